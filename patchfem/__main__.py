@@ -105,7 +105,7 @@ def first_screen() -> str:
         for verb, (_, what, example) in verbs.items():
             shown = f"  patchfem {verb} {example}"
             lines += [f"{shown:<45}  {what}"] if len(shown) <= 45 else [shown, f"{'':47}{what}"]
-    return "\n".join([*lines, "", "`patchfem run --help` explains a verb; `--install-completion` completes words."])
+    return "\n".join([*lines, "", "`patchfem run --help` explains a verb; `--install-completion` adds completion."])
 
 
 def known(words: list) -> None:

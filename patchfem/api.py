@@ -186,7 +186,8 @@ def backbone(scene: str | Path | Scene | Model, /, *, mode: str = "",
     model = joint.freed(build(scene, **sets))
     ways = backbones.WAYS if _word(method, "backbone: method") == "all" else (method,)
     if unknown := set(ways) - set(backbones.WAYS):
-        raise PatchfemError(f"backbone: method {unknown.pop()!r}: one of {', '.join(backbones.WAYS)} or all")
+        raise PatchfemError(f"backbone: method {unknown.pop()!r} is not known; use one of {', '.join(backbones.WAYS)}, "
+                            "or all")
     wanted = None if amplitudes is None else axes.lengths(_lengths(amplitudes), "amplitudes")
     found = backbones.backbone(model, _word(mode, "backbone: mode"), wanted, ways)
     return backbone_files.contents(found, model.source.title).to_xarray()
@@ -207,7 +208,7 @@ def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *
     "failed" and its message. Raises SceneError if no case is valid.
     """
     if over is not None and not isinstance(over, Mapping):
-        raise PatchfemError(f"sweep: over is a dict of key: values, not {over!r:.60}")
+        raise PatchfemError(f"sweep: over must be a dict of keys and their values, not {over!r:.60}")
     if wrong := oversized(over or {}):
         raise SceneError(wrong)
     asked = case_models.Asked(*_text_of(scene))
@@ -293,7 +294,7 @@ def fit(scene: str | Path | Scene, /, *, to: str | Path = "", free: Mapping[str,
     """
     found, tell = load(scene, **sets), _on_stderr if say is None else say
     if not isinstance(free, Mapping | None):
-        raise PatchfemError(f"fit: free is a dict of key: (low, high), not {free!r:.60}")
+        raise PatchfemError(f"fit: free must be a dict of keys and their ranges (low, high), not {free!r:.60}")
     asked = [f"{key}={_ends_of(key, ends)}" for key, ends in (free or {}).items()]
     slides = "" if amplitudes is None else _lengths(amplitudes)
     options = fits.Options(_words(hold, "fit: hold"), _words(offset, "fit: offset"), warm_up, leave_out, starts, seed,
@@ -368,7 +369,7 @@ def export(folder: str | Path, out: str | Path, /, *, frame: int | None = None, 
     if folder.suffix != ".toml":
         chosen.export(folder, out, frame, histories, of)
     elif frame is not None or histories or of:
-        raise PatchfemError("frame, histories, of: can only be used for a results folder; of a scene only the "
+        raise PatchfemError("frame, histories and of can be used only with a results folder; from a scene only the "
                             "structure is exported")
     else:
         from .export.lab import structures  # its folder holds more than words
@@ -447,7 +448,7 @@ def compare(*files: str | Path, direction: str = "", units: tuple[str, str] | No
     if pairs is None:
         return compared_data.data_of(*verdict.judged(files, direction, **how))
     if files:
-        raise PatchfemError("compare: files or a table of pairs are needed, not both")
+        raise PatchfemError("compare: give either files or a table of pairs, not both")
     return pairs_data.data_of(pairs_data.answers(pairs_tables.read_pairs(_path(pairs, "compare: pairs")), direction,
                                                  **how))
 

@@ -54,8 +54,8 @@ _SENTENCES = {
     Outcome.EXCEEDS_TRAVEL: "The motion exceeded the travel of the flexure, so the run ended there.",
     Outcome.LEAVES_CONTACT: "The slide passed the end of the piece, where the pieces no longer overlap; lower the "
                             "drive, shorten the slide or lengthen the piece.",
-    Outcome.LEAVES_GROOVES: "The inertia of the lifted mass took all of the load, so it left its grooves and the run "
-                            "ended there; lower the drive or the lifted mass, or raise the load.",
+    Outcome.LEAVES_GROOVES: "The inertia of the lifted mass took all of the load, so the pieces left their grooves and "
+                            "the run ended there; lower the drive or the lifted mass, or raise the load.",
     Outcome.WORN_THROUGH: "Wear went through a coating at its deepest place, so the run ended; ask for fewer "
                           "cycles or make the coating thicker.",
     Outcome.NO_CONTACT: "The pieces do not touch; raise the load or close the gap.",

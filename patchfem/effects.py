@@ -110,10 +110,11 @@ EFFECTS = {
                                    "l_k = l_ref exp(T_l (1/T_s - 1/T_ref)) (2.13)"),
     "slide.kind=constant": Effect("", "q = speed t", (), ("motion",)),
     "slide.kind=sine": Effect("", "q = amplitude sin(2 pi f t)", (), ("motion",)),
-    "slide.kind=triangle": Effect("", "q between +- amplitude at constant speed", (), ("motion",)),
-    "slide.kind=dwell": Effect("", "q = speed t, then hold at rest (2.10 with v = 0), then on at the same speed", (),
+    "slide.kind=triangle": Effect("", "q moves between -amplitude and +amplitude at constant speed", (), ("motion",)),
+    "slide.kind=dwell": Effect("", "q = speed t, then rest for `hold` (2.10 with v = 0), then slide on at the same "
+                                   "speed", (),
                                ("motion",)),
-    "slide.kind=file": Effect("patchfem.inputs.paths", "q straight between the rows of a table", (), ("motion",)),
+    "slide.kind=file": Effect("patchfem.inputs.paths", "q is linear between the rows of a table", (), ("motion",)),
     "structure": Effect("patchfem.structure.modes", "z_i'' + 2 zeta_i w_i z_i' + w_i^2 z_i = G_i + g_i (3.4)", (),
                         ("modes",)),
     "structure.reduced": Effect("patchfem.structure.reduced", "x = V y, V of constraint and fixed-interface modes, or "
@@ -130,7 +131,7 @@ EFFECTS = {
     "drive.waveform=levels": _wave("a(t) = a_k sin(2 pi f t), level after level",
                                    ("frequency levels", "onset onset_length"),
                                    "steady endless"),
-    "drive.waveform=file": _wave("a(t) straight between the rows of a table", ("file", "")),
+    "drive.waveform=file": _wave("a(t) is linear between the rows of a table", ("file", "")),
     "drive.waveform=tones": _wave("a(t) = sum_k a_k sin(2 pi f_k t + phi_k)", ("frequencies accelerations", "phases"),
                                   "endless", "patchfem.structure.tones"),
     "drive.waveform=random": _wave("a(t) = sum_k A_k cos 2 pi f_k t + B_k sin 2 pi f_k t, A_k, B_k normal of variance "
@@ -139,18 +140,19 @@ EFFECTS = {
     "structure.stiffening": Effect("patchfem.dynamics.march.joints", "F = k_3 x^3 at the output"),
     "accuracy.method=exact": Effect("patchfem.dynamics.events.histories", "closed form or series between events"),
     "accuracy.method=march": Effect("patchfem.dynamics.march.loop_kernels",
-                                    "exact propagator, path-mean force, Newton on the "
-                                    "force residual"),
+                                    "exact propagator of the modes, mean force along the path, Newton's method for the "
+                                    "force"),
     "accuracy.method=duhamel": Effect("patchfem.dynamics.comparison.duhamel",
-                                      "Duhamel's integral with forces linear in the step, "
-                                      "fixed point (3.10)"),
+                                      "Duhamel's integral with forces that are linear within a step, fixed-point "
+                                      "iteration (3.10)"),
     "accuracy.method=newmark": Effect("patchfem.dynamics.comparison.newmark",
-                                      "average acceleration, stuck below a speed"),
+                                      "Newmark's average acceleration; the interface sticks below a given speed"),
     "accuracy.method=euler": Effect("patchfem.dynamics.comparison.euler", "explicit Euler"),
     "accuracy.method=harmonic": Effect("patchfem.dynamics.harmonic.harmonic",
                                        "x = Re sum X_k exp(i k w t); Coulomb: the map of "
                                        "events over a period"),
-    "wear": Effect("patchfem.wear.depth", "g += h, dh = coefficient p ds per point, or tau ds of form 'energy'",
+    "wear": Effect("patchfem.wear.depth", "g += h, dh = coefficient p ds at each point; with form 'energy' dh = "
+                                          "coefficient tau ds",
                    ("pressure", "traction")),
     "wear.friction": Effect("", "mu = mu_0 c(h), eps = eps_0 l(h), h = worn volume/area", ("traction",)),
     "measured": Effect("", "overlay of measured rows"),
@@ -259,7 +261,7 @@ MEANWHILE = {  # what serves where two effects cannot stand together yet
     "linear": "use 'linear'",
     "march": "use 'march'",
     "march or stiff": "use 'march', or law 'elastic-plastic' with a short bond_length",
-    "stiff": "use law 'elastic-plastic' with a short bond_length, which is Coulomb behind stiff springs",
+    "stiff": "use law 'elastic-plastic' with a short bond_length, which acts as Coulomb friction behind stiff springs",
 }
 
 

@@ -132,7 +132,7 @@ def test_refuses_amplitudes_that_are_no_lengths(amplitudes, said):
 
 @pytest.mark.parametrize("free, said", [
     ({"friction.static": 0.3}, r"\(low, high\) .* not 0\.3"), ({"friction.static": (0.1, 0.2, 0.5)}, r"\(low, high\)"),
-    ({"friction.static": None}, "not a value of a scene"), (["friction.static=0.1..0.5"], "is a dict"),
+    ({"friction.static": None}, "not a value of a scene"), (["friction.static=0.1..0.5"], "must be a dict"),
     ({}, "at least one"), ({"friction.static": "0.5..0.1"}, "must lie below")])
 def test_refuses_free_keys_without_two_ends(tmp_path, free, said):
     with pytest.raises(pf.PatchfemError, match=said):
@@ -140,7 +140,8 @@ def test_refuses_free_keys_without_two_ends(tmp_path, free, said):
 
 
 @pytest.mark.parametrize("scene, given, said", [
-    (BLOCK, {"offset": ["force"], "warm_up": True}, "offset belongs to a loop of a bench; warm_up belongs"),
+    (BLOCK, {"offset": ["force"], "warm_up": True}, "offset belongs to a loop "
+                                                    "under a prescribed slide; warm_up belongs"),
     (pf.new("bench"), {"starts": 3}, "starts belongs to rows of a rig"),
     (pf.new("bench"), {"leave_out": "frequency"}, "leave_out belongs to rows of a rig"),
     (pf.new("wear"), {"hold": "frequency=1 Hz"}, "hold belongs to a loop"), (BLOCK, {"starts": 0}, "at least one"),
@@ -220,7 +221,7 @@ def test_exact_an_import_is_that_of_the_command_line(tmp_path):
     cli("import", path, "-o", tmp_path / "shell.csv", "--zero")
     assert (tmp_path / "python.csv").read_bytes() == (tmp_path / "shell.csv").read_bytes() and found["rows"] == 3
     for given, said in (({"segmet": "2 s"}, "segmet: unknown setting"), ({"map": 3}, "map: a text"),
-                        ({"segment": 2.0}, "segment: a text"), ({"begin": "1 s"}, "can only be used for modes")):
+                        ({"segment": 2.0}, "segment: a text"), ({"begin": "1 s"}, "can be used only for modes")):
         with pytest.raises(pf.PatchfemError, match=said):
             pf.import_(path, tmp_path / "other.csv", **given)
 
@@ -236,7 +237,7 @@ def test_refuses_what_is_no_scene_file_word_or_dataset(odd):
              lambda one: pf.compare("a.csv", "b.csv", shift=[one]), lambda one: pf.cost(BLOCK, over=[one])]
     verbs = verbs[:10] + verbs[11:] if odd is None else verbs  # a sweep without axes takes those of its table
     for verb in verbs:
-        with pytest.raises(pf.PatchfemError, match=r"needed|at least one|unknown kind|is a dict|settings|not a"):
+        with pytest.raises(pf.PatchfemError, match=r"needed|at least one|unknown kind|must be a dict|settings|not a"):
             verb(odd)
 
 

@@ -163,8 +163,8 @@ def backbone(model: Model, mode: str = "", amplitudes=None, methods=WAYS, progre
         joint = _joint(model, mode)
         wanted = _default(joint) if amplitudes is None else np.unique(np.asarray(amplitudes, float))
         if wanted[-1] > joint.model.rig.travel:
-            raise PatchfemError(f"the amplitude {say(wanted[-1], 3)} lies beyond it; give smaller ones with "
-                                "--amplitudes", "structure.travel")
+            raise PatchfemError(f"the amplitude {say(wanted[-1], 3)} lies beyond this travel; give smaller amplitudes "
+                                "with --amplitudes", "structure.travel")
         curves, missing, richer = {}, {}, model.rig.richer
         other = None if richer is None else _joint(replace(model, rig=richer), mode)
         for way in methods:
@@ -188,7 +188,7 @@ def _beside(curve: Curve, other: Curve) -> Curve:
     a, ends = curve.amplitude, other.amplitude[[0, -1]] * [1 - CLOSE, 1 + CLOSE]
     curve = curve.at((a >= ends[0]) & (a <= ends[1]))
     if not curve.amplitude.size:
-        raise NotConverged("with more modes of the structure no motion of these amplitudes was found; raise "
+        raise NotConverged("the check run with more modes of the structure found no motion of these amplitudes; raise "
                            "structure.reduced.modes")
     frequency, damping = (OF_MODES * np.abs(np.interp(curve.amplitude, other.amplitude, theirs) - own) for own, theirs
                           in ((curve.frequency, other.frequency), (curve.damping, other.damping)))
@@ -214,11 +214,11 @@ def _joint(model: Model, name: str) -> Joint:
     if not (modes.omega[number] or joint.held[0]):
         raise PatchfemError("this mode has 0 Hz and its friction is rigid, so it has no natural frequency")
     if not (joint.linear or model.rig.bends or np.abs(modes.interfaces @ joint.held[1]).max() > 0):
-        raise PatchfemError("the mode does not move the contact, so no friction acts on it; choose another with "
-                            "--mode, or give it a slide")
+        raise PatchfemError("the mode does not move the contact, so no friction acts on it; choose another mode with "
+                            "--mode, or give this mode a slide")
     if not joint.reach > 0:
-        raise PatchfemError("the mode does not move the output, so it has no amplitude there; give it an output, or "
-                            "choose another with --mode")
+        raise PatchfemError("the mode does not move the output, so the mode has no amplitude there; give the mode an "
+                            "output, or choose another mode with --mode")
     return joint
 
 
@@ -505,7 +505,7 @@ def _sized(equations: FreeBalance, joint: Joint, x, here: float, amplitude: floa
             slope = (off - before[1]) / np.log(here / before[0])
         slope, before = slope if slope > SLOW else 1.0, (here, off)
         here *= np.exp(-off / slope)
-    raise NotConverged(f"no free motion is {say(amplitude, 3)} large at the output")
+    raise NotConverged(f"no free motion has an amplitude of {say(amplitude, 3)} at the output")
 
 
 def _begun(equations: FreeBalance, first, small: float, here: float) -> np.ndarray:
@@ -527,8 +527,8 @@ def _turned(joint: Joint, amplitudes) -> Curve:
     """Curve under rigid friction; it begins where the motion no longer holds on the way."""
     model, modes, load = joint.model, joint.model.rig.modes, _limit(joint)
     if model.rig.bends or not modes.omega.all():
-        raise PatchfemError("with rigid friction it cannot be computed if there is a nonlinear spring or a mode of 0 "
-                            "Hz")
+        raise PatchfemError("with rigid friction the free motion cannot be computed if there is a nonlinear spring or "
+                            "a mode of 0 Hz")
     f, row = model.friction, modes.interfaces[0]
     kinetic = load if f.kinetic is None else load * f.kinetic / f.static
     found = limit_cycles.relay_backbone(modes, row, (kinetic, load), amplitudes, joint.mode)
@@ -681,7 +681,7 @@ def _decayed(joint: Joint, amplitudes) -> Curve:
         found = engine.run(what, how, joint.patch, 0, None, None)
     error += reading
     if not known.any():
-        raise NotConverged("the release gave no frequency and damping at these amplitudes")
+        raise NotConverged("the free decay gave no frequency and damping at these amplitudes")
     return Curve(amplitudes, best[0], error[0], best[1], error[1], np.full(amplitudes.size, np.nan)).at(known)
 
 
@@ -829,10 +829,11 @@ def _regimes(joint: Joint, wanted, micro: float | None) -> list:
         return []
     edge = MICRO * _amplitude_of(joint, _knee(joint))
     if wanted[0] > edge:
-        return [f"the smallest amplitude, {say(wanted[0], 3)}, is beyond micro-slip, which ends at some "
-                f"{say(edge, 2)}; amplitudes from {say(LOW / MICRO * edge, 2)} on show its exponent"]
-    return [f"no exponent of micro-slip is told: fewer than two amplitudes below {say(edge, 2)} have a loss of "
-            f"{RESOLVED:g} times its error or more; give amplitudes that end there, or a smaller accuracy.tolerance"]
+        return [f"the smallest amplitude, {say(wanted[0], 3)}, lies beyond micro-slip, which ends at about "
+                f"{say(edge, 2)}; begin at {say(LOW / MICRO * edge, 2)} to see the exponent of micro-slip"]
+    return [f"the exponent of micro-slip cannot be determined: fewer than two amplitudes below {say(edge, 2)} have a "
+            f"loss of at least {RESOLVED:g} times the error of the loss; give amplitudes up to {say(edge, 2)}, or a "
+            "smaller accuracy.tolerance"]
 
 
 def _edge(one: Curve) -> float | None:
@@ -855,7 +856,8 @@ def _unworn(model: Model) -> tuple:
     return () if model.wear is None else ("these curves are for unworn pieces: [wear] is ignored",)
 
 
-LEFT_OUT = {"balance": "not computed: the balance did not converge there; the curve may fold, or the mode dies out",
+LEFT_OUT = {"balance": "not computed: harmonic balance did not converge there; the curve may fold back, or the mode "
+                       "may stop oscillating",
             "quasi-static": "the static curve ends there",
             "decay": "not computed: the release, or one of its coarser check runs, gave no frequency and damping there"}
 
@@ -868,7 +870,7 @@ def _gaps(wanted, curves: dict) -> list:
         if lacks.size and one.amplitude.size < wanted.size:
             left = f"lie from {say(lacks[0], 3)} to {say(lacks[-1], 3)}" if lacks.size > FEW else \
                 f"are {', '.join(say(each, 3) for each in lacks)}"
-            out.append(f"{way} has {one.amplitude.size} of {wanted.size} points; those left out {left}: "
+            out.append(f"{way} has {one.amplitude.size} of {wanted.size} points; the points left out {left}: "
                        f"{LEFT_OUT[way]}")
     return out
 
@@ -876,14 +878,15 @@ def _gaps(wanted, curves: dict) -> list:
 def _secant(joint: Joint, wanted, curves: dict) -> list:
     """A sentence on what a static curve in slip is, where no balance stands beside it."""
     slips = not joint.linear and _limit(joint) and wanted[-1] > MICRO * _amplitude_of(joint, _knee(joint))
-    return ["quasi-static frequencies are those of the stiffness from turn to turn under a force of fixed shape; once "
-            "the contact slips they lie above those of --method balance, whose first harmonic has less of it"] \
+    return ["quasi-static frequencies follow from the stiffness between turning points under a force of fixed shape; "
+            "once the contact slips they are higher than those of --method balance, because the first harmonic of the "
+            "force gives a lower stiffness"] \
         if slips and "quasi-static" in curves and "balance" not in curves else []
 
 
-WHY = {"decay": "a decay gives the mean over a cycle, in which the amplitude falls by the share {:.2g} there",
-       "quasi-static": "the static curve uses the secant stiffness and a fixed force shape; harmonic balance follows "
-                       "the first harmonic"}
+WHY = {"decay": "a decay gives the mean over a cycle, in which the amplitude falls by a fraction of {:.2g} there",
+       "quasi-static": "the static curve uses the secant stiffness under a force of fixed shape; harmonic balance uses "
+                       "the first harmonic of the force"}
 
 
 def _differences(curves: dict) -> list:

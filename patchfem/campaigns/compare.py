@@ -69,8 +69,8 @@ def pressed(before: Model, after: Model, title: str, say: Callable | None = None
             sides.append(None)
             failed.append(f"the surface {name}: {error}")
     known = {name for one in sides if one is not None for name, m in one.measures.items() if _there(m)}
-    lacking = tuple(f"{words}: this scene does not compute it, because it needs "
-                    f"{need}" for name, (words, need) in SHOWN.items()
+    lacking = tuple(f"{words}: not computed by "
+                    f"this scene, because it lacks {need}" for name, (words, need) in SHOWN.items()
                     if name not in known) if any(sides) else ()
     return Pressed(title, *sides, tuple(failed), lacking)
 

@@ -77,7 +77,7 @@ def curve(model: Model, knob: str, say=None) -> list:
     with placed(model.source):
         mine = knobs_of(model)
         if knob not in mine:
-            raise PatchfemError(f"cost --over {knob}: this scene has only the keys {', '.join(mine) or 'none'}", "")
+            raise PatchfemError(f"cost --over {knob}: this scene has only the settings {', '.join(mine) or 'none'}", "")
         wanted = settings(model, knob)
         _tried(wanted[0], "first run, not counted", None)  # imports and compiling stay out of the times
         runs, done = [], 0
@@ -214,14 +214,14 @@ def sentence(runs: list, tolerance: float) -> str:
     the best one."""
     names, percent = _stated(runs), f"{100 * tolerance:g} %"
     if one := quickest(runs, tolerance):
-        return f"{one.words} takes {_seconds(one)} and has all measures within {percent}"
+        return f"{one.words}: {_seconds(one)} per run, with all measures within {percent}"
 
     known = [one for one in runs if one.errors or one.distances]
     share, name, least = min(((*_worst(one, names, tolerance), one) for one in known), key=lambda found: found[0])
     if share >= STUCK * max(_worst(one, [name], tolerance)[0] for one in known if name in one.values):
         return (f"no run has all measures within {percent}: the error of {name} is {100 * share:.2g} % with every "
                 "setting")
-    return (f"no run has all measures within {percent}: {name} is within {100 * share:.2g} % at best, with "
+    return (f"no run has all measures within {percent}: the smallest error of {name} is {100 * share:.2g} %, with "
             f"{least.words} in {_seconds(least)}")
 
 

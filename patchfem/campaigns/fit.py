@@ -165,11 +165,11 @@ def _doubts(fitted: Fitted, led: bool) -> list:
     out, peak, used = [], float(np.abs(loop.reading).max()), np.count_nonzero(~held)
     if rms > 1e-6 * peak and rows < FEWER * used:
         out.append(f"the residual is correlated from row to row, so the {used} rows count as {max(rows, 1):.3g} "
-                   "independent ones in the intervals; the law or the instrument does not describe everything")
+                   "independent rows in the intervals; a part of the deviation is systematic")
     if abs(loop.reading[0]) > 0.2 * peak and not has(scene.friction.law, "memoryless") and not held[0] and not led:
         out.append(f"the first row is at {abs(loop.reading[0]) / peak:.0%} of the peak, but the model starts "
                    "unstressed: use --warm-up, hold out the first cycle, or begin the record at rest")
     if step_error > scene.accuracy.tolerance * peak:
-        out.append(f"with half the steps the model changes by {step_error / peak:.1g} of the peak, more than the "
-                   "tolerance")
+        out.append(f"with half the steps the force of the model changes by {step_error / peak:.1g} of the peak, more "
+                   "than the tolerance")
     return out

@@ -75,14 +75,14 @@ def read_curve(path) -> tuple:
     table = read_columns(path, units, tuple(f"decay_{name} {name}" for name in UNITS), HEADER, "a decay",
                          labels=True)
     if len(set(table.labels.get("method", ("",)))) > 1:
-        raise PatchfemError(f"{path}: curves of several methods; keep the rows of one")
+        raise PatchfemError(f"{path}: the file has the curves of several methods; keep the rows of one method")
     columns = {name.removeprefix("decay_"): one for name, one in table.values.items()}
     value = np.array([columns["frequency"], columns["damping"]])
     spread = np.array([columns[f"{name}_error"] / 2 if f"{name}_error" in columns else half * np.abs(one) for
                        name, half, one in zip(("frequency", "damping"), HALVES, value)])
     if (spread < 0).any():
-        raise PatchfemError(f"{path}: an error is below 0; give half the width of its interval, or leave out the "
-                            "column")
+        raise PatchfemError(f"{path}: an error is below 0; give half the width of each interval, or leave out the "
+                            "column of errors")
     if not (columns["amplitude"] > 0).all() or not (value[0] > 0).all():
         raise PatchfemError(f"{path}: amplitudes and frequencies must be above 0")
     order = np.argsort(columns["amplitude"], kind="stable")
@@ -151,7 +151,7 @@ def fit_decay(scene: Scene, to: Path, free, say=None, starts: int = 3) -> Fitted
             told = balanced(start)
         except PatchfemError as reason:
             raise PatchfemError(f"at the fitted values harmonic balance finds no oscillation at {_listed(amplitude)}: "
-                                f"{reason}; leave out the rows of the largest damping, or narrow --free") from None
+                                f"{reason}; leave out the rows with the largest damping, or narrow --free") from None
         settled = np.abs((told - quick(start)) / error).max() < SAME
         tried.append((float(np.square((told - measured) / error).sum()), len(tried), start))
         share, starts = share * told / quick(start), 1
@@ -159,8 +159,8 @@ def fit_decay(scene: Scene, to: Path, free, say=None, starts: int = 3) -> Fitted
     start = start if settled else min(tried)[2]
     found = fitted(model, "series")
     best, lost = model(found.values), amplitude[np.isnan(curve(found.values, ways[0])[0])]
-    warned = [f"harmonic balance found no oscillation at {_listed(lost)}; the static curve is used there, corrected as "
-              "at the nearest amplitude"] if lost.size else []
+    warned = [f"harmonic balance found no oscillation at {_listed(lost)}; there the static curve is used, with the "
+              "correction found at the nearest amplitude"] if lost.size else []
     sets = [one.assigned(value) for one, value in zip(wanted, found.values)]
     return FittedDecay(scene, Path(to), wanted, found, amplitude, measured, error, best, ways[0], sets,
                        [*scene.remarks, *warned, *remarks(found, [one.key for one in wanted])], perf_counter() - begin)
@@ -182,8 +182,8 @@ def _known(curve, tried: list) -> list:
         if len(most) == len(WAYS):
             break
     if not most:
-        raise PatchfemError("no backbone of the scene could be computed within --free; "
-                            f"{'; '.join(reasons[:len(WAYS)])}; leave out the rows of the largest damping, or change "
+        raise PatchfemError("no curve over the amplitude could be computed within the ranges of --free; "
+                            f"{'; '.join(reasons[:len(WAYS)])}; leave out the rows with the largest damping, or change "
                             "the ranges of --free")
     return most
 

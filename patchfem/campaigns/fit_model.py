@@ -152,4 +152,4 @@ class BenchModel:
         slide, half = self.scene.slide, float(np.ptp(self.loop.displacement)) / 2
         if slide.kind in ("sine", "triangle") and abs(slide.amplitude - half) > 0.02 * half:
             self.notes.append(f"slide.amplitude is {slide.amplitude:.4g} m, but the measured displacement runs over "
-                              f"+-{half:.4g} m; the model follows the measured one")
+                              f"+-{half:.4g} m; the model follows the measured displacement")

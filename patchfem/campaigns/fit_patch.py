@@ -141,12 +141,12 @@ def _coarse(model: Model, patch, left: float) -> tuple:
     """Sentences on a mesh that leaves a share `left` of the loss open."""
     if left <= KNOWN:
         return ()
-    cure = "begin with larger amplitudes, where more of its elements slip"
+    cure = "begin with larger amplitudes, at which more elements of the patch slip"
     if not model.patch.chosen:
-        cure = "leave contact.element_size out: the mesh is then refined until it is known" \
-            if model.patch.mesh is None else "cut the mesh of the file finer"
-    return (f"the mesh ({patch.x.size} interface nodes) leaves {100 * left:.2g} % (rms) of the loss open, and with it "
-            f"the exponent of micro-slip, which is chi of 'iwan'; {cure}",)
+        cure = "leave contact.element_size out: the mesh is then refined until chi is known" \
+            if model.patch.mesh is None else "refine the mesh in the file"
+    return (f"the mesh ({patch.x.size} interface nodes) leaves {100 * left:.2g} % (rms) of the loss uncertain, and "
+            f"with the loss also chi of law 'iwan', which sets the exponent of micro-slip; {cure}",)
 
 
 def fit_law(law: str, static: float, load: float, slides, own: Curves, stiffness: float) -> OneLaw:
@@ -194,9 +194,9 @@ def _refuse(model: Model) -> None:
                              f"{' or '.join(named)}", f.law not in named),
             ("friction.law", f"'{f.law}' is rigid, so there is no stiffness to fit: add [contact.shear] or "
              "contact.asperities.tangential_ratio", has(f.law, "set-valued") and not model.soft),
-            ("contact.grooves", "no fitted law describes a load that climbs grooves; leave them out here and add "
-                                "[normal.grooves] to the fitted law", model.grooves is not None),
-            ("wear", "the loops are those of unworn pieces; leave [wear] out", model.kind != "patch" and
+            ("contact.grooves", "no fitted law describes grooves; leave them out here and add [normal.grooves] to the "
+                                "fitted law", model.grooves is not None),
+            ("wear", "the fit uses the loops of unworn pieces; leave [wear] out", model.kind != "patch" and
              model.wear is not None),
             ("structure.mode", "moves or turns the pieces out of the plane of the contact, so the load and the loops "
                                "change; set normal, pitch and yaw to 0", rig is not None and

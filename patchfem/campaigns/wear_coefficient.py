@@ -87,8 +87,8 @@ def _from_file(path: Path) -> Measured:
         parts = [one.get(key) for key in ("value", "low", "high")] if isinstance(one, dict) else [None]
         if all(isinstance(part, (int, float)) and math.isfinite(part) for part in parts) and parts[0] > 0:
             return Measured(name, float(parts[0]), max(float(parts[1]), 0.0), float(parts[2]), str(path))
-    raise PatchfemError(f"{path}: it contains no worn depth above zero; compare gives none if both traces lack a "
-                        "common reference")
+    raise PatchfemError(f"{path}: the file contains no worn depth above zero; compare gives no depth if the traces "
+                        "have no common reference")
 
 
 def wear_coefficient(model: Model, to: str, free, progress=None) -> Coefficient:
@@ -106,8 +106,8 @@ def wear_coefficient(model: Model, to: str, free, progress=None) -> Coefficient:
     patch = ladder.solve_all(model.patch, model.accuracy.tolerance, False)[0]  # no coefficient changes it
     curve, most = _curve(model, patch, bounds.high, target.name, progress)
     if not curve[1][-1] >= target.value:
-        raise PatchfemError(f"--free {KEY}: with {bounds.high:.4g} m^2/N the scene reaches {target.name} = "
-                            f"{curve[1][-1]:.4g} of the measured {target.value:.4g}; "
+        raise PatchfemError(f"--free {KEY}: with {bounds.high:.4g} m^2/N the scene reaches only {target.name} = "
+                            f"{curve[1][-1]:.4g}, but {target.value:.4g} was measured; "
                             + ("the coating is worn through then" if curve[0][-1] < 1 else "raise the high bound"))
     inverse = _inverse(curve)
     value, runs, reached = float(bounds.high * inverse(target.value)), 1, math.nan
@@ -122,7 +122,7 @@ def wear_coefficient(model: Model, to: str, free, progress=None) -> Coefficient:
                            f"{target.value:.6g}")
     if value < bounds.low:
         raise PatchfemError(f"--free {KEY}: {target.name} = {target.value:.4g} needs {value:.4g} m^2/N, below the low "
-                            f"bound {bounds.low:.4g}; lower it")
+                            f"bound {bounds.low:.4g}; lower this bound")
     low, high = (value * inverse(min(end, most)) / inverse(target.value) for end in (target.low, target.high))
     return Coefficient(float(value), float(low), float(high), target, float(reached), bounds, runs)
 

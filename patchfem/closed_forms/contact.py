@@ -54,7 +54,7 @@ def hertz_pressure(x, line_load, radius, modulus):
 def _offset(offset, half) -> None:
     positive(half=half)
     if not abs(offset) < half:
-        raise ValueError(f"the load line at {offset} lies outside the punch of half width {half}: it tips over")
+        raise ValueError(f"the load line at {offset} lies outside the punch of half width {half}: the punch tips over")
 
 
 def punch_contact(half, offset=0.0) -> tuple:
@@ -113,7 +113,7 @@ def _rounded_angle(line_load, flat, radius, modulus) -> float:
     want = 2 * line_load * radius / (flat**2 * modulus)
     top = np.pi / 2 - 1e-9
     if want >= _less_sine(2 * top) / (2 * np.cos(top)**2):
-        raise ValueError("the flat is too short to count under this load; use hertz_pressure")
+        raise ValueError("the flat part is too short to matter under this load; use hertz_pressure")
     from scipy.optimize import brentq
 
     return brentq(lambda t: _less_sine(2 * t) / (2 * np.cos(t)**2) - want, 0.0, top, xtol=1e-18, rtol=1e-15)
@@ -253,7 +253,8 @@ def cattaneo_stick_half_width(shear_load, line_load, radius, modulus, friction):
     half = hertz_half_width(line_load, radius, modulus)
     share = np.abs(shear_load) / (friction * line_load)
     if np.any(share > 1):
-        raise ValueError(f"shear_load {shear_load} exceeds friction times load, {friction * line_load}: it slides")
+        raise ValueError(f"shear_load {shear_load} exceeds friction times load, {friction * line_load}: the contact "
+                         "slides")
     return half * np.sqrt(1 - share)
 
 
@@ -324,7 +325,7 @@ def wedge_loop(amplitude, friction, tangential, area, least, largest):
     """
     positive(amplitude=amplitude, friction=friction, tangential=tangential, area=area, largest=largest)
     if not 0 <= least <= largest:
-        raise ValueError(f"least must lie between 0 and largest, got {least} and {largest}")
+        raise ValueError(f"'least' must lie between 0 and 'largest', got {least} and {largest}")
     amplitude = np.asarray(amplitude, float)
     low, high = friction * least / tangential, friction * largest / tangential
     slip = np.clip(amplitude, low, high)
@@ -341,5 +342,5 @@ def kern_fraction(offset, length):
     positive(length=length)
     share = np.abs(np.asarray(offset, float)) / length
     if np.any(share >= 1 / 2):
-        raise ValueError(f"the load line at {offset} lies outside the pad of length {length}: it tips over")
+        raise ValueError(f"the load line at {offset} lies outside the pad of length {length}: the pad tips over")
     return np.minimum(1, 3 * (1 / 2 - share))

@@ -80,16 +80,16 @@ def sliding_amplitude(r, friction, damping=0.0) -> float:
     try:
         free = np.linalg.solve(np.stack([x0 + x1, v0 + v1]), [-2 * friction, 0.0])
     except np.linalg.LinAlgError:
-        raise ValueError(f"no isolated sliding motion at r = {r} without damping") from None
+        raise ValueError(f"no isolated sliding motion exists without damping at the frequency ratio r = {r}") from None
     size2 = 1 / ((1 - r * r)**2 + (2 * damping * r)**2)
     sine = v0 @ free / r
     if size2 < sine**2:
-        raise ValueError(f"no motion without stops at r = {r}, f/a = {friction}")
+        raise ValueError(f"no motion without stops exists at the frequency ratio r = {r} with f/a = {friction}")
     cosine = np.sqrt(size2 - sine**2)
     t = half * (np.arange(2000) + 0.5) / 2000
     speed = np.array([basis(at)[1] @ free for at in t]) - r * (cosine * np.sin(r * t) + sine * np.cos(r * t))
     if speed.max() > 0:
-        raise ValueError(f"the block stops on the way at r = {r}, f/a = {friction}")
+        raise ValueError(f"the block stops during the cycle at the frequency ratio r = {r} with f/a = {friction}")
     return float(friction + x0 @ free + cosine)
 
 

@@ -27,7 +27,7 @@ def weight_along(relative_path, order=1.0):
     if order <= -1:
         raise ValueError(f"order must exceed -1, got {order}")
     if np.any(x < 0):
-        raise ValueError("a path is never negative (2.9)")
+        raise ValueError("the path must not be negative (eq. 2.9)")
     with np.errstate(divide="ignore"):
         return np.exp(xlogy(order, x) - x - gammaln(order + 1))
 
@@ -91,7 +91,7 @@ def virgin_force(slide, length, order=1.0, initial=1.0, limit=1.0):
     if order <= -1:
         raise ValueError(f"order must exceed -1, got {order}")
     if np.any(x < 0):
-        raise ValueError("slide must not be negative; the virgin curve is odd")
+        raise ValueError("slide must not be negative; the curve of first loading is odd")
     with np.errstate(divide="ignore", invalid="ignore"):
         first = initial * x**order * np.exp(-x) / gamma(order + 1) if initial else 0.0
     return limit * (gammainc(order + 1, x) + first)

@@ -44,7 +44,8 @@ def compare(before: Path | None = None, after: Path | None = None, /, *other: Pa
             direction: word("axis along which the traces run, x or y; not needed for an areal scan, which has "
                             "both") = "",
             units: Units = "",
-            shift: word('known shift (x after minus x before), such as "0 mm" if both traces start at one mark') = "",
+            shift: word('known shift of the second trace (x of AFTER minus x of BEFORE), such as "0 mm" if both traces '
+                        'start at the same mark') = "",
             keep_spikes: flag("keep spikes, dropouts and dust, which are otherwise left out of traces") = False,
             scene: Annotated[Path | None, Parameter(name="--scene", help="scene whose patch is pressed with each "
                                                                          "surface, such as rig.toml")] = None,
@@ -136,7 +137,8 @@ def _runs(before: Path, after: Path, out, json_: bool):
 def _pressed(scene: Path, sets, part, target: Path, quiet: bool):
     """The scene with each surface as its profile; the traces are written beside the page."""
     if not isinstance(part.before, profile.Profile):
-        raise Refused("compare --scene: only traces can be pressed; write one row of each scan to a file")
+        raise Refused("compare --scene: the contact can be computed only for traces; write one row of each scan to a "
+                      "file")
     if scene_of(scene, sets).contact is None:
         raise Refused(f"compare --scene {scene}: the scene has no [contact], so it has no patch to press")
     models = []

@@ -78,7 +78,8 @@ def _window() -> Finding:
         fine, why = done.returncode == 0, (done.stderr.strip().splitlines() or ["it crashed"])[-1][:100]
     except (OSError, subprocess.TimeoutExpired) as error:
         fine, why = False, str(error)[:100]
-    cure = "" if fine else "apt-get install libgl1 libxrender1, or write a picture (view -o FILE.png), which needs none"
+    cure = "" if fine else ("run apt-get install libgl1 libxrender1, or write a picture (view -o FILE.png), which "
+                            "needs neither")
     return Finding("the window by OpenGL", fine, "drawn" if fine else why, cure)
 
 
@@ -87,7 +88,7 @@ def _film() -> Finding:
     program = which("ffmpeg")
     found = "by ffmpeg" if program else _version("imageio-ffmpeg") and f"imageio-ffmpeg {_version('imageio-ffmpeg')}"
     return Finding("films (.mp4)", bool(found), found or "neither ffmpeg nor imageio-ffmpeg, optional",
-                   "" if found else "pip install imageio-ffmpeg, or use a .gif or .html, which need none")
+                   "" if found else "run pip install imageio-ffmpeg, or use .gif or .html, which do not need it")
 
 
 def _extras() -> Iterator[Finding]:

@@ -27,8 +27,8 @@ def import_(file: Path, /, *, out: Annotated[Path, Parameter(
         name=["-o", "--out"], help="output: table.csv (records in SI), modes.toml (modes for a scene) or "
                                    "response.uff")],
             map_: texts('quantity of a channel of the file: "force=Load cell [lbf]", "displacement=12:+x", "time=t '
-                        '[s]", "force=run.load(:,2) [N]"; for shapes: slide=12:+x; may be repeated; without it the '
-                        "channel labels are used", "--map") = (),
+                        '[s]", "force=run.load(:,2) [N]"; for shapes: slide=12:+x; may be repeated; without this '
+                        'option the labels of the channels are used', "--map") = (),
             zero: flag("subtract the first row from time and displacement") = False,
             modes: Annotated[Estimate, Parameter(name="*")] = Estimate(), json_: Json = False):
     """Convert a laboratory file (.uff: datasets 58 in the units of 164; .mat; .csv with units in its header) into the

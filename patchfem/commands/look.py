@@ -9,8 +9,8 @@ from ..export import chosen, reports
 from ..export.lab import structures
 from .shared import Refused, Sets, flag, model_of, out_in, word
 
-Frame = Annotated[int | None, Parameter(help="number of the frame, such as 0 for the pressed state; the last one "
-                                             "unless given")]
+Frame = Annotated[int | None, Parameter(help="number of the frame, such as 0 for the pressed state; default: the last "
+                                             "frame")]
 
 
 def export(folder: Path, /, *, out: Annotated[Path, Parameter(
@@ -19,8 +19,8 @@ def export(folder: Path, /, *, out: Annotated[Path, Parameter(
                                    "matrices and friction elements as .mat (NLvib) or .npz (TMDSimPy, pyHarm)")],
            frame: Frame = None, sets: Sets = (),
            histories: flag("the histories and loops as .csv, not the interface") = False,
-           of: word("stress that a script for ParaView colours, such as sigma_yy or tau_xy (von_mises unless given); "
-                    "status shows where the interface sticks and slips",
+           of: word("stress that the script for ParaView shows in colour, such as sigma_yy or tau_xy (default: "
+                    "von_mises); 'status' shows where the interface sticks and slips",
                     "--of") = ""):
     """Write the fields of a results folder in another format, or its histories and loops. For a fit, write the measured
     and the fitted loop; for a scene, write its structure for other programs.
@@ -29,16 +29,17 @@ def export(folder: Path, /, *, out: Annotated[Path, Parameter(
     """
     if folder.suffix != ".toml":
         if sets:
-            raise Refused("--set can only be used for a scene, not for a results folder")
+            raise Refused("--set can be used only with a scene, not with a results folder")
         print(chosen.export(folder, out, frame, histories, of))
         return
     if frame is not None or histories or of:
-        raise Refused("--frame, --histories, --of: can only be used for a results folder; of a scene only the "
+        raise Refused("--frame, --histories and --of can be used only with a results folder; from a scene only the "
                       "structure is exported")
     print(structures.export(model_of(folder, sets), out))
 
 
-def view(folder: Path, /, *, out: out_in("picture.png in place of a window; .gif, .mp4, .html: the last cycle") = None,
+def view(folder: Path, /, *, out: out_in("picture.png in place of "
+                                         "a window; .gif, .mp4 or .html for the last cycle") = None,
          frame: Frame = None,
          magnify: Annotated[float | None, Parameter(help="magnification of displacements, such as 1000")] = None):
     """Show the pressed pieces of a results folder in a window, or draw them into a picture or a film.

@@ -13,15 +13,15 @@ from .shared import Json, Refused, Units, flag, note, out_in, pair, quantity, wo
 
 
 def profile(file: Path, /, *more: Path,
-            cutoff: word('wavelength that splits roughness from waviness (L-filter), such as "0.25 mm"') = "",
+            cutoff: word('wavelength that separates roughness from waviness (L-filter), such as "0.25 mm"') = "",
             form: word("form to subtract first: a degree from 1 (line or plane) to 9 such as 2, or cylinder") = "1",
             s_filter: word('wavelength below which waves are removed first, such as "2.5 um"') = "",
             level: word('height above the mean line at which the material ratio is computed, such as "0.5 '
                         'um"') = "0 um",
-            ratios: word("two material ratios, in percent, whose height difference is computed, such as "
-                         '"10,90"') = "10,90",
-            window: word('part to evaluate, between two positions such as "468 um,733 um"; for a scan four positions, '
-                         "those in x first") = "",
+            ratios: word('two material ratios in percent, such as "10,90"; the height difference between them is '
+                         'computed') = "10,90",
+            window: word('part to evaluate, between two positions such as "468 um,733 um"; a scan needs four '
+                         'positions, those in x first') = "",
             tip: word('radius of the stylus tip, to check whether it reaches the valleys, such as "12.5 um"') = "",
             units: Units = "",
             out: out_in("folder for a page, a table of the parameters and the levelled heights, such as "
@@ -74,5 +74,6 @@ def _ratios(text: str) -> tuple:
 def _window(text: str) -> tuple:
     words = text.split(",")
     if len(words) not in (2, 4) or not all(map(str.strip, words)):
-        raise Refused(f"profile --window '{text}': two places are needed, such as '468 um,733 um', for a scan four")
+        raise Refused(f"profile --window '{text}': "
+                      "two positions are needed, such as '468 um,733 um'; a scan needs four")
     return tuple(quantity(word, "length", "profile --window") for word in words)

@@ -28,10 +28,10 @@ from .shared import (
 
 
 def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False,
-        resume: flag("continue an interrupted run that has [wear] or marches in time") = False,
+        resume: flag("continue an interrupted run that has [wear] or is integrated in time") = False,
         fresh: flag("compute the stiffness of the pieces again, without the cache") = False,
         no_page: NoPage = False, quiet: Quiet = False,
-        verbose: flag("print also the time of each part", "-v", "--verbose") = False):
+        verbose: flag("print also the time of each part of the run", "-v", "--verbose") = False):
     """Run SCENE and write its results folder, by default out/<scene name>.
 
     Example: patchfem run rig.toml --set "drive.acceleration=6 g" -o out/six
@@ -39,8 +39,8 @@ def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False
     talk = (lambda text: None) if quiet else say
     what = plan.plan(scene_of(scene, set_))
     if resume and not folder.keeps(what):
-        raise Refused("run --resume: only a run with [wear] on a patch or a march in time keeps its state; run the "
-                      "scene again")
+        raise Refused("run --resume: only a run with [wear] on a patch or a run that is integrated in time saves its "
+                      "state; run the scene again without --resume")
     if verbose:
         compiles = plan.compile_words(what.compile_seconds)
         talk(f"about {what.seconds:.1f} s{compiles}, {what.steps} steps, engine {what.engine}")
@@ -98,6 +98,6 @@ def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
     print(f"results: {target}{page}")
     if (target / "fields.vtkhdf").is_file():
         place = shlex.quote(str(target))
-        print(f"fields: {target / 'fields.vtkhdf'} for ParaView 5.13 or newer; before it, "
-              f"`patchfem export {place} -o {shlex.quote(str(target / 'fields.pvd'))}`")
+        print(f"fields: {target / 'fields.vtkhdf'} for ParaView 5.13 or newer; for older versions run `patchfem export "
+              f"{place} -o {shlex.quote(str(target / 'fields.pvd'))}`")
     sys.stdout.flush()

@@ -66,7 +66,7 @@ def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Js
     read = scene_of(scene, set_) if over is None else None
     if over is not None or read.sweep:
         if probe:
-            raise Refused("--probe works for one case; set its values with --set and leave out the sweep")
+            raise Refused("--probe works for one case; choose its values with --set and leave out the sweep")
         _plan_sweep(scene, set_, over or Over(), json_, verbose)
         return
     found = plans.plan(read)
@@ -91,7 +91,7 @@ def _plan_sweep(scene: Path, sets, what: Over, json_: bool, verbose: bool) -> No
         print(json.dumps(answer))
         return
     print("case     " + ", ".join(f"{key} {brief(text)}" for key, text in answer["case"].items())
-          + ", the first: all below but the cost and the last line is of this case")
+          + ", the first; the lines below refer to this case, except the cost and the last line")
     _print_plan(answer, False, verbose)
     print(f"sweep    {answer['cases']} cases of " + ", ".join(f"{n} {key}" for key, n in answer["values"].items())
           + f"; about {answer['seconds_per_case']:.2g} s each on one core, {answer['disk_bytes'] / 1e6:.2g} MB on disk")

@@ -12,8 +12,7 @@ from .run import run
 from .shared import Json, NoPage, Out, Refused, out_in, placed, say
 
 
-def new(kind: str = "", /, *, out: out_in("file to write, such as mine.toml; unless given, printed on the "
-                                          "screen") = None):
+def new(kind: str = "", /, *, out: out_in("file to write, such as mine.toml; default: the screen") = None):
     """Print a template scene of this KIND; without KIND, list the kinds.
 
     Example: patchfem new joint -o mine.toml
@@ -43,7 +42,7 @@ def demo(*, out: Out = None, no_page: NoPage = False):
     run(scene, out=placed(out, "demo"), no_page=no_page)
 
 
-def schema(*, out: out_in("file to write, such as scene.json; unless given, printed on the screen") = None):
+def schema(*, out: out_in("file to write, such as scene.json; default: the screen") = None):
     """Print the JSON schema of a scene, for editors that complete keys and check units. In VS Code with Even Better
     TOML, begin a scene with the line #:schema scene.json.
 

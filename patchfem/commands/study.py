@@ -63,12 +63,13 @@ def cost(scene: Path, /, *, over: word("vary only one setting: element_size, ste
 ALL = "all"  # of the ways of a backbone
 
 
-def backbone(scene: Path, /, *, mode: word("a mode by its name, such as axial, or with masses by its number; the "
-                                           "first unless given") = "",
-             amplitudes: word('half peak-to-peak at the output, such as "1 um..1 mm:25"; unless given, around the '
-                              "onset of slip") = "",
+def backbone(scene: Path, /, *, mode: word("mode, by its name such as axial or, in a rig of masses, by its number; "
+                                           "default: the first") = "",
+             amplitudes: word('amplitudes (half peak-to-peak at the output), such as "1 um..1 mm:25"; default: around '
+                              'the onset of slip') = "",
              method: Annotated[Literal["balance", "decay", "quasi-static", "all"], Parameter(
-                 help="method, such as balance; unless given, all are used and compared")] = ALL,
+                 help="method that computes the motion, "
+                      "such as balance; default: all methods, compared with each other")] = ALL,
              out: Out = None, set_: Sets = (), no_page: NoPage = False, json_: Json = False, quiet: Quiet = False):
     """Compute frequency and damping of a mode of SCENE against its amplitude, contact included and without the drive.
 
@@ -103,29 +104,29 @@ class Rows:
     leave_out: word("cross-validation: refit without each value of a column such as frequency, input or run, and score "
                     "the rows left out") = ""
     starts: Annotated[int | None, Parameter(
-        help="number of random starts inside the ranges, such as 20; the best is used; unless given 8, or 3 for a "
-             "curve over the amplitude")] = None
+        help="number of random starts inside the ranges, such as 20; the best is used; default: 8, or 3 for a curve "
+             "over the amplitude")] = None
     seed: Annotated[int, Parameter(help="seed seed of the random starts, such as 1")] = 0
     unstable: Annotated[Literal["bound", "out", "read"], Parameter(
-        help="use of rows flagged U in the fit: as lower bounds, left out, or as read, such as out")] = "bound"
+        help="how the fit uses rows flagged U: as lower bounds, not at all, or as read, such as out")] = "bound"
     placebo: texts('repeat the fit with each of these values, such as "structure.mode.yaw.frequency=110 Hz,138 Hz", to '
                    "see whether the rows prefer the value in the scene") = ()
-    resume: flag("continue an interrupted fit after the starts that it finished") = False
+    resume: flag("continue an interrupted fit; the starts that it finished are kept") = False
 
 
 def fit(scene: Path, /, *, to: word(
-            'measured file: loop.csv of a bench ("time [s],displacement [um],force [N]", or what export writes), '
-            'rows.csv of a rig or its decay.csv (import --decay), compare.json or "worn_depth_max=2.5 um..3.5 um" of a '
-            "scene with [wear]") = "",
+            'measured file: loop.csv for a scene with [slide] ("time [s],displacement [um],force [N]", or what export '
+            'writes), rows.csv or decay.csv (import --decay) for a rig, compare.json or "worn_depth_max=2.5 um..3.5 '
+            'um" for a scene with [wear]') = "",
         free: texts('a key to fit and its range, such as "friction.static=0.1..0.6"; may be repeated') = (),
         from_patch: flag("in place of --to and --free: fit lumped Iwan, Bouc-Wen and elastic-plastic laws to the loops "
-                         "of the scene's own patch; each is written as a scene, with its error") = False,
-        amplitudes: word('with --from-patch: half peak-to-peak of the slide, such as "0.1 um..10 um:25"; unless given, '
-                         "from the onset of slip") = "",
+                         "of the scene's own patch; each law is written as a scene, with the error of the law") = False,
+        amplitudes: word('with --from-patch: amplitudes of the slide (half peak-to-peak), such as "0.1 um..10 um:25"; '
+                         'default: from the onset of slip on') = "",
         hold: texts('rows held out: predicted but not fitted, such as "frequency=135 Hz,150 Hz"') = (),
         offset: texts("for a loop: offsets to fit as well, such as force (constant over the record) or displacement "
                       "(of the first row from the unstressed position)") = (),
-        warm_up: flag("for a loop: run its whole cycles once before the fitted record") = False,
+        warm_up: flag("for a loop: run the whole cycles of the record once before the cycles that are fitted") = False,
         rows: Annotated[Rows, Parameter(name="*")] = Rows(),
         out: Out = None, set_: Sets = (), json_: Json = False, quiet: Quiet = False):
     """Fit values of keys of SCENE to measurements: a bench to a friction loop; a rig to rows of frequency, input,

@@ -27,14 +27,12 @@ class Over:
     """Which cases."""
 
     over: texts("table.key=v1,v2,... or table.key=1 mm..9 mm:9 (:9log, :9lin), may be repeated", "--over") = ()
-    cases: Annotated[Path | None, Parameter(name="--cases", help="a file such as cases.csv with a column `table.key "
-                                            "[unit]` per key, a case per row")] = None
-    random: Annotated[int, Parameter(name="--random", show_default=False, help="draw this many random cases, such as "
-                                                                               "200, from ranges such as 1 mm..9 "
-                                                                               "mm")] = 0
-    sobol: Annotated[int, Parameter(name="--sobol", show_default=False, help="draw this many cases by Sobol's "
-                                                                             "sequence, best a power of 2, such as "
-                                                                             "256")] = 0
+    cases: Annotated[Path | None, Parameter(name="--cases", help="file of cases, such as cases.csv: a column "
+                                                                 "`table.key [unit]` per key, a row per case")] = None
+    random: Annotated[int, Parameter(name="--random", show_default=False, help=
+                                     "number of random cases, such as 200, drawn from ranges such as 1 mm..9 mm")] = 0
+    sobol: Annotated[int, Parameter(name="--sobol", show_default=False, help="number of cases by Sobol's sequence, "
+                                                                             "such as 256; best a power of 2")] = 0
     seed: Annotated[int, Parameter(name="--seed", help="seed seed of the draws, such as 1")] = 0
 
     def given(self) -> bool:
@@ -62,7 +60,7 @@ class Over:
 class By:
     """Who works, and on which part."""
 
-    jobs: Annotated[int, Parameter(name=["-j", "--jobs"], help="processes on this machine, such as 4")] = 1
+    jobs: Annotated[int, Parameter(name=["-j", "--jobs"], help="number of processes on this machine, such as 4")] = 1
     executor: word("dask (a cluster on this machine) or dask:ADDRESS, such as dask:tcp://10.0.0.2:8786",
                    "--executor") = ""
     shard: word("run only one part, such as 3/40, into a folder that all parts share", "--shard") = ""
@@ -88,7 +86,7 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
           resume: flag("continue an interrupted sweep in this folder") = False,
           keep: Annotated[Literal["none", "summaries", "results", "pages"] | None, Parameter(
               help="what to keep of each case besides its row: summaries, results, pages (results with report.html) or "
-                   "none, such as results; unless given, summaries for up to 1000 cases")] = None,
+                   "none, such as results; default: summaries for up to 1000 cases")] = None,
           no_page: NoPage = False, json_: Json = False, quiet: Quiet = False):
     """Run SCENE for all combinations of the values in --over, or in its table [sweep]. Write sweep.csv, sweep.nc and
     report.html, by default into out/<scene name>-sweep.
@@ -202,8 +200,8 @@ def _answer(number: int, messages: dict, written: dict, told: Told) -> None:
         if tables[0].is_file():
             print(f"results: {tables[0]} {tables[1]}")
         else:
-            print(f"results: {target / 'sweep.json'}; sweep.csv and sweep.nc of so many cases take some "
-                  f"{1e-6 * TABLE * number:.0f} MB: run the same command with --collect to write them")
+            print(f"results: {target / 'sweep.json'}; sweep.csv and sweep.nc are not written, because they would take "
+                  f"about {1e-6 * TABLE * number:.0f} MB; to write them, run the same command with --collect")
     sys.stdout.flush()
     alike = {}
     for case in failed:

@@ -194,7 +194,8 @@ def _refuse_roll(offsets, load, lateral) -> None:
     if lateral is None:
         return
     if load is None or offsets.size < 2:
-        raise PatchfemError("contact.strips.roll: a free roll needs a load and at least two strips")
+        raise PatchfemError("contact.strips.roll: a holder that is free to rotate about x needs a load and at least "
+                            "two strips")
     if load > 0 and not offsets.min() < lateral / load < offsets.max():
         raise PatchfemError(f"contact.strips.offset: the load line at {lateral / load:.6g} m lies beyond the middle of "
                             f"the outermost strips at {offsets.max():.6g} m, where no pressure can balance it; raise "
@@ -205,14 +206,15 @@ def _refuse_loose(skin, force, checks, free_rotation: bool, free_roll: bool) -> 
     """NotConverged where a free motion is not determined by what bears, or a residual is too large."""
     bears = force > 1e-12 * force.max()  # less is round-off
     if free_rotation and not smooth(skin) and bears.any(axis=0).sum() < 2:
-        raise NotConverged("contact.strips: the contact set does not determine the rotation; lower "
+        raise NotConverged("contact.strips: the nodes that touch do not determine the rotation of the piece; lower "
                            "contact.element_size or set contact.holder.rotational_stiffness")
     if free_roll and not smooth(skin) and bears.any(axis=1).sum() < 2:
-        raise NotConverged("contact.strips: the contact set does not determine the roll; raise contact.strips.count or "
-                           "prescribe contact.strips.roll")
+        raise NotConverged("contact.strips: the nodes that touch do not determine the rotation about x; raise "
+                           "contact.strips.count or prescribe contact.strips.roll")
     if not all(value <= LIMIT for value in checks.values()):  # NaN must not pass
         worst = max(checks, key=lambda name: (checks[name] != checks[name], checks[name]))
-        at, cure = ("asperities", "make the rough layer softer (decay length, height deviation), or leave it out") \
+        at, cure = ("asperities", "make the rough layer softer "
+                                  "(decay length, height deviation), or leave the layer out") \
             if smooth(skin) else ("strips", "lower contact.strips.roll or raise the load")
         raise NotConverged(f"contact.{at}: {worst} {checks[worst]:.2e} exceeds {LIMIT:.0e}; {cure}")
 

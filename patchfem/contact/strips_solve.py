@@ -286,7 +286,8 @@ def _reach(skin, c, weight, gap) -> np.ndarray | None:
     if (diagonal > 0).all():
         s = np.maximum(s, skin.separation(np.maximum(-gap, np.abs(gap).max() * 1e-3) / (diagonal * weight)))
     if skin.log_pressure(s)[0].max() > -FLOOR:
-        raise PatchfemError("contact.approach: the pressure of the rough layer exceeds any number; lower the distance")
+        raise PatchfemError("contact.approach: the pressure of the rough layer is too large to compute; give a smaller "
+                            "distance")
     return s
 
 

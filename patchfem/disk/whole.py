@@ -123,25 +123,25 @@ def room(path: Path) -> tuple[int, str]:
 def short(path: Path, need: int) -> str:
     """Path, need and room where `need` bytes have none, else ""."""
     there, where = room(path)
-    return f"{shown(path)}: no room: {size_of(need)} needed, {size_of(there)} {where}" if need > there else ""
+    return f"{shown(path)}: not enough space: {size_of(need)} needed, {size_of(there)} {where}" if need > there else ""
 
 
 def fault(error: OSError, path: Path, partial: Path, need: int | None = None) -> Unwritten:
     """What to raise for a writing that failed: path and reason; where room ran out, the need and the room."""
     if partial == path and error.errno in FULL:  # a device; what is free on a disk is not its room
-        return Unwritten(f"{shown(path)}: no room ({error.strerror})")
+        return Unwritten(f"{shown(path)}: not enough space ({error.strerror})")
     with suppress(OSError):
         there, where = room(path)
         written = partial.stat().st_size if partial != path and partial.exists() else 0
         limited = where.endswith(")")  # what is written so far counts against a limit, and no longer for the free room
         left = there - written if limited else there
         if error.errno in FULL and not _places(path):
-            return Unwritten(f"{shown(path)}: no room: its disk has no free inodes; remove files")
+            return Unwritten(f"{shown(path)}: not enough space: the disk has no free inodes; remove files")
         if error.errno in FULL or (error.errno is None and left < NARROW):
             wanted = f"{size_of(need)} needed" if need is not None else f"more than {size_of(written)} needed"
             why = f" ({os.strerror(error.errno)})" if error.errno else ""
             there = there if limited else there + written
-            return Unwritten(f"{shown(path)}: no room{why}: {wanted}, {size_of(there)} {where}")
+            return Unwritten(f"{shown(path)}: not enough space{why}: {wanted}, {size_of(there)} {where}")
     return Unwritten(f"{shown(path)}: cannot be written ({error.strerror or error})")
 
 

@@ -132,7 +132,7 @@ class Shooting:
             if self.grows(mapped):
                 raise Grows(mapped, used + 1)
         raise NotConverged(f"dynamics: no periodic motion was found in {MOST} steps of Newton's method; start closer "
-                           'to it, or use accuracy.method = "march"')
+                           "to the periodic motion, or use accuracy.method = \"march\"")
 
     def _newton(self, mapped: Mapped, shares) -> Mapped | None:
         """A better Mapped by the first of some shares of Newton's step that leads to one, None where none does."""

@@ -93,9 +93,9 @@ def remedy(layers: Layers, coated: bool, least: float, size: tuple) -> str:
     ratio = layers.coating[0] / layers.substrate[0]
     if coated and not 1e-3 < ratio < 1e3:
         return (f"the Young's moduli of coating and substrate differ by a factor of {max(ratio, 1 / ratio):.2g}: bring "
-                "them closer together, make the coating thicker, or leave it out")
-    return (f"the shortest cell is {say(least, 3)} in a piece of {say(size[0], 3)} x {say(size[1], 3)}: use "
-            "longer cells (contact.element_size, or those of contact.mesh)")
+                "the moduli closer together, make the coating thicker, or leave the coating out")
+    return (f"the shortest cell is {say(least, 3)} in a piece of {say(size[0], 3)} x {say(size[1], 3)}: use longer "
+            "cells (contact.element_size, or the cells of contact.mesh)")
 
 
 def assemble(x, depth, coating_rows: int, layers: Layers) -> Piece:

@@ -79,8 +79,8 @@ def mortar(lower: tuple, x_lower: np.ndarray, upper: tuple, x_upper: np.ndarray,
                             "interface cells of similar size that grow gradually")
     if side in (None, best.side):
         return best
-    return replace(best, reason=f"pressure on the {side} piece was asked for, but {found.reason}; so another choice "
-                                f"is used: {best.reason}")
+    return replace(best, reason=f"the pressure was to be defined on the {side} piece, but {found.reason}; so another "
+                                f"choice is used: {best.reason}")
 
 
 def _grids(pair) -> dict:
@@ -90,7 +90,7 @@ def _grids(pair) -> dict:
     low, high = clipped(x_lower, begin, end), clipped(x_upper, begin, end)
     if min(low.size, high.size) < 3:
         raise PatchfemError(f"contact.mesh: the pieces share {end - begin:.6g} m of interface only, less than two "
-                            "cells; shift or refine them")
+                            "cells; shift or refine the pieces")
     both = common_grid(low, high, softness(x_lower, lower[0], low), softness(x_upper, upper[0], high))
     return {"lower": low, "upper": high, "both": both}
 
@@ -146,8 +146,8 @@ def overlap(x_lower, x_upper) -> tuple:
     """
     begin, end = max(x_lower[0], x_upper[0]), min(x_lower[-1], x_upper[-1])
     if not end - begin > CLOSE * max(np.ptp(x_lower), np.ptp(x_upper)):
-        raise PatchfemError("contact.mesh: the interfaces do not face one another: the lower one runs from "
-                            f"{x_lower[0]:.6g} to {x_lower[-1]:.6g} m, the upper one from {x_upper[0]:.6g} to "
+        raise PatchfemError("contact.mesh: the interfaces do not face one another: the lower interface runs from "
+                            f"{x_lower[0]:.6g} to {x_lower[-1]:.6g} m, the upper interface from {x_upper[0]:.6g} to "
                             f"{x_upper[-1]:.6g} m")
     return begin, end
 
@@ -254,8 +254,8 @@ def _name(grids) -> str:
 def _reason(grids, name: str, ripple: float, place: float) -> str:
     where = f"the nodes of the {name} piece" if name != "both" else "nodes of both pieces alternately"
     low, high, x = (grids[key].size for key in ("lower", "upper", name))
-    return f"pressure on {where} ({x} points, the lower interface has {low}, the upper one {high}) is expected to " \
-           f"ripple by {100 * ripple:.2g} % near x = {say(place, 3)}"
+    return (f"with the pressure on {where} ({x} points; the lower interface has {low}, the upper interface {high}), a "
+            f"ripple of the pressure by {100 * ripple:.2g} % is expected near x = {say(place, 3)}")
 
 
 def _plain(c: tuple, x, side: str) -> None:

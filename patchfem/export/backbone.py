@@ -15,10 +15,10 @@ from .summary import write_json
 
 COLUMNS = ("amplitude", "frequency", "frequency_error", "damping", "damping_error")
 HEAD = ("method", "amplitude [m]", "frequency [Hz]", "frequency_error [Hz]", "damping", "damping_error")
-WAYS = {"balance": "The curve is of the periodic motion that the rig would have without a net loss of energy. A slow "
-                   "decay follows this motion, and so does a test in phase resonance.",
-        "decay": "The curve is of a release from the largest amplitude; frequency and damping are read from one "
-                 "turning point to the next.",
+WAYS = {"balance": "The curve belongs to the periodic motion that the rig would have without a net loss of energy. A "
+                   "slow decay follows this motion, and so does a test in phase resonance.",
+        "decay": "The curve belongs to a free decay from the largest amplitude; frequency and damping are evaluated "
+                 "from one turning point to the next.",
         "quasi-static": "The curve is computed from one static force, with the shape of the mode while the contact "
                         "sticks, and from the loops of the friction law."}
 COLOURS = {"balance": "accent", "decay": "warm", "quasi-static": "#2f9e63"}
@@ -141,8 +141,8 @@ def sentences(found: Backbone) -> list:
         out.insert(0, f"Mode {found.mode} at {said}.")
         if (count := best.amplitude.size) > 1:
             k = int(np.argmax(best.damping))
-            out.append(f"Of these {count} amplitudes the damping ratio is largest at "
-                       f"{scales.short(best.amplitude[k], 'm', 3)}: {best.damping[k]:.3g}, at "
+            out.append(f"Among these {count} amplitudes the damping ratio is largest at "
+                       f"{scales.short(best.amplitude[k], 'm', 3)}: {best.damping[k]:.3g}, with a frequency of "
                        f"{scales.short(best.frequency[k], 'Hz', 5)}.")
     theory = "" if found.expected is None else f" (theory: {found.expected:.3g})"
     powers = [f"to the power {value:.3g} {where}" for value, where in (

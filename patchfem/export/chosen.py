@@ -22,13 +22,14 @@ def export(folder: Path, out: Path, frame: int | None = None, histories: bool = 
     fields = (folder / lab.FIELDS).is_file() or not folder.is_dir()
     if out.suffix.lower() in lab.ENDINGS and (out.suffix != ".csv" or histories or not fields):
         if frame is not None:
-            raise PatchfemError("--frame can only be used for fields (.vtu, .csv); a file of histories contains all "
+            raise PatchfemError("--frame can be used only with fields (.vtu, .csv); a file of histories contains all "
                                 "times")
         return write.export(folder, out)
     if histories:
-        raise PatchfemError(f"--histories: they are written as {', '.join(lab.ENDINGS)}, not as {out.suffix or out}")
+        raise PatchfemError(f"--histories: histories are written as {', '.join(lab.ENDINGS)}, not as "
+                            f"{out.suffix or out}")
     if of and out.suffix != ".py":
-        raise PatchfemError("--of can only be used for a ParaView script, -o play.py; other files contain every "
+        raise PatchfemError("--of can be used only with a ParaView script, -o play.py; other files contain every "
                             "component")
     if out.suffix == ".py":
         if frame is not None:

@@ -81,7 +81,7 @@ def draw(knob: str, runs: list, tolerance: float, names: list):
     for axis in axes:
         _name_runs(axis, groups)
     axes[0].set_ylabel("relative to the measure")
-    stars = "; star: by the scene's tolerance" if any(one.value is None for one in runs) else ""
+    stars = "; star: setting that follows from the scene's tolerance" if any(one.value is None for one in runs) else ""
     by = "tolerance of the mesh" if runs[0].words.startswith("element size by tolerance") else AXES[knob]
     figure.suptitle(f"What accuracy costs, by {by}{stars}", fontsize=11)
     labelled = [axis.get_legend_handles_labels() for axis in axes]

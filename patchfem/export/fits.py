@@ -26,7 +26,8 @@ from .results import STARTS, Folder
 
 LOOP, ROWS = ("offset", "warm_up"), ("leave_out", "seed", "unstable", "placebo", "resume")
 STARTED = {"rows": 8, "curve": 3}  # starts of a search, unless given
-BELONG = {"hold": "a loop of a bench or to rows of a rig", **dict.fromkeys(LOOP, "a loop of a bench"),
+BELONG = {"hold": "a loop under a prescribed slide "
+                  "or to rows of a rig", **dict.fromkeys(LOOP, "a loop under a prescribed slide"),
           "starts": "rows of a rig or to its curve over the amplitude", **dict.fromkeys(ROWS, "rows of a rig"),
           "amplitudes": "--from-patch"}
 

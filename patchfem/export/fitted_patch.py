@@ -115,9 +115,10 @@ def lines_of(answer: dict) -> list:
     out += [f"  {line}" for line in sentences(answer["law"], answer)]
     if answer["mesh"] is not None:
         stiff, loss = (answer["mesh"][part] for part in PARTS)
-        out.append(f"  A mesh coarser than its {answer['mesh']['nodes']} interface nodes changes the patch's own "
-                   f"stiffness by {_percent(abs(stiff['largest']))} at most, its loss by "
-                   f"{_percent(abs(loss['largest']))}, at {short(loss['at'], 'm', 3)}, {_percent(loss['rms'])} rms.")
+        out.append(f"  A mesh coarser than the present one ({answer['mesh']['nodes']} interface nodes) changes the "
+                   f"stiffness of the patch by at most {_percent(abs(stiff['largest']))}, and its loss by at most "
+                   f"{_percent(abs(loss['largest']))} (at {short(loss['at'], 'm', 3)}) and by {_percent(loss['rms'])} "
+                   "rms.")
     return out
 
 
@@ -126,12 +127,13 @@ def sentences(law: str, answer: dict) -> list:
     (low, high), (stiff, loss) = answer["amplitudes"], (answer["laws"][law][part] for part in PARTS)
     low, high, at, there = (short(one, "m", 3) for one in (low, high, stiff["at"], loss["at"]))
     return [f"For slide amplitudes from {low} to {high} the stiffness of '{law}' differs from that of the patch by at "
-            f"most {_percent(abs(stiff['largest']))} (at {at}), {_percent(stiff['rms'])} rms.",
-            f"Its energy dissipated per cycle is up to {_percent(abs(loss['largest']))} "
-            f"{'larger' if loss['largest'] > 0 else 'smaller'} than that of the patch (at {there}), "
-            f"{_percent(loss['rms'])} rms; a loss below a thousandth of 4 x force x slide is compared as that much.",
+            f"most {_percent(abs(stiff['largest']))} (at {at}) and by {_percent(stiff['rms'])} rms.",
+            f"The energy that this law dissipates per cycle is up to {_percent(abs(loss['largest']))} "
+            f"{'larger' if loss['largest'] > 0 else 'smaller'} than that of the patch (at {there}) and differs by "
+            f"{_percent(loss['rms'])} rms; a loss below a thousandth of 4 x force x slide is compared as if it were "
+            "that large.",
             "The error of a mode's frequency is then at most about half that of the stiffness; the error of its "
-            "friction damping is at most both together."]
+            "friction damping is at most the sum of both."]
 
 
 def _percent(share: float) -> str:

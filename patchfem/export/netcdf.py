@@ -19,35 +19,36 @@ CACHE = 1 << 18  # bytes of each variable that stay in memory until its file is 
 
 LONG = {
     "relative_displacement": ("m", "displacement of the output relative to the base"),
-    "slide": ("m", "slide of the interface, under which friction_force is its loop"),
+    "slide": ("m", "slide of the interface; friction_force over this slide is the friction loop"),
     "relative_velocity": ("m s-1", "velocity of the output relative to the base"),
     "absolute_acceleration": ("m s-2", "acceleration at the output, base motion included"),
     "base_acceleration": ("m s-2", "acceleration of the base"),
-    "friction_force": ("N", "resultant friction force, positive against positive slip"),
+    "friction_force": ("N", "resultant friction force, positive when it opposes positive slip"),
     "lateral_displacement": ("m", "displacement of the upper piece across the sliding direction"),
-    "lateral_force": ("N", "resultant friction force across the sliding direction, positive against positive slip"),
+    "lateral_force": ("N", "resultant friction force across the sliding direction, positive when it opposes positive "
+                           "slip"),
     "yaw_moment": ("N m", "moment about +z of the friction on the upper piece, sum of y f_x - x f_y"),
     "normal_load": ("N", "normal load on the interface"),
     "friction_work": ("J", "work done against friction since the start"),
     "energy_stored": ("J", "elastic energy of the interface"),
     "energy_dissipated": ("J", "energy dissipated by friction since the start"),
-    "energy_created": ("J", "energy that a law without passivity has created since the start"),
+    "energy_created": ("J", "energy created since the start by a law that is not passive"),
     "output_displacement": ("m", "displacement of the output relative to the base"),
     "output_velocity": ("m s-1", "velocity of the output relative to the base"),
     "modal_coordinate": ("m", "modal coordinate"),
     "normal_stress": ("Pa", "normal stress at the nodes, compression positive"),
     "strip_normal_stress": ("Pa", "normal stress at the nodes of every strip, compression positive"),
     "gap": ("m", "remaining gap"),
-    "shear_stress": ("Pa", "frictional shear stress, positive against positive slip"),
+    "shear_stress": ("Pa", "frictional shear stress, positive when it opposes positive slip"),
     "slip": ("m", "irreversible local slip"),
     "worn_depth": ("m", "worn depth, both pieces together"),
-    "weight": ("m2", "nodal area of all pairs"),
+    "weight": ("m2", "area that belongs to a node, all pairs together"),
     "unloaded_gap": ("m", "gap of the unloaded surfaces, wear included"),
 }
 
 BETWEEN = {"relative_displacement": "displacement of the first mass of an interface relative to the second",
            "relative_velocity": "velocity of the first mass of an interface relative to the second",
-           "friction_force": "friction force of an interface, positive against positive slip",
+           "friction_force": "friction force of an interface, positive when it opposes positive slip",
            "normal_load": "normal load on an interface"}
 
 
@@ -123,7 +124,7 @@ def of_run(histories: dict, modal, fields: dict, x, weight, strips: tuple | None
         data["strip_normal_stress"] = (("strip", "x"), strips[1], _attributes("strip_normal_stress"))
     for name, (unit, values) in (levels or {}).items():
         drive = "force" if unit == "N" else "acceleration of the base"
-        text = {"level_drive": drive, "level_stuck": "whether the interface stuck",
+        text = {"level_drive": drive, "level_stuck": "whether the interface sticks",
                 "level_outcome": "outcome of the level"}
         about = {"units": unit} if unit else {}
         data[name] = ("level", values, about | {"long_name": text.get(name, name.replace("_", " "))})
@@ -136,7 +137,7 @@ def with_events(data: Contents, time, interface, kind, slide, count: int, meanin
     time [s]; interface: its number from 1, 0 for a border of the drive; kind: a flag of `meanings`; slide [m]; count:
     how many there were, the last of them are kept.
     """
-    flags = {"long_name": "what happened, up: towards positive slip", "flag_meanings": " ".join(meanings),
+    flags = {"long_name": "kind of event; up means towards positive slip", "flag_meanings": " ".join(meanings),
              "flag_values": np.arange(len(meanings), dtype=np.int8)}
     about = {"long_name": "time of the event", "units": "s", "source": source, "total_count": count}
     return data.also({
@@ -145,14 +146,15 @@ def with_events(data: Contents, time, interface, kind, slide, count: int, meanin
                             {"units": "1", "long_name": "number of the interface from 1 (of the strip, if strips yaw); "
                                                         "0 for a change of the drive"}),
         "event_kind": ("event", np.asarray(kind, np.int8), flags),
-        "event_slide": ("event", slide, {"units": "m", "long_name": "relative displacement at the event; none at a "
+        "event_slide": ("event", slide, {"units": "m", "long_name": "relative displacement at the event; missing at a "
                                                                     "change of the drive"})})
 
 
 READ = {"amplitude": ("m", "half peak-to-peak at the output"),
         "acceleration_peak": ("m s-2", "largest absolute acceleration"),
         "acceleration_fundamental": ("m s-2", "first harmonic of the absolute acceleration"),
-        "acceleration_distortion": ("1", "third over first harmonic of the absolute acceleration")}  # off a curve
+        "acceleration_distortion": ("1", "third harmonic of the absolute "
+                                         "acceleration divided by the first")}  # off a curve
 
 
 def with_curve(data: Contents, curve: dict) -> Contents:
@@ -180,7 +182,7 @@ def with_curve(data: Contents, curve: dict) -> Contents:
     return data.also(out)
 
 
-DECAY = {"amplitude": ("m", "half peak-to-peak of the released output"),
+DECAY = {"amplitude": ("m", "half peak-to-peak of the output during the decay"),
          "frequency": ("Hz", "frequency of the decay"), "damping": ("1", "damping ratio of the decay")}
 
 
@@ -192,7 +194,8 @@ def with_decay(data: Contents, decay) -> Contents:
         if name != "amplitude":
             out[f"decay_{name}_error"] = (over, getattr(decay, f"{name}_error"), {
                 "units": unit, "long_name": f"half-width of the interval of the {text}"})
-    return data.also(out, {over: (over, decay.time, {"units": "s", "long_name": "time of the middle of that cycle"})})
+    return data.also(out, {over: (over, decay.time, {"units": "s", "long_name": "time at the middle of the evaluated "
+                                                                                "cycle"})})
 
 
 def with_spectra(data: Contents, found) -> Contents:

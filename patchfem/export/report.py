@@ -111,7 +111,8 @@ def _spectra(data: dict) -> Picture | None:
     found = data["summary"]["measures"]
     at = found.get("response_frequency", {}).get("value")
     told = "" if at is None else (
-        " Its peak, the ring, is that of a mode at {} ({}) with a damping ratio of {} ({}), friction included.".format(
+        " The peak of H1, marked by a ring, belongs to a mode at {} ({}) with a damping ratio of {} ({}), friction "
+        "included.".format(
             *of_records("response_frequency", found), *of_records("response_damping", found)))
     return Picture(charts.spectra, (data["spectra"], at), "One-sided spectral densities of "
                    "output and drive, and H1, displacement of the output over acceleration of the base; H1 is drawn "
@@ -121,16 +122,17 @@ def _spectra(data: dict) -> Picture | None:
 def _decay(data: dict) -> Picture | None:
     if "decay" not in data:
         return None
-    return Picture(charts.decay, (data["decay"],), "Frequency and damping ratio (structure and friction together) "
-                   "of the released output against half its peak-to-peak motion; bars show reading and numerical "
-                   "errors.")
+    return Picture(charts.decay, (data["decay"],), "Frequency and damping ratio (structure and friction together) of "
+                                                   "the released output against half its peak-to-peak motion; bars "
+                                                   "show the errors of the evaluation and of the computation.")
 
 
 def _levels(data: dict) -> Picture | None:
     if "levels" not in data:
         return None
     return Picture(charts.levels, (data["levels"],), "Amplitude at the end of every level; each level starts from the "
-                   f"state of the one before; arrows show the order of the test.{_under(data)}")
+                                                     "final state of the previous level; arrows show the order of the "
+                                                     f"test.{_under(data)}")
 
 
 def _wear(data: dict) -> Picture | None:
@@ -162,7 +164,8 @@ def _interface(data: dict) -> Picture | None:
         caption += f"; shear stress in {len(fields['time']) - 1} frames of {span}, the largest resultant in colour"
     if charts.part_in_contact(data["x"], fields["normal_stress"][0]):
         length, scale = scales.axis_unit(data["x"], "m")
-        caption += f". Only the part in contact is drawn, of {(data['x'][-1] - data['x'][0]) * scale:.4g} {length}"
+        caption += (". Only the part in contact is drawn; the whole length is "
+                    f"{(data['x'][-1] - data['x'][0]) * scale:.4g} {length}")
     return Picture(charts.interface, (data["x"], fields), caption + ".")
 
 
@@ -202,7 +205,8 @@ def _at_corner(bodies: dict) -> str:
         return ""
     faces = {"the face of the coating meets the end of the piece": coating, "the held far face ends": depth[-1]}
     near = [words for words, face in faces.items() if face > 0 and np.isclose(depth[row:row + 2], face).any()]
-    return f", where {near[0]}: stress has no bound in this corner, and a finer mesh shows more" if near else ""
+    return (f", where {near[0]}: the stress "
+            "is unbounded in this corner, and a finer mesh shows a larger value") if near else ""
 
 
 def _loop(data: dict) -> Picture | None:
@@ -367,8 +371,8 @@ def _measures(data: dict) -> Section:
             "whole cycle.</p>") if part_of_cycle(data) else ""
     heads = ("measure", ">value", ">error (±)", "unit", "in customary units", "what it is")
     return Section("measures", "Measures", table(heads, rows, "across many")
-                   + f"<p class=soft>Value and error in the same unit; {SHARP.replace('±', 'error')}. "
-                   f"summary.json has all digits in SI.</p>{note}")
+                   + f"<p class=soft>Value and error have the same unit; {SHARP.replace('±', 'error')}. summary.json "
+                     f"has all digits in SI.</p>{note}")
 
 
 def _cost(data: dict) -> Section:
@@ -376,7 +380,7 @@ def _cost(data: dict) -> Section:
     summary = data["summary"]
     rows = [[escape(e["effect"]), escape(e["equations"]), f"{e['seconds']:.3f}"] for e in summary["effects"]]
     parts = ", ".join(f"{k} {v:.3f} s" for k, v in summary["seconds"].items())
-    shared = " The time loop of law and modes is listed under the law." if summary["kind"] == "rig" else ""
+    shared = " The time of the loop over law and modes is listed under the law." if summary["kind"] == "rig" else ""
     absent = shown_absent(summary["not_in_scene"], summary.get("numerics", {}).get("engine"))
     text = (table(("effect", "equations", ">seconds"), rows)
             + f"<p class=soft>Wall-clock seconds: {escape(parts)}.{shared}</p>"

@@ -30,7 +30,7 @@ def report_of(folders: list, out: Path | None = None, measured: Path | None = No
         runs = [beside.read(folder) for folder in folders]
         return _written(beside.page(runs, None if measured is None else _read(measured, runs)), out)
     if measured is not None:
-        raise PatchfemError(f"--measured {measured}: can only be plotted over runs, not over sweeps")
+        raise PatchfemError(f"--measured {measured}: can be plotted only over runs, not over sweeps")
     tables = [sweeps.seen_from(sweeps.read_table(folder), folder, out) for folder in folders]
     names = beside.distinct([folder.resolve().name for folder in folders])
     return _written(sweep.page(tables[0] if len(tables) == 1 else sweeps.joined(tables, names)), out)

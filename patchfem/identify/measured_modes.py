@@ -79,7 +79,7 @@ def of_drive(values: dict, segment: float | None, window: str | None, band: tupl
 def _of_force(found: Modes) -> tuple:
     if found.residue[0] <= 0:
         raise PatchfemError(f"the mode at {found.frequency[0]:.5g} Hz moves against the force: force and response are "
-                            "not at the same point or one has the wrong sign, so the modal mass is unknown")
+                            "not at the same point, or one of the two has the wrong sign, so the modal mass is unknown")
     size = np.sqrt(np.abs(found.residue) / found.residue[0])
     turned = found.residue < 0
     notes = [f"the mode at {f:.5g} Hz moves against the force, which is impossible if both are at the same point; its "
@@ -126,7 +126,7 @@ def _freely(values: dict, begin: float | None) -> tuple:
     """(times, values, name) of the one response from `begin` [s] on, unless given from its largest value."""
     name = response_of(values)
     if "time" not in values:
-        raise PatchfemError("a free decay needs a time channel; choose it with --map")
+        raise PatchfemError("a free decay needs a time channel; choose this channel with --map")
     time, value = values["time"], values[name]
     start = int(np.argmax(np.abs(value - value[-value.size // 20:].mean()))) if begin is None else \
         int(np.searchsorted(time, begin))

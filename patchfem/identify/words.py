@@ -22,7 +22,7 @@ def remarks(found: Fit, names) -> list:
                 side = "low" if found.open_ends[i, 0] else "high"
                 out.append(f"{name}: the rows do not exclude its {side} bound")
         elif found.sensitivity[i] <= 1e-9 * max(float(np.max(found.sensitivity)), found.rms):
-            out.append(f"{name} has no effect on the rows: it is not determined")
+            out.append(f"{name} has no effect on the rows, so its value is not determined")
         elif i not in told:
             out.append(f"{name} is not determined: every value in its range fits the rows")
     if found.failures:
@@ -40,4 +40,4 @@ def _combination(row, names) -> str:
     known = ""
     if used.size == 2 and abs(abs(row[used[0]]) - abs(row[used[1]])) < 2e-3:
         known = f": only their {'product' if row[used[0]] * row[used[1]] < 0 else 'ratio'} is known"
-    return f"{' and '.join(names[i] for i in used)} cannot be told apart ({changes} changes nothing){known}"
+    return f"{' and '.join(names[i] for i in used)} cannot be determined separately ({changes} changes nothing){known}"

@@ -66,7 +66,7 @@ def _columns(path: Path) -> list:
     for number, line in enumerate(lines[1:], 2):
         cells = [_bare(cell) for cell in line.split(mark)]
         if len(cells) != len(names):
-            raise PatchfemError(f"{path}:{number}: {len(cells)} cells under {len(names)} columns")
+            raise PatchfemError(f"{path}:{number}: {len(cells)} cells, but {len(names)} column names")
         rows.append(cells)
     found, plain = [], [name.strip().lower().replace(" ", "_") for name in names]
     ours = [own_name(name, plain) for name in plain]

@@ -199,7 +199,7 @@ def ranked(places) -> tuple:
     if not places.size:
         return places, np.zeros(0, int)
     if places.min() < 0 or places.max() >= 2**31:
-        raise ValueError(f"{places.min()} to {places.max()} are no nodes and directions")
+        raise ValueError(f"{places.min()} to {places.max()} are not nodes and directions")
     wide = int(places[:, 1].max()) + 1
     found, where = np.unique(places[:, 0] * wide + places[:, 1], return_inverse=True)
     return np.stack(np.divmod(found, wide), axis=1), where

@@ -116,8 +116,8 @@ def chosen(path: Path, channels: list, asked: list, notes: list) -> Records:
         raise PatchfemError(f"{path}: {names.count(twice[0])} channels are {twice[0]}; choose with --map "
                             f"{twice[0]}=CHANNEL among {listed(channels)}")
     if not set(names) - {"time"}:
-        raise PatchfemError(f"{path}: no channel label tells its quantity; choose channels with --map force=CHANNEL "
-                            f"[N], displacement=CHANNEL [mm] among {listed(channels)}")
+        raise PatchfemError(f"{path}: no channel label names a quantity; choose channels with --map force=CHANNEL [N], "
+                            f"displacement=CHANNEL [mm] among {listed(channels)}")
     values = {name: _in_si(path, name, one, unit) for name, one, unit in picked}
     if "time" not in values:
         values = _shared_time(path, [one for _, one, _ in picked], channels, bool(asked)) | values
@@ -181,7 +181,7 @@ def _shared_time(path, picked: list, channels: list, asked: bool) -> dict:
         for one in picked:
             if one.time is None or one.time.size != times[0].size or not np.array_equal(one.time, times[0]):
                 raise PatchfemError(f"{path}: '{one.name[:40]}' has other times than '{picked[0].name[:40]}'; choose "
-                                    f"channels that share them with --map, among {listed(channels)}")
+                                    f"channels with the same times by --map, among {listed(channels)}")
         return {"time": times[0]}
     columns = [one for one in channels if one.quantity == "time"] if asked else []
     return {"time": _in_si(path, "time", columns[0], "")} if len(columns) == 1 else {}

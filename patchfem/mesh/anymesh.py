@@ -170,7 +170,7 @@ def _numbers(raw: Tagged, where) -> None:
     used = np.unique(np.concatenate([raw.triangles.ravel(), raw.quads.ravel()]))
     span = np.ptp(raw.points[used], axis=0)
     if span.size > 2 and span[2] > CLOSE * span[:2].max():
-        raise PatchfemError(f"{where}: the mesh is not plane: z runs over {span[2]:.6g} m; draw it in x and y")
+        raise PatchfemError(f"{where}: the mesh is not plane: z runs over {span[2]:.6g} m; draw the mesh in x and y")
     if not np.abs(raw.points[used, :2]).max() < 1e150:
         raise PatchfemError(f"{where}: a node lies beyond 1e150 m")
 
@@ -233,7 +233,7 @@ def _interface(points, nodes, side: str, where) -> np.ndarray:
     close = CLOSE * np.ptp(x)
     twin = int(np.argmin(np.diff(x)))
     if x[twin + 1] - x[twin] <= close and np.ptp(x) > 0:
-        raise PatchfemError(f"{where}: {name} has two nodes at x = {x[twin]:.6g} m; merge them")
+        raise PatchfemError(f"{where}: {name} has two nodes at x = {x[twin]:.6g} m; merge these nodes")
     flat = np.abs(y) <= close
     slope = np.diff(y) / np.maximum(np.diff(x), 1e-300)
     hollow = np.append(False, np.diff(slope) < -1e-6 - 4 * close / max(np.diff(x).min(), close))
@@ -248,7 +248,7 @@ def _interface(points, nodes, side: str, where) -> np.ndarray:
                             "belong in the gap ([contact.crown], [contact.tilt])")
     if points[:, 1].min() < -close:
         raise PatchfemError(f"{where}: the {side} piece reaches {-points[:, 1].min():.6g} m across y = 0; the lower "
-                            "piece lies at y <= 0, the upper one at y >= 0")
+                            "piece lies at y <= 0, the upper piece at y >= 0")
     if flat.all():
         points[nodes, 1] = 0.0
     np.maximum(points[:, 1], 0.0, out=points[:, 1])
@@ -263,8 +263,8 @@ def _joined(mesh: PieceMesh, side: str, where) -> None:
     near = cKDTree(mesh.points).query_pairs(CLOSE * mesh.length, output_type="ndarray")
     if len(near):
         x, y = mesh.points[near[0, 0]]
-        raise PatchfemError(f"{where}: {len(near)} pairs of nodes of the {side} piece coincide, the first at x "
-                            f"= {x:.6g} m, {y:.6g} m from the interface; merge them")
+        raise PatchfemError(f"{where}: {len(near)} pairs of nodes of the {side} piece coincide, the first at x = "
+                            f"{x:.6g} m, {y:.6g} m from the interface; merge these nodes")
     if np.unique(ends[:, 0] * count + ends[:, 1]).size < len(ends):
         raise PatchfemError(f"{where}: cells of the {side} piece overlap")
     key = ends.min(axis=1) * count + ends.max(axis=1)
@@ -287,8 +287,8 @@ def _joined(mesh: PieceMesh, side: str, where) -> None:
     gone = ~np.isin(wanted[:, 0] * count + wanted[:, 1], key[~inner])
     if gone.any():
         x = mesh.x[np.argmax(gone)]
-        raise PatchfemError(f"{where}: {side}_interface has a hole or leaves out nodes after x = {x:.6g} m; make it "
-                            "one continuous edge")
+        raise PatchfemError(f"{where}: {side}_interface has a hole or leaves out nodes after x = {x:.6g} m; make the "
+                            "interface one continuous edge")
 
 
 def cell_edges(mesh: PieceMesh) -> tuple:
@@ -318,8 +318,8 @@ def _hanging(mesh: PieceMesh, border, side: str, where) -> None:
     off = np.abs(along[:, 0] * aside[:, 1] - along[:, 1] * aside[:, 0]) / size[edge]
     if off.min() <= CLOSE * mesh.length:
         x, y = point[np.argmin(off)]
-        raise PatchfemError(f"{where}: cells of the {side} piece do not meet edge to edge: a node hangs inside an "
-                            f"edge at x = {x:.6g} m, {y:.6g} m from the interface")
+        raise PatchfemError(f"{where}: cells of the {side} piece do not meet edge to edge: a node lies inside an edge "
+                            f"at x = {x:.6g} m, {y:.6g} m from the interface")
 
 
 def _centred(mesh: PieceMesh, x) -> PieceMesh:

@@ -10,8 +10,9 @@ import numpy as np
 from ..core import PatchfemError
 from .anymesh import CELLS, EDGES, Tagged
 
-INP = ("names of *ELSET for the cells; of *NSET, or *ELSET of line elements, for interface and far")
-UNV = ("names of groups of elements for the cells; of groups of nodes or of line elements for interface and far")
+INP = ("for the cells, names of *ELSET; for `interface` and `far`, names of *NSET or of *ELSET made of line elements")
+UNV = ("for the cells, names of groups of elements; for `interface` and `far`, names of groups of nodes or of line "
+       "elements")
 FLAT = re.compile(r"(?:CPE|CPS|CPEG|CAX|S|STRI|M3D|R3D|SFM3D)([34])(?:R|H|I|RH|IH|RS|RSW|R5)?$")
 LINE = re.compile(r"(?:T2D2|T3D2|B21|B31|R2D2|RAX2|SAX1)H?$")
 UNV_SIZES = {11: 2, 21: 2, 41: 3, 51: 3, 61: 3, 81: 3, 91: 3, 44: 4, 54: 4, 64: 4, 84: 4, 94: 4}
@@ -149,7 +150,8 @@ def _unv_elements(lines) -> dict:
             next(lines)
         out[words[0]] = [int(word) for word in next(lines).split()]
         if len(out[words[0]]) != size:
-            raise PatchfemError(f"element {words[0]} has {len(out[words[0]])} nodes, its kind {size}")
+            raise PatchfemError(f"element {words[0]} has {len(out[words[0]])} nodes, but elements of its kind have "
+                                f"{size}")
     return out
 
 

@@ -68,7 +68,8 @@ def _mesh(path: Path, tables, whole: bool) -> None:
         return
     with open(path, "rb") as file:
         if not file.read(4096).lstrip().startswith(start):
-            raise PatchfemError(f"{path}: not a readable {path.suffix} file (it does not start like one)")
+            raise PatchfemError(f"{path}: not a readable {path.suffix} file (its content does not start like that of "
+                                "such a file)")
 
 
 def _profile(path: Path, tables, whole: bool) -> tuple:

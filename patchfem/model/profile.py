@@ -54,14 +54,14 @@ def _waviness(trace: Profile, cutoff: float) -> tuple:
     shorter ones."""
     if cutoff >= trace.length:
         raise PatchfemError(f"{say(cutoff)} is longer than the patch, {say(trace.length)}, so that no wave is left to "
-                            "the profile; take a shorter one, or leave [contact.profile] out",
+                            "the profile; take a shorter cut-off, or leave [contact.profile] out",
                             "contact.asperities.cutoff")
     same = even(trace)
     x = np.linspace(same.x[0], same.x[-1], max(same.x.size, int(np.ceil(DENSE * same.length / cutoff)) + 1))
     line = mean_line(np.interp(x, same.x, same.z), cutoff * (x.size - 1) / same.length, tilted=True)
     share = fine_share(trace, cutoff)
-    said = (f"{trace.source}: waves longer than {say(cutoff)} shape the gap; the shorter ones, {100 * share:.2g} % of "
-            "the rms, are left to [contact.asperities], whose cutoff moves the limit",) if share > 0 else ()
+    said = (f"{trace.source}: waves longer than {say(cutoff)} shape the gap; the shorter waves, {100 * share:.2g} % of "
+            "the rms, are left to [contact.asperities], whose key cutoff sets the limit",) if share > 0 else ()
     return replace(trace, x=frozen_array(x), z=frozen_array(line), notes=()), said
 
 

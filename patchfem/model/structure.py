@@ -34,7 +34,7 @@ def modes_of(scene, own: ModalBasis | None = None) -> ModalBasis:
     if bonded is None or bonded.wavelength is not None:  # interlocking is no spring: it acts in the march
         return found
     if len(found.interfaces) != 1 and not scene.structure.mode:
-        raise PatchfemError(f"{scene.where('structure.bonded')}: is for one contact, but the rig has "
+        raise PatchfemError(f"{scene.where('structure.bonded')}: applies to one contact, but the rig has "
                             f"{len(found.interfaces)} interfaces; write a spring between the same places")
     return module_of("structure.bonded").bonded(found, bonded.stiffness, bonded.damping)
 
@@ -233,8 +233,8 @@ def start_of(scene, modes: ModalBasis):
     """Start of a scene that does not begin at rest, else None; PatchfemError where it lies beyond structure.travel."""
     start, travel = start_state(scene, modes), scene.structure.travel
     if travel is not None and abs(float(modes.output @ start.z)) > travel:
-        raise PatchfemError(f"{scene.where('structure.travel')}: the start lies beyond it; raise travel or start "
-                            "nearer to the middle")
+        raise PatchfemError(f"{scene.where('structure.travel')}: the start lies beyond this travel; raise travel or "
+                            "start nearer to the middle")
     return start if start.z.any() or start.v.any() else None
 
 

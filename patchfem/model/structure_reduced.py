@@ -84,7 +84,7 @@ def _rounded(files: tuple, every: list, stiffness, unit: float, shape) -> list:
         share = matrices.scatter(one.values, told[1], shape) / unit / scale  # two deviations, of half a square
         if share > TOLD:
             out.append(f"{path.name} has its {key} in {told[0]}, which leaves the lowest frequency of the structure "
-                       f"uncertain by {100 * share:.2g} %; write it in double precision")
+                       f"uncertain by {100 * share:.2g} %; write the file in double precision")
     return out
 
 
@@ -120,7 +120,7 @@ def _placed(every: list, boundary: tuple, moved: tuple | None, driven: bool) -> 
     if moved is None and one.places is None:
         moving[:] = 1.0
         notes = [f"all {n} coordinates of structure.reduced move with the base, because the files name no directions; "
-                 "give the ones along x in structure.reduced.moved"] if n > rows.size else []
+                 "give the coordinates along x in structure.reduced.moved"] if n > rows.size else []
     for each in ("x",) if moved is None and one.places is not None else moved or ():
         moving[_rows(each, one, n, "moved")] = 1.0
     return rows, moving, notes

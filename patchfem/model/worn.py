@@ -41,9 +41,9 @@ class WornBefore:
         asked, cycles = float(self.scene["wear"]["cycles"]), f"{self.cycles:.6g}"
         if self.cycles < asked * (1 - 1e-9):
             cycles += f" of {asked:.6g}"
-        return (f"continues from {self.path.parent.name}/{self.path.name}, up to {say(float(self.depth.max()), 3)} "
-                f"worn off in {cycles} cycles; cycles count from there, but worn_volume and worn_depth_max from unworn "
-                "pieces")
+        return (f"continues from {self.path.parent.name}/{self.path.name}, where up to "
+                f"{say(float(self.depth.max()), 3)} was worn off in {cycles} cycles; the cycles of this run count from "
+                "there, but worn_volume and worn_depth_max count from the unworn pieces")
 
     def on(self, x) -> np.ndarray:
         """Worn depth (m,) [m] at x (m,) [m] of an interface; PatchfemError unless it is as long."""
@@ -57,7 +57,7 @@ class WornBefore:
         off = float(np.abs(off - np.polyval(np.polyfit(x, off, 1), x)).max())
         if off > SAME * float(np.ptp(gap)) + FLAT:
             raise PatchfemError(f"{self.path}: its unworn surfaces differ from those of this scene by {say(off, 3)}; "
-                                "choose a run of the same pieces, with elements of the same length if they are "
+                                "choose a run of the same pieces, and elements of the same length if the surfaces are "
                                 "rough", KEY)
 
     def missing(self, name: str, value: float) -> float | None:
@@ -68,8 +68,8 @@ class WornBefore:
 
     def _as_long(self, first: float, last: float) -> None:
         if not np.allclose(self.x[[0, -1]], (first, last), rtol=1e-6, atol=0):
-            raise PatchfemError(f"{self.path}: its interface is {say(float(np.ptp(self.x)))} long but this one "
-                                f"{say(last - first)}; choose a run of the same pieces", KEY)
+            raise PatchfemError(f"{self.path}: the interface of that run is {say(float(np.ptp(self.x)))} long, that of "
+                                f"this scene {say(last - first)}; choose a run of the same pieces", KEY)
 
 
 def read(path: Path) -> WornBefore:
@@ -86,7 +86,8 @@ def read(path: Path) -> WornBefore:
         found = WornBefore(path, x, depth, gap - depth, float(cycles[-1]), scene, measures)
         right = row and x.size > 1 and (np.diff(x) > 0).all() and depth.min() >= 0 and bool(found.sentence)
     except UNREADABLE:
-        raise PatchfemError(f"{path}: not the result.nc of a run with [wear] and [contact]; give one", KEY) from None
+        raise PatchfemError(f"{path}: not the result.nc "
+                            "of a run with [wear] and [contact]; give such a file", KEY) from None
     if strips:
         raise PatchfemError(f"{path}: worn strip by strip, and such wear cannot be continued yet; choose a run without "
                             "[contact.strips]", KEY)
@@ -102,6 +103,6 @@ def of_pieces(path: Path, tables: Tables) -> WornBefore:
                 {"wear.upper_share": each["wear"]["upper_share"]} for each in (found.scene, here))
     unlike = [key if "." in key else f"contact.{key}" for key in {**one, **two} if one.get(key) != two.get(key)]
     if unlike:
-        raise PatchfemError(f"{path}: worn on other pieces: {', '.join(unlike)} differ; choose a run of the "
-                            "same pieces", KEY)
+        raise PatchfemError(f"{path}: that run wore other pieces: {', '.join(unlike)} differ; choose a run of the same "
+                            "pieces", KEY)
     return found

@@ -87,4 +87,4 @@ def _of_cycles(name: str, values, window, drive, beside: float) -> str:
     if name == "equivalent_damping":
         return f"it is the damping ratio of mode 1, but another mode carries {plain(100 * beside, 2)} % of the slide" \
             if beside > SHARED else "mode 1 is a rigid-body mode, or does not move the interface"
-    return "in none of the last cycles is the force known on both sides of the largest slides"
+    return "in none of the last cycles is the force known just before and just after the largest slide"

@@ -201,11 +201,11 @@ ROWS = (
         "first harmonic of the acceleration at the output, base motion included",
         lambda s: s.waves.get("absolute_acceleration_fundamental")),
     Row("acceleration_distortion", "1", 1e-6,
-        "third over first harmonic of the acceleration at the output, base motion included; null if the output does "
-        "not move",
+        "third harmonic of the acceleration at the output, base motion included, divided by the first; null if the "
+        "output does not move",
         lambda s: s.waves.get("acceleration_distortion")),
     Row("drift_per_cycle", "m", 1e-11,
-        "change of the time mean of the slide from the first to the last cycle of the window, per cycle",
+        "mean change per cycle of the time mean of the slide, from the first to the last cycle of the window",
         lambda s: drift(s.window.time, s.window.slide, s.window.slide_rate, s.drive.period) if s.own.drift is None
         else s.own.drift,
         term=("slip, or motion", _moved), halves=FOURTH),
@@ -214,13 +214,14 @@ ROWS = (
         "by the pressure, sliders of law 'iwan' by their slip forces",
         lambda s: s.slip.get("slip_amplitude"), group="friction"),
     Row("stick_fraction", "1", 1e-3,
-        "share of the last cycles in which the interface as a whole sticks, that is, over half of its slide, weighted "
-        "as in slip_amplitude, is elastic; part of a patch, or some sliders of law 'iwan', may slip meanwhile",
+        "share of the last cycles in which the interface as a whole sticks: more than half of the motion of the slide, "
+        "weighted as in slip_amplitude, is elastic; part of a patch, or some sliders of law 'iwan', may slip at the "
+        "same time",
         lambda s: s.slip.get("stick_fraction"), 0.35, group="friction", term=("1", lambda _: 1.0),
         halves=(2.5, 0.5)),
     Row("slip_start_phase", "rad", 1e-3,
-        "phase of the base displacement at which slip starts after stick, modulo pi; slip is the mean used in "
-        "slip_amplitude; printed in degrees",
+        "phase of the base displacement at which slip starts after stick, modulo pi; slip is the weighted mean defined "
+        "for slip_amplitude; the phase is printed in degrees",
         lambda s: s.slip.get("slip_start_phase"), 1.0, group="friction", term=("pi", lambda _: np.pi),
         halves=(2.5, 1.0)),
     Row("normal_load", "N", 0.0, "normal load on the interface, all pairs together", lambda s: s.load,
@@ -230,20 +231,20 @@ ROWS = (
         "close, because the interface then stores or returns more than it dissipates",
         lambda s: s.cycle.get("loop_area"), group="energy"),
     Row("equivalent_stiffness", "N m-1", 1.0,
-        "in-phase part of the first harmonic of the friction force over the first harmonic of the slide; negative if "
-        "friction holds the spring deflected during stick",
+        "in-phase part of the first harmonic of the friction force divided by the first harmonic of the slide; "
+        "negative if friction holds the spring deflected during stick",
         lambda s: s.cycle.get("equivalent_stiffness"), group="friction", term=("whole first harmonic", first_harmonic)),
     Row("secant_stiffness", "N m-1", 1.0,
-        "friction force at the largest minus that at the smallest slide of a cycle, over the range of the slide; where "
-        "the force jumps, the mean of both sides counts",
+        "friction force at the largest slide of a cycle minus the friction force at the smallest, divided by the range "
+        "of the slide; where the force jumps, the mean of both sides counts",
         lambda s: s.cycle.get("secant_stiffness"), group="friction", halves=FOURTH),
     Row("equivalent_damping", "1", 1e-8,
-        "equivalent damping ratio of friction in the first mode that is not rigid: loop area over 2 pi K A^2, with K = "
-        "moving_mass omega_1^2 and A half the range of the slide in a cycle over the mode's `slide`, averaged over the "
-        "last cycles; null if other modes carry more than 5 % of the slide",
+        "equivalent damping ratio of friction in the first mode that is not rigid, averaged over the last cycles: loop "
+        "area over 2 pi K A^2, where K = moving_mass omega_1^2 and A is half the range of the slide in a cycle divided "
+        "by the `slide` of this mode; null if other modes carry more than 5 % of the slide",
         lambda s: s.cycle.get("equivalent_damping"), group="friction", halves=FOURTH),
-    Row("friction_work", "J", 1e-10, "work done on all interfaces together over the run; by method harmonic over "
-        "two cycles",
+    Row("friction_work", "J", 1e-10, "work done on all interfaces together over the run; with method `harmonic`, over "
+                                     "two cycles",
         lambda s: s.energies.get("friction_work"), group="energy"),
     Row("energy_stored", "J", 1e-10, "energy stored in all interfaces at the end: elastic energy, and over grooves the "
                                      "potential energy of the load or, for a load that changes, the work done against "
@@ -260,16 +261,16 @@ ROWS = (
     Row("open_fraction", "1", 1e-3, "share of the last cycles without contact",
         lambda s: s.of_load(lambda load: np.mean(load <= 0)), 4.0, group="friction", term=("1", lambda _: 1.0)),
     Row("relative_displacement_amplitude_steady", "m", 1e-10,
-        "extrapolated steady amplitude of a motion that has not settled, or still changes by 2 % of the tolerance"),
-    Row("peak_frequency", "Hz", 0.0, "drive frequency at the largest amplitude of a curve of steady states"),
+        "steady amplitude, extrapolated for a motion that has not settled or still changes by 2 % of the tolerance"),
+    Row("peak_frequency", "Hz", 0.0, "drive frequency at which a curve of steady states has its largest amplitude"),
     Row("friction_ratio_end", "1", 1e-9, "ratio of friction to normal load at the end of the slide", group="friction"),
     Row("friction_ratio_peak", "1", 1e-9, "largest ratio of friction to normal load over the run", group="friction"),
     Row("flutter_amplitude", "m", 1e-10,
-        "half peak-to-peak, at the output, of the unstable limit cycle without a drive: friction dissipates exactly "
-        "what a mode of negative damping supplies; smaller motions decay, larger motions grow"),
+        "amplitude (half peak-to-peak at the output) of the unstable limit cycle without a drive, in which friction "
+        "dissipates exactly what a mode of negative damping supplies; smaller motions decay, larger motions grow"),
     Row("work_check", "1", 1e-2,
-        "relative difference between the friction work by the trapezoidal rule on the samples of the run and that in "
-        "its energy balance",
+        "relative difference between two values of the friction work: by the trapezoidal rule on the samples of the "
+        "run, and in the energy balance of the run",
         lambda s: s.work_check, group="energy"),
     *_shaken("relative_displacement_rms", "m", 1e-10, "root mean square displacement at the output about its mean, "
                                                       "under a random drive"),
@@ -277,17 +278,18 @@ ROWS = (
                                                          "included, under a random drive"),
     *_shaken("response_frequency", "Hz", 1e-3, "frequency of the largest peak of H1, the frequency response under a "
                                                "random drive"),
-    *_shaken("response_damping", "1", 1e-5, "damping ratio of that peak, structure and friction together"),
+    *_shaken("response_damping", "1", 1e-5, "damping ratio of the peak of H1, structure and friction together"),
     Row("ring_frequency", "Hz", 1e-3, "frequency of the free vibration (ringing) during stick"),
-    Row("ring_damping", "1", 1e-6, "damping ratio of that free vibration"),
+    Row("ring_damping", "1", 1e-6, "damping ratio of the free vibration (ringing) during stick"),
     Row("onset_level", "m s-2", 0.0,
-        "level of the drive at the onset that drive.onset defines, found by bisection between two levels; in N for a "
-        "force drive", group="friction"),
+        "drive level at the onset that drive.onset defines, found by bisection between two levels; in N for a force "
+        "drive", group="friction"),
     Row("jump_level", "m s-2", 0.0,
-        "level after the largest jump of the amplitude between two levels; a jump is larger than the change of the "
-        "drive by a factor of 1.5 or more; in N for a force drive"),
+        "drive level just after the largest jump of the amplitude; a jump is a step between two levels at which the "
+        "ratio of the amplitudes is at least 1.5 times the ratio of the levels; in N for a force drive"),
     Row("level_hysteresis", "m", 0.0,
-        "hysteresis: largest difference of the amplitude between rising and falling levels at the same level"),
+        "hysteresis: largest difference between the amplitudes reached at the same level with rising and with falling "
+        "levels"),
 )
 TABLE = {row.name: row for row in ROWS}
 OF_EACH = ("slip_amplitude", "stick_fraction", "friction_force_peak", "loop_area")  # of every interface

@@ -24,7 +24,7 @@ from .wear import plan as of_wear
 LONGEST = 1e6  # seconds of a run, twelve days, beyond which none is begun
 GROUPS = {  # group -> (what it is, SI unit of its value)
     "D": ("D: friction limit over the largest force of the drive", "1"),
-    "knee": ("acceleration beyond which friction alone does not bound a resonance", "m s-2"),
+    "knee": ("acceleration beyond which friction alone does not limit the amplitude at resonance", "m s-2"),
     "drive_amplitude_over_bond_length": ("amplitude of the drive over the bond length", "1"),
     "amplitude_over_bond_length": ("amplitude of the slide over the bond length", "1"),
     "slip_length": ("elastic slide of the pieces before the patch slips", "m"),
@@ -161,10 +161,10 @@ def _verdict(model: Model, groups: dict, parts: tuple, said: list) -> list:
         about = f"by {say(groups['slip_length'], 3)} or more before the whole patch slips"
         out.append(f"the pieces shear elastically {about}" if model.patch.shear else
                    f"the pieces are rigid in shear in this scene; elastic pieces would shear {about}: add "
-                   "[contact.shear] to include it")
+                   "[contact.shear] to include this")
     if model.kind == "rig" and model.soft and model.rig.load_varies:
         out.append(f"{model.soft}is computed with the tangential modes of all nodes, because the load changes with the "
-                   "motion; a run with half as many gives the error")
+                   "motion; a run with half as many modes gives the error")
     return out
 
 

@@ -21,7 +21,7 @@ SIZE = "contact.element_size"  # an even mesh finds the ends of a contact at fir
 OF_PEAK = ("pressure_peak", "loaded_fraction")
 OF_SAMPLES = ("stick_fraction", "slip_start_phase")  # of a cycle of a balance, however many harmonics it has
 RINGS = "ring_"  # measures of a ring beside the motion, which an engine without steps need not have
-READ = "no known setting improves it; use it with its stated error"
+READ = "no known setting improves this value; use it with its stated error"
 # what a run answers first, named before what misses its tolerance by more
 FIRST = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "friction_ratio_peak",
          "pressure_peak", "contact_fraction")
@@ -115,8 +115,8 @@ def _finer_mesh(seen, wide: dict, coarse) -> str:
             seen.patch.sharper else f"a mesh finer than {nodes} interface nodes"
         return (f"{finer} would take too long; use "
                 f"{'these values with their stated errors' if len(wide) > 1 else 'this value with its stated error'}")
-    return f"the mesh ({nodes} interface nodes) was not refined for this quantity; set accuracy.tolerance = " \
-           f"{tighter:.3g} for a finer one"
+    return (f"the mesh ({nodes} interface nodes) was not refined for this quantity; set accuracy.tolerance = "
+            f"{tighter:.3g} for a finer mesh")
 
 
 def _locks(seen, wide: dict) -> bool:
@@ -211,7 +211,7 @@ def _to_a_sample(cycles: float, steps: int) -> str:
     have a half and a quarter."""
     found = min(range(4 * ceil(steps / 4), 2 * steps + 4, 4), key=lambda n: abs(cycles * n - round(cycles * n)))
     return (f"the run ends between two samples; set accuracy.steps_per_cycle = {found}, so that a sample lies closer "
-            "to its end")
+            "to the end of the run")
 
 
 def _finer_bonds(accuracy) -> str:
@@ -239,8 +239,8 @@ def _unproven(model, steps: int, name: str, wide: dict) -> str:
         return f"{seen}, so more steps may not help; {exact}"
     if model.kind == "rig" and model.accuracy.steps_per_cycle is not None and 2 * steps <= costs.MOST_STEPS and \
             "relative_displacement_amplitude" in wide:
-        return (f"{seen}; leave out accuracy.steps_per_cycle, so that patchfem doubles them until the displacement "
-                "meets the tolerance")
+        return (f"{seen}; leave out accuracy.steps_per_cycle, so that patchfem doubles the steps until the "
+                "displacement meets the tolerance")
     return f"{seen}, so more steps may not help; use the value with its stated error"
 
 
@@ -255,9 +255,9 @@ def _finer_under(seen, coarse) -> str:
         return faces.in_scene(seen.model, f"the mesh causes this; leave out {SIZE}")
     tighter = min((found for one in every if (found := _climbing(*one)) is not None), default=None)
     if tighter is None:
-        return (f"the mesh ({nodes} interface nodes) causes this, and a finer one would take too long; use the value "
+        return (f"the mesh ({nodes} interface nodes) causes this, and a finer mesh would take too long; use the value "
                 "with its stated error")
-    return f"the mesh ({nodes} interface nodes) causes this; set accuracy.tolerance = {tighter:.3g} for a finer one"
+    return f"the mesh ({nodes} interface nodes) causes this; set accuracy.tolerance = {tighter:.3g} for a finer mesh"
 
 
 def _stepless(model) -> str:

@@ -124,7 +124,7 @@ def apply_set(draft: Draft, assignment: str) -> None:
         assignment.encode()
     except UnicodeEncodeError:
         shown = assignment.encode(errors="backslashreplace").decode()
-        draft.refuse_set(f"{shown}: contains bytes that are not UTF-8 text; save it as UTF-8")
+        draft.refuse_set(f"{shown}: contains bytes that are not UTF-8 text; save the file as UTF-8")
         return
     key, equals, text = assignment.partition("=")
     pieces = pieces_of(key)

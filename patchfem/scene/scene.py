@@ -118,8 +118,8 @@ def text_of(path: str | Path) -> str:
         reason = getattr(error, "strerror", None) or str(error)
         raise SceneError([f"{path}: cannot be read: {reason}"]) from None
     if len(content) > LARGEST:
-        raise SceneError([f"{path}: more than {LARGEST >> 20} MiB, too large for a scene; put matrices into a file "
-                          "and name it in structure.file"])
+        raise SceneError([f"{path}: more than {LARGEST >> 20} MiB, too large for a scene; put matrices into a file and "
+                          "give its name in structure.file"])
     try:
         return content.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -49,8 +49,8 @@ def oversized(given: dict[str, Any], patch: float | None = None, at: str = "") -
             limit = patch if patch is not None and not key.startswith("contact.") else LONGEST
             if abs(value) > limit and not key.endswith("radius"):
                 wrong.append(f"--set: {key}: {value:g} without a unit means {value:g} m, more than "
-                             f"{'the patch is long' if limit is patch else 'any joint has'} ({limit:g} m); give it "
-                             f"its unit, such as '{value:g} mm' or '{value:g} m'")
+                             f"{'the patch is long' if limit is patch else 'any joint has'} ({limit:g} m); add the "
+                             f"unit, such as '{value:g} mm' or '{value:g} m'")
     return wrong
 
 

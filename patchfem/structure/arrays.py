@@ -158,7 +158,8 @@ def _of_modes(data, pairs, pushed, forced, mass, where) -> ModalBasis:
     if mass is None and "moving_mass" in data:
         mass = float(_numbers(data, "moving_mass", where)[0])
     if mass is None or not mass > 0:
-        raise PatchfemError(f"{where}: lacks moving_mass > 0, the modal mass [kg]; give it there or in [structure]")
+        raise PatchfemError(f"{where}: lacks moving_mass > 0, the modal mass [kg]; give moving_mass in the file or in "
+                            "[structure]")
     if (omega < 0).any():
         raise PatchfemError(f"{where}: frequencies must be >= 0, not {omega.min():g}")
     faces = np.atleast_2d(_numbers(data, "slide", where, (n,), (None, n)))

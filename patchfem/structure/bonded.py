@@ -41,8 +41,8 @@ def freed(basis: ModalBasis, stiffness, damping: float = 0.0) -> ModalBasis:
     square[square <= least] = 0.0
     damper = -damping / m * np.outer(rows[0], rows[0])
     if damping and np.linalg.eigvalsh(basis.dampers + damper)[0] < -least**0.5 * ROUND:
-        raise PatchfemError("structure.bonded.damping is larger than the damping of the modes, of which it is a part; "
-                            "lower it")
+        raise PatchfemError("structure.bonded.damping is larger than the damping of the modes, which includes it; "
+                            "lower structure.bonded.damping")
     found = _turned(basis, np.sqrt(square), V, damper)
     return replace(found, shapes=None) if square.size == 1 and basis.shapes is None else found
 

@@ -36,8 +36,8 @@ class Fit:
         size = np.sqrt(np.mean(np.abs(data)**2, axis=0))
         self.size, shared = size, int(np.unique(power).size == 1)
         if not shared:
-            raise PatchfemError("structure.file: responses of displacement, velocity and acceleration are mixed; fit "
-                                "one kind")
+            raise PatchfemError("structure.file: responses of displacement, velocity and acceleration are mixed; use "
+                                "responses of one kind")
         self.lift = (1j * omega)**power[0]
         self.data = data / size
         self.level = np.sqrt(np.mean(np.abs(self.data)**2, axis=1))
@@ -278,5 +278,5 @@ def _reference(measured):
     if not driven:
         refs = ", ".join(_named(ref) for ref in sorted({ref for _, ref in measured}))
         raise PatchfemError(f"structure.file: no response at the driven point itself ({refs}), without which the mode "
-                            "shapes have no scale; measure one")
+                            "shapes have no scale; measure such a response")
     return max(driven, key=lambda ref: sum(at == ref for _, at in measured))

@@ -116,7 +116,7 @@ def _root(M):
         bare = np.flatnonzero(np.diag(M) <= 0)
         which = f" (coordinate {bare[0] + 1} has none)" if bare.size else ""
         raise PatchfemError(f"structure: M is not positive definite: every coordinate needs mass{which}; condense out "
-                            "the coordinates without mass, or give them a mass")
+                            "the coordinates without mass, or give each of these coordinates a mass")
     return root
 
 
@@ -142,8 +142,8 @@ def without_phase(values, name):
         return values.real
     remedy = ""
     if name == "K":
-        remedy = (f"; for a loss factor eta (here about {share:.3g}) give K without it and the damping matrix C = eta "
-                  "K/omega [N s/m] at the frequency of the drive")
+        remedy = (f"; for a loss factor eta (here about {share:.3g}) give K without the loss factor, and the damping "
+                  "matrix C = eta K/omega [N s/m] at the frequency of the drive")
     raise PatchfemError(f"structure: {name} is complex, imaginary parts up to {share:.2g} of the real ones; motion in "
                         f"time needs real matrices{remedy}")
 

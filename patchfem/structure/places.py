@@ -86,4 +86,4 @@ def held_note(basis: ModalBasis) -> list:
     if held >= 0.8:
         return []
     return [f"the modes of structure.file contain {100 * held:.0f} % of structure.moving_mass at base_at; the rest of "
-            "it is not driven by the base"]
+            "this mass is not driven by the base"]

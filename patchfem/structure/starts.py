@@ -25,7 +25,7 @@ def _coordinates(basis: ModalBasis, values) -> np.ndarray:
         return np.zeros(n)
     values, own = np.asarray(values, float), n if basis.shapes is None else len(basis.shapes)
     if values.shape != (own,):
-        raise PatchfemError(f"structure.start: {values.size} values are given for {own} modes or masses; one for "
+        raise PatchfemError(f"structure.start: {values.size} values are given for {own} modes or masses; one value for "
                             "each is needed")
     if basis.shapes is None:
         return values

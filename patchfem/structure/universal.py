@@ -93,7 +93,8 @@ def _responses(sets, factors) -> Shapes:
             raise PatchfemError(f"structure.file: {what} is type {kind} over {over}; displacement (8), velocity "
                                 "(11) or acceleration (12) over force (13) is needed")
         if len(one["x"]) != x.size or not np.allclose(one["x"], x, rtol=1e-6, atol=0):
-            raise PatchfemError(f"structure.file: {what} has other frequencies than the first; all must share them")
+            raise PatchfemError(f"structure.file: {what} has other frequencies than the first response; all responses "
+                                "need the same frequencies")
         if not np.isfinite(one["data"]).all() or not np.iscomplexobj(one["data"]):
             raise PatchfemError(f"structure.file: {what} contains values that are not finite or not complex")
         sign_out, place = _place(one["rsp_node"], one["rsp_dir"])

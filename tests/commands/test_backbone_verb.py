@@ -59,7 +59,7 @@ def test_the_screen_answers_in_sentences_and_names_what_is_not_known(scene, caps
 
 
 def test_the_largest_damping_is_told_of_the_amplitudes_that_were_computed(scene, capsys):
-    for asked, told in (("10 um..1 mm:3", "Of these 3 amplitudes the damping ratio is largest at "), ("10 um", "")):
+    for asked, told in (("10 um..1 mm:3", "Among these 3 amplitudes the damping ratio is largest at "), ("10 um", "")):
         assert run("backbone", "joint.toml", "--amplitudes", asked, "--method", "quasi-static", "--no-page", "-q",
                    "-o", f"out{len(told)}") == 0
         shown = capsys.readouterr().out

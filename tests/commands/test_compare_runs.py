@@ -108,8 +108,8 @@ def test_exact_the_verb_says_what_python_says_and_writes_a_page(runs, tmp_path):
     assert found["verdict"] in table and "worn volume" in table and "pressure peak" in table
 
 
-@pytest.mark.parametrize("ends, kind", [((0.0, 2.0), "a wedge"), ((2.0, 0.3), "a wedge"), ((1.0, 2.0), "even wear with "
-                                         "a wedge"), ((2.0, 1.7), "even wear"), ((1.0, 1.0), "even wear")])
+@pytest.mark.parametrize("ends, kind", [((0.0, 2.0), "a wedge"), ((2.0, 0.3), "a wedge"), ((1.0, 2.0), "uniform wear "
+                                         "with a wedge"), ((2.0, 1.7), "uniform wear"), ((1.0, 1.0), "uniform wear")])
 def test_exact_kinds_of_hidden_wear(ends, kind):
     assert worn._kind(ends) == kind
 
@@ -174,7 +174,7 @@ def test_exact_a_table_of_results_folders_beside_traces(runs, tmp_path):
         alone = json.loads(json.dumps(pf.compare(runs / before, runs / after)))
         assert {name: row[name] for name in alone if name not in ("before", "after")} == \
             {name: one for name, one in alone.items() if name not in ("before", "after")}
-    says = ("has no [wear]", "a direction can only be given for traces", "a file, while")
+    says = ("has no [wear]", "a direction can be given only for traces", "a file, while")
     assert all(text in row["message"] for text, row in zip(says, found[2:5]))
     means = json.loads((tmp_path / "out" / "pairs.json").read_text())["means"]
     assert len(means) == 2 and means[0]["kind"] == "run" and means[0]["pairs"] == 2

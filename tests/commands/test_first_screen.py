@@ -164,9 +164,9 @@ def test_exact_a_level_between_two_others_does_not_claim_the_tolerance():
     jump, fine = Measure(5 * 9.80665, "m s-2", 9.80665, 9.80665), Measure(2.0, "J", 1e-2)
     between = "jump_level, 5.0 ± 1.0 g, has an error of the step between drive levels"
     assert said(jump_level=jump, loop_area=fine) == "Every measure with an error meets the tolerance 0.01; " \
-        f"closest to it is loop_area, 2.000 ± 0.010 J; {between}, which the scene sets."
+        f"closest to the tolerance is loop_area, 2.000 ± 0.010 J; {between}, which the scene sets."
     assert said(jump_level=jump) == f"{between}."
-    assert said(loop_area=fine).endswith("closest to it is loop_area, 2.000 ± 0.010 J.")
+    assert said(loop_area=fine).endswith("closest to the tolerance is loop_area, 2.000 ± 0.010 J.")
     assert said(jump_level=jump, loop_area=Measure(2.0, "J", 1.0)) == ""
 
 
@@ -182,7 +182,7 @@ def test_always_what_slips_while_the_interface_holds_is_said(more, part):
             for name, (value, error, unit) in found.items()}})
 
     holds = "The interface sticks: no slip in the last cycles" + \
-        (" beyond the error of this mesh; a slip zone smaller than an element is not seen." if more else ".")
+        (" beyond the error of this mesh; a slip zone smaller than an element cannot be seen." if more else ".")
     assert said((1.6583e-6, 1.6e-9), (1e-9, 1e-12)) == \
         f"The interface as a whole sticks, but {part} (1.6583 ± 0.0016 uJ per cycle)."
     assert said((1e-9, 2e-9), (1e-9, 1e-12)) == f"The interface as a whole sticks, but {part} (by 1.0000 ± 0.0010 nm)."

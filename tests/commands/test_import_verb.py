@@ -130,9 +130,9 @@ def test_exact_shapes_of_dataset_55_scaled_to_the_mass_they_hold(tmp_path):
 
 
 @pytest.mark.parametrize("words, says", [
-    (["-o", "a.xlsx"], "modes as .toml"), (["-o", "a.csv", "--segment", "2 s"], "can only be used for modes"),
-    (["-o", "a.toml", "--zero"], "--zero can only be used for a table"), (["-o", "a.uff", "--decay"], "can only be "
-                                                                                                      "used for modes"),
+    (["-o", "a.xlsx"], "modes as .toml"), (["-o", "a.csv", "--segment", "2 s"], "can be used only for modes"),
+    (["-o", "a.toml", "--zero"], "--zero can be used only when importing a "
+                                 "table"), (["-o", "a.uff", "--decay"], "can be used only for modes"),
     (["-o", "a.toml", "--segment", "2"], "--segment 2:"), (["-o", "a.toml", "--window", "flat"], "hann or none"),
     (["-o", "a.toml", "--band", "20 Hz"], "two rising frequencies"),
     (["-o", "a.toml", "--segment", "9 s"], "a segment"),

@@ -111,8 +111,8 @@ def test_exact_means_over_files_a_table_of_them_and_the_levelled_heights(tmp_pat
     (("--cutoff", "-1 mm"), "patchfem: profile --cutoff -1 mm: a length above zero is needed"),
     (("--tip", "0 um"), "patchfem: profile --tip 0 um: a length above zero is needed"),
     (("--cutoff", "5 mm"), "the trace is 4 mm long; half a cut-off of 5 mm is trimmed at each end"),
-    (("--window", "1 mm"), "--window '1 mm': two places are needed, such as '468 um,733 um', for a scan four"),
-    (("--window", "1 mm,9 mm"), "a window from 1 mm to 9 mm; the trace runs from 0 um to 4 mm"),
+    (("--window", "1 mm"), "--window '1 mm': two positions are needed, such as '468 um,733 um'; a scan needs four"),
+    (("--window", "1 mm,9 mm"), "the window runs from 1 mm to 9 mm, but the trace runs from 0 um to 4 mm"),
     (("--units", "mm"), "give two units, of x and of z"),
 ])
 def test_refuses_with_exit_code_2(trace, words, says):

@@ -447,7 +447,7 @@ def test_refuses_what_has_no_answer():
 
 def test_refuses_a_rotation_that_the_contact_set_leaves_open():
     c, x, weight, y = real(4, 30)
-    with pytest.raises(NotConverged, match="does not determine the rotation"):
+    with pytest.raises(NotConverged, match="do not determine the rotation"):
         press_strips(c, x, weight, y, np.where(x == 0, 0.0, 1.0), load=LOAD, moment=0.0)
     state = press_strips(c, x, weight, y, np.where(x == 0, 0.0, 1.0), load=LOAD, moment=0.0, spring=1e3)
     assert (state.force > 0).sum() == 4 and abs(state.theta) <= 1e-15

@@ -45,13 +45,13 @@ def test_always_a_run_without_room_names_path_need_and_room_and_keeps_the_older_
 
 
 def test_exact_a_process_without_room_ends_with_4_and_not_by_a_signal(tmp_path):
-    """HDF5 once wrote again what had no room when the process ended with a thread at work, and died of it."""
+    """HDF5 once wrote again what had not enough space when the process ended with a thread at work, and died of it."""
     (tmp_path / "scene.toml").write_text(COATED, "utf-8")
     code = "import resource, threading; resource.setrlimit(resource.RLIMIT_FSIZE, (65536, 65536)); " \
            "threading.Thread(target=threading.main_thread().join).start(); from patchfem.__main__ import main; main()"
     done = subprocess.run([sys.executable, "-B", "-c", code, "run", tmp_path / "scene.toml", "-o", tmp_path / "out"],
                           text=True, capture_output=True, timeout=120)
-    assert done.returncode == 4 and "no room" in done.stderr and "Traceback" not in done.stderr, done.stderr
+    assert done.returncode == 4 and "not enough space" in done.stderr and "Traceback" not in done.stderr, done.stderr
     assert [one.name for one in tmp_path.iterdir()] == ["scene.toml"]
 
 
@@ -66,7 +66,7 @@ def test_always_every_file_is_the_older_one_where_there_is_no_room(results, tmp_
     Path(name).write_text("older")
     with limited(2048):
         answer = cli(*({"SCENE": results[0], "OUT": results[1]}.get(word, word) for word in words))
-    assert answer.code == 4 and "no room" in answer.err and "2.05 kB is the limit" in answer.err, answer.err
+    assert answer.code == 4 and "not enough space" in answer.err and "2.05 kB is the limit" in answer.err, answer.err
     assert len(answer.err.splitlines()) == 1
     assert Path(name).read_text() == "older"
     assert [one for one in tmp_path.rglob("*") if one.is_file() and one.stat().st_size == 2048] == []
@@ -78,7 +78,7 @@ def test_exact_a_device_is_written_and_stays_a_device(tmp_path):
     for device, code in ("/dev/full", 4), ("/dev/null", 0):
         answer = cli("schema", "-o", device)
         assert answer.code == code and stat.S_ISCHR(os.stat(device).st_mode)
-        assert not code or "/dev/full: no room (No space left on device)" in answer.err
+        assert not code or "/dev/full: not enough space (No space left on device)" in answer.err
 
 
 @pytest.mark.parametrize("size", [0, 100, 2048, 5000, 40_000, 81_000])
@@ -140,7 +140,7 @@ def test_refuses_before_it_writes_what_has_no_room(tmp_path):
     assert there > 0 and ("free" in where or "limit" in where)
     with limited(100):
         assert room(tmp_path / "a") == (100, "is the limit on the size of a file (ulimit -f)")
-        with pytest.raises(Missing, match=r"a: no room: 101 bytes needed, 100 bytes is the limit"), \
+        with pytest.raises(Missing, match=r"a: not enough space: 101 bytes needed, 100 bytes is the limit"), \
                 whole(tmp_path / "a", 101):
             raise AssertionError("written")
         write_text(tmp_path / "a", "x" * 100)
@@ -161,7 +161,7 @@ def test_exact_a_sweep_without_room_keeps_its_cases(tmp_path):
     words = ("sweep", scene, "--over", "friction.static=0.1,0.2", "-o", tmp_path / "out", "-q")
     with limited(8192):  # a summary has room, the table with the page has not
         answer = cli(*words)
-    assert answer.code == 4 and "no room" in answer.err and "out/" in answer.err
+    assert answer.code == 4 and "not enough space" in answer.err and "out/" in answer.err
     assert len(list((tmp_path / "out" / "cases").iterdir())) == 2
     assert not [one for one in (tmp_path / "out").rglob("*") if one.name.startswith(".")]
     assert cli(*words, "--resume").code == 0
@@ -184,7 +184,7 @@ def test_exact_who_is_interrupted_says_what_was_replaced(tmp_path, monkeypatch, 
 
 
 def test_always_a_file_inside_a_draft_without_room_names_need_and_room(tmp_path):
-    with limited(1000), pytest.raises(Missing, match=r"a\.json: no room.*: 2 kB needed, 1 kB is the limit"):
+    with limited(1000), pytest.raises(Missing, match=r"a\.json: not enough space.*: 2 kB needed, 1 kB is the limit"):
         write_inside(tmp_path / "a.json", 2000 * "x")
     write_inside(tmp_path / "a.json", "\udce4 is no letter")
     assert (tmp_path / "a.json").read_text() == "? is no letter"

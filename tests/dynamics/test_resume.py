@@ -108,7 +108,7 @@ def test_refuses_the_state_of_another_march(tmp_path, often):
     assert cli(*words).code == 0
     scene.write_text(BENCH, "utf-8")
     answer = cli(*words)
-    assert answer.code == 2 and "a march in time" in answer.err
+    assert answer.code == 2 and "integrated in time" in answer.err
 
 
 def test_always_a_march_goes_on_where_its_state_has_no_room(tmp_path, often):
@@ -117,7 +117,7 @@ def test_always_a_march_goes_on_where_its_state_has_no_room(tmp_path, often):
     often.stop = 5
     with limited(5000):
         answer = cli("run", scene, "--no-page", "-o", tmp_path / "out")
-    assert answer.code == 4 and "result.nc: no room" in answer.err  # not for its state, which it does without
+    assert answer.code == 4 and "result.nc: not enough space" in answer.err  # not for its state, which it does without
     assert sorted(one.name for one in tmp_path.iterdir()) == ["scene.toml"]
 
 

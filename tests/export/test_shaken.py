@@ -48,7 +48,7 @@ def test_exact_the_first_row_is_the_rms_with_the_interval_of_records(found, tmp_
     head = next(line for line in lines if line.startswith("The output moves"))
     assert head.index(" rms ") < head.index("H1 peaks at") < head.index("damping ratio") < head.index("half peak-to-p")
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
-    assert "Its peak, the ring, is that of a mode at" in page and f"measure-{RMS}_scatter" not in page
+    assert "The peak of H1, marked by a ring, belongs to a mode at" in page and f"measure-{RMS}_scatter" not in page
     rows = re.findall(r"id='measure-(\w+)'", page)
     assert rows[:4] == [RMS, "absolute_acceleration_rms", "response_frequency", "response_damping"]
 

@@ -110,7 +110,7 @@ LEVELS = '[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "100 Hz"\nlev
     (RUB.replace("[structure]", '[structure]\ntravel = "5 mm"'), "; not written: structure.travel\n"),
     (RUB.replace("[drive]", '[structure.start]\ndisplacement = ["5 um"]\n[drive]'),
      "; not written: the initial motion\n"),
-    (HEAD + LEVELS, "; Fex1 is that of 1 m/s^2, not of waveform = 'levels'\n")])
+    (HEAD + LEVELS, "; Fex1 is the excitation for 1 m/s^2, not for waveform = 'levels'\n")])
 def test_always_the_line_says_what_the_file_has_not(tmp_path, text, says):
     (tmp_path / "rig.toml").write_text(text)
     answer = cli("export", tmp_path / "rig.toml", "-o", tmp_path / "rig.npz")

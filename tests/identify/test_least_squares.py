@@ -90,8 +90,8 @@ def test_exact_two_values_known_by_their_product_are_named():
     assert np.abs(found.unknown) == pytest.approx(np.array([[1, 1, 0, 0]]), abs=1e-6)
     assert found.unknown[0, 0] * found.unknown[0, 1] == pytest.approx(-1, abs=1e-6)
     product, flat = remarks(found, "abcd")
-    assert "a and b cannot be told apart" in product and product.endswith("only their product is known")
-    assert flat == "d has no effect on the rows: it is not determined"
+    assert "a and b cannot be determined separately" in product and product.endswith("only their product is known")
+    assert flat == "d has no effect on the rows, so its value is not determined"
 
 
 def test_exact_a_ratio_is_named_and_the_rest_keeps_its_interval():
@@ -106,7 +106,7 @@ def test_exact_a_value_that_the_rows_do_not_rule_out_anywhere_has_no_interval():
     data = RNG.normal(size=20)
     found = fit(lambda v: v[0] - data + 1e-3 * v[1], [-5, 0], [5, 1])
     alone = fit(lambda v: v[0] - data + 1e-3 * v[1] * LINE[:20], [-5, 0], [5, 1])
-    assert "cannot be told apart" in remarks(found, "ab")[0]
+    assert "cannot be determined separately" in remarks(found, "ab")[0]
     assert np.isnan(alone.intervals[1]).all() and alone.methods[1] == "none"
     assert "b is not determined: every value in its range fits the rows" in remarks(alone, "ab")
 

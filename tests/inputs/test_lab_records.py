@@ -105,7 +105,7 @@ def spoilt(values, at=3, to=np.nan):
     ([SI], "no record over time"),
     ([record(spoilt(TIME, to=0.0), FORCE, 13)], "of sample 4 does not follow"),
     ([record(TIME, FORCE, 13), record(TIME + 1, SLIDE, 8)], "has other times than"),
-    ([record(TIME, FORCE + 1j, 13)], "complex"), ([record(TIME, FORCE, 0)], "no channel label tells its quantity"),
+    ([record(TIME, FORCE + 1j, 13)], "complex"), ([record(TIME, FORCE, 0)], "no channel label names a quantity"),
     ([SI | {"length": 0.0}, record(TIME, FORCE, 13)], "must be > 0")])
 def test_refuses_universal_files_by_name(tmp_path, sets, says):
     answer = cli("import", written(tmp_path / "a.uff", sets), "-o", tmp_path / "o.csv")
@@ -121,11 +121,11 @@ def test_refuses_values_that_are_not_finite(tmp_path):
 
 
 @pytest.mark.parametrize("text, says", [
-    ("1,2\n3,4\n5,6\n", ":1: a header like"), ("time [s],force [N]\n0,1\n1\n", ":3: 1 cells under 2 columns"),
+    ("1,2\n3,4\n5,6\n", ":1: a header like"), ("time [s],force [N]\n0,1\n1\n", ":3: 1 cells, but 2 column names"),
     ("time [s];force [N]\n0;1\n1;2,5\n", ":3: force [N]: '2,5' has a decimal comma".replace(" [N]", "")),
     ("time [s],force [N]\n0,1\n1,nan\n", ":3: force: 'nan' is not a finite number"),
     ("time [s],force [lb]\n0,1\n1,2\n", "force [lb]: unknown unit"),
-    ("time [s],force\n0,1\n1,2\n", "'force' has no unit"), ("time [s],A\n0,1\n1,2\n", "no channel label tells")])
+    ("time [s],force\n0,1\n1,2\n", "'force' has no unit"), ("time [s],A\n0,1\n1,2\n", "no channel label names")])
 def test_refuses_tables_by_line(tmp_path, text, says):
     (tmp_path / "a.csv").write_text(text)
     answer = cli("import", tmp_path / "a.csv", "-o", tmp_path / "o.csv")

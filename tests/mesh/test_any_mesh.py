@@ -191,13 +191,14 @@ SPOILT = {
     "double node": (lambda m: double(m, m.quads[20, 0], 20), "coincide, the first at .*merge"),
     "double interface node": (lambda m: twin(m, interface_node(m)), "upper_interface has two nodes at x = .*; merge"),
     "loose coating": (loosen, "9 pairs of nodes of the upper piece coincide"),
-    "hanging node": (hang, "do not meet edge to edge: a node hangs"),
+    "hanging node": (hang, "do not meet edge to edge: a node lies"),
     "shared nodes": (share, "the two pieces share 9 nodes"),
     "steep edge": (bend, "rounded edges may reach a slope of 0.1\\): the node"),
     "across": (lambda m: np.negative(m.points[:, 1], out=m.points[:, 1]), "piece reaches 0.001 m across y = 0"),
     "no far face": (lambda m: drop_edge(m, "upper_far"), r"nothing is tagged upper_far \("),
     "no interface": (lambda m: drop_edge(m, "lower_interface"), r"nothing is tagged lower_interface \("),
-    "hole in the interface": (lambda m: drop_edge(m, "lower_interface", 2), "lower_interface has a hole .* make it"),
+    "hole in the interface": (lambda m: drop_edge(m, "lower_interface", 2), "lower_interface has a hole .* make the "
+                                                                            "interface"),
     "far at the interface": (lambda m: m.edges.__setitem__(m.edge_tags == EDGE_TAGS["lower_far"], interface_node(
         m, "lower")), "lower_far must contain two nodes or more"),
     "foreign far": (lambda m: m.edge_tags.__setitem__(m.edge_tags == EDGE_TAGS["lower_far"], EDGE_TAGS["upper_far"]),

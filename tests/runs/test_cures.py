@@ -80,7 +80,7 @@ def test_always_steps_that_are_left_out_cure_what_few_steps_do_not_show():
     few, main = run(plan(loads(SHAKEN + FEW))), "relative_displacement_amplitude"
     said = [text for text in few.warnings if text.startswith(f"{main} has an estimated error of ")]
     assert len(said) == 1 and "absolute_acceleration_peak of " in said[0] and "loop_area of " in said[0]
-    assert "; leave out accuracy.steps_per_cycle, so that patchfem doubles them" in said[0]
+    assert "; leave out accuracy.steps_per_cycle, so that patchfem doubles the steps" in said[0]
     again = run(plan(loads(SHAKEN + FEW.replace("steps_per_cycle = 16\n", "")))).measures[main]
     assert again.error <= 1e-2 * again.value < few.measures[main].error
 
@@ -115,7 +115,7 @@ def test_always_what_the_mesh_leaves_open_is_not_laid_on_the_steps():
     first = ran_text(BENCH.format(steps=100) + BOWED)
     said = [text for text in first.warnings if text.startswith("loop_area")]
     assert len(said) == 1 and "steps_per_cycle" not in said[0] and "interface nodes) causes this" in said[0]
-    advised = re.search(r"accuracy.tolerance = (\S+) for a finer one", said[0])[1]
+    advised = re.search(r"accuracy.tolerance = (\S+) for a finer mesh", said[0])[1]
     again = ran_text(BENCH.format(steps=100).replace("tolerance = 1e-2", f"tolerance = {advised}") + BOWED)
     for name in ("friction_ratio_end", "loop_area"):
         assert again.measures[name].error < first.measures[name].error / 2

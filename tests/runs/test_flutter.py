@@ -88,7 +88,7 @@ def test_a_motion_that_grows_past_all_bounds_ends(law):
     """Ten thousand cycles at exp(0.126) a cycle pass the largest number that there is."""
     found = pf.run(pf.load(text(law=law, start=1.1 * EDGE, cycles=10000)))
     assert found.outcome == "grows" and found.measures["flutter_amplitude"].value < 1.1e-3 * EDGE
-    assert found.response.time[-1] < 2 and "where the motion passed 1000 m" in found.notes[-1]
+    assert found.response.time[-1] < 2 and "where the motion exceeded 1000 m" in found.notes[-1]
     assert all(one.error is None for name, one in found.measures.items() if name != "flutter_amplitude")
 
 

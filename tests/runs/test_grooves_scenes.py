@@ -373,7 +373,7 @@ BALANCED = RIG.replace('law = "coulomb"', 'law = "elastic-plastic"\nbond_length 
 def test_always_a_lifted_mass_that_leaves_its_grooves_is_an_outcome(text):
     """In every engine; the moment stands in a note, no warning calls it a solve that failed."""
     found = run(text, **LEAVES)
-    assert found.outcome is Outcome.LEAVES_GROOVES and "left its grooves" in found.outcome.sentence
+    assert found.outcome is Outcome.LEAVES_GROOVES and "left their grooves" in found.outcome.sentence
     assert any("leaves the grooves at" in one for one in found.notes)
     assert not any("leaves the grooves" in one or "residual" in one for one in found.warnings)
     assert all(one.error is not None for one in found.measures.values() if one.value is not None)

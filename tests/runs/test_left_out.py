@@ -91,7 +91,7 @@ def test_exact_a_mesh_with_a_hole_says_so_with_its_area(tmp_path):
     m.quads, m.quad_tags = np.delete(m.quads, gone, axis=0), np.delete(m.quad_tags, gone)
     FORMATS["vtu"][1](m, whole[1])
     said = [[text for text in ran(HELD.format(path), False).extra["notes"] if "hole" in text] for path in whole]
-    told = f"contact.mesh: the lower piece has 1 hole inside, {1e6 * area:.3g} mm^2 in all; fill any that"
+    told = f"contact.mesh: the lower piece has 1 hole inside, {1e6 * area:.3g} mm^2 in all; fill any hole that"
     assert gone.size == 2 and said == [[], [f"{told} is not intended"]]
 
 
@@ -201,7 +201,7 @@ def test_refuses_an_approach_between_two_rotations_on_one_node():
     order of h^2/2R = 28 um. On finer cells it rolls evenly and reaches the distance."""
     text = TURNING.replace("0.2 um", "2.509 um") + '[contact.crown]\nradius = "18.18 mm"\n' \
         '[contact.load_line]\nmoment = "0.0001782 N m"\n'
-    with pytest.raises(NotConverged, match=r"contact\.approach\.distance: 2\.509e-06 m is passed in a jump"):
+    with pytest.raises(NotConverged, match=r"contact\.approach\.distance: an approach of 2\.509e-06 m cannot be"):
         ran(text.replace('"0.2 mm"', '"1 mm"'), False)
     found = ran(text.replace('"0.2 mm"', '"0.02 mm"'), False)
     assert found.measures["approach"].value == pytest.approx(2.509e-6, rel=1e-6)
@@ -229,5 +229,5 @@ def test_always_a_plan_calls_no_contact_full_that_is_not(tilt, more):
 def test_exact_a_plan_says_which_pieces_are_rigid_in_shear():
     rigid, soft = (plan(loads(COATED + more + COULOMB + SLIDE, "a.toml")) for more in ("", SHEAR))
     assert rigid.chain["pieces_shear"] == "rigid" and soft.chain["pieces_shear"] != "rigid"
-    assert any(text.endswith("add [contact.shear] to include it") for text in rigid.verdict)
+    assert any(text.endswith("add [contact.shear] to include this") for text in rigid.verdict)
     assert any(text.startswith("the pieces shear elastically") for text in soft.verdict)

@@ -112,4 +112,4 @@ def test_exact_the_work_beside_wear_is_that_of_the_marched_cycles(worn):
     one = {"value": 1.0, "error": 0.0, "unit": "J", "reason": ""}
     lines = "\n".join(table_of({"friction_work": one} | ({"worn_volume": one | {"unit": "m3"}} if worn else {})))
     assert ("over the cycles of the motion, not those of wear" in lines) == worn != ("over the whole run" in lines)
-    assert worn or "over the two cycles" in "\n".join(table_of({"friction_work": one}, "harmonic"))
+    assert worn or "over the two stored cycles" in "\n".join(table_of({"friction_work": one}, "harmonic"))

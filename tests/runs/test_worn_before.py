@@ -68,7 +68,7 @@ def test_exact_volumes_add_where_the_path_and_the_friction_stay(place):
     volume = sum(each.measures["worn_volume"].value for each in (one, two))
     assert found.measures["worn_volume"].value == pytest.approx(volume, rel=1e-12, abs=0)
     assert volume == pytest.approx(ALPHA * LOAD * 1.5 * PATH * 1e6, rel=1e-8, abs=0)
-    assert "continues from archard/result.nc, up to " in found.extra["notes"][-1]
+    assert "continues from archard/result.nc, where up to " in found.extra["notes"][-1]
 
 
 def test_exact_a_run_goes_on_on_another_mesh(place):
@@ -94,7 +94,7 @@ def test_exact_a_sweep_goes_on_from_each_of_two_runs(place):
     (["wear.start=one/summary.json"], "not the result.nc of a run with [wear]"),
     (["wear.start=new.nc"], "not the result.nc of a run with [wear]"),
     (["wear.start=one/result.nc", "contact.length=10 mm", "wear.upper_share=0.6"],
-     "worn on other pieces: contact.length, wear.upper_share differ"),
+     "that run wore other pieces: contact.length, wear.upper_share differ"),
     (["wear.start=nowhere.nc"], "there is no file")])
 def test_refuses_what_is_no_worn_depth_of_these_pieces(place, sets, told):
     if not (place / "new.nc").exists():

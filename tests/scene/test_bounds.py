@@ -56,7 +56,7 @@ def test_refuses_signs_that_no_file_can_hold():
 
 def test_refuses_words_of_set_that_are_no_text():
     assert mistakes(PATCH, "contact.load=26 lbf\udcff") == [
-        "--set: contact.load=26 lbf\\udcff: contains bytes that are not UTF-8 text; save it as UTF-8"]
+        "--set: contact.load=26 lbf\\udcff: contains bytes that are not UTF-8 text; save the file as UTF-8"]
 
 
 @pytest.mark.parametrize("word", ["x" * 3000 + " = 1\n", "[" + "x" * 3000 + "]\n"])

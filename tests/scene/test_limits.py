@@ -37,7 +37,7 @@ REFUSED = [
     (RIG, [PLASTIC, LOWER], "contact.tilt.on", "'lower' in a rig with law 'elastic-plastic'"),
     (POINT_RIG, [COULOMB, STEADY, "structure.stiffening.cubic=1e9 N/m^3"], "accuracy.method", "use 'march', or law"),
     (POINT_RIG, [COULOMB, STEADY, "structure.bonded.stiffness=1e6 N/m", "structure.bonded.wavelength=80 um"],
-     "accuracy.method", "'harmonic' with law 'coulomb', which jumps, and structure.bonded.wavelength"),
+     "accuracy.method", "'harmonic' with law 'coulomb', whose force jumps, and structure.bonded.wavelength"),
 ]
 PLAIN = [
     (RIG, [SHEAR, "friction.static=0"], "friction.static", "no point carries friction; static > 0 is needed"),

@@ -142,14 +142,14 @@ MISSING = [
     (RIG, r"^angle.*\n", "[contact.tilt]", "contact.tilt.angle", "missing; an angle"),
     (RIG, r"^law.*\n", "[friction]", "friction.law", "missing; one of coulomb, tanh"),
     (RIG, r"^static.*\n", "[friction]", "friction.static", "missing; a plain number is needed"),
-    (RIG, r"^bond_length.*\n", "[friction]", "friction.bond_length", "law 'nonlocal' needs it"),
+    (RIG, r"^bond_length.*\n", "[friction]", "friction.bond_length", "law 'nonlocal' needs this key"),
     (RIG, r"^moving_mass.*\n", "[structure]", "structure.moving_mass", "missing; a mass"),
     (RIG, r"^slide = 0.1\n", "[[structure.mode]]", "structure.mode.second.slide", "missing; a plain number"),
     (RIG, r"^cycles.*\n", "[drive]", "drive.cycles", "missing; a plain number is needed; or drive.duration instead"),
     (RIG, r"^acceleration.*\n", "[drive]", "drive.acceleration", "or drive.displacement instead"),
     (LINEAR, r"^\[\[(.|\n)*(?=\[drive)", "[structure]", "structure.mode", "at least one [[structure.mode]] is needed"),
     (BENCH, r"^kind.*\n", "[slide]", "slide.kind", "missing; one of constant, sine, triangle, dwell, file"),
-    (BENCH, r"^amplitude.*\n", "[slide]", "slide.amplitude", "kind 'triangle' needs it"),
+    (BENCH, r"^amplitude.*\n", "[slide]", "slide.amplitude", "kind 'triangle' needs this key"),
     (BENCH, r"^speed.*\n", "[slide]", "slide.speed", "missing; a velocity with its unit is needed, such as '5 mm/s'"),
     (BENCH, r'^load.*\n', "[normal]", "normal.load", "missing; a force"),
 ]  # fmt: skip
@@ -168,15 +168,15 @@ def test_refuses_a_missing_key_at_its_table(text, pattern, header, key, says):
 @pytest.mark.parametrize(
     "sets, key, says",
     [
-        (["friction.law=tanh"], "friction.reference_speed", "law 'tanh' needs it"),
-        (["friction.law=elastic-plastic"], "friction.bond_length", "needs it or stiffness"),
-        (["friction.law=convolution"], "friction.bond_length", "needs it"),
-        (["slide.kind=sine"], "slide.frequency", "kind 'sine' needs it"),
-        (["slide.kind=constant"], "slide.distance", "kind 'constant' needs it"),
-        (["slide.kind=file"], "slide.file", "kind 'file' needs it"),
-        (["friction.rest_growth=1 g"], "friction.slip_growth", "rest_growth needs it"),
-        (["friction.slip_growth=1 um"], "friction.rest_growth", "slip_growth needs it"),
-        (["normal.amplitude=1 N"], "normal.frequency", "normal.amplitude needs it"),
+        (["friction.law=tanh"], "friction.reference_speed", "law 'tanh' needs this key"),
+        (["friction.law=elastic-plastic"], "friction.bond_length", "needs this key or stiffness"),
+        (["friction.law=convolution"], "friction.bond_length", "needs this key"),
+        (["slide.kind=sine"], "slide.frequency", "kind 'sine' needs this key"),
+        (["slide.kind=constant"], "slide.distance", "kind 'constant' needs this key"),
+        (["slide.kind=file"], "slide.file", "kind 'file' needs this key"),
+        (["friction.rest_growth=1 g"], "friction.slip_growth", "rest_growth needs this key"),
+        (["friction.slip_growth=1 um"], "friction.rest_growth", "slip_growth needs this key"),
+        (["normal.amplitude=1 N"], "normal.frequency", "normal.amplitude needs this key"),
     ],
 )
 def test_refuses_a_key_missing_for_the_selector(sets, key, says):
@@ -189,7 +189,7 @@ def test_refuses_kinetic_for_laws_with_one_coefficient(law):
     found = mistakes(BENCH, f"friction.law={law}", "friction.kinetic=0.2", "friction.bond_length=1 um",
                      "friction.reference_speed=1 mm/s")  # fmt: skip
     assert found == [f"--set: friction.kinetic: law '{law}' has only one coefficient; "
-                     "a kinetic one exists for coulomb, nonlocal and lugre"]  # fmt: skip
+                     "laws with a kinetic coefficient are coulomb, nonlocal and lugre"]  # fmt: skip
 
 
 def test_refuses_first_bonds_that_hold_any_force_beside_shear():

@@ -179,8 +179,8 @@ M2, K2 = np.eye(2), np.array([[2.0, -1.0], [-1.0, 1.0]])
     (M2 * np.nan, K2, None, "M contains values that are not finite"),
     (M2, [["a", "b"], ["c", "d"]], None, "K is not a matrix of real numbers"),
     (M2, K2 * (1 + 0.2j), None, "K is complex, imaginary parts up to 0.2 of the real ones; motion in time needs real "
-                                "matrices; for a loss factor eta (here about 0.2) give K without it and the damping "
-                                "matrix C = eta K/omega [N s/m]"),
+                                "matrices; for a loss factor eta (here about 0.2) give K without the loss factor, and "
+                                "the damping matrix C = eta K/omega [N s/m]"),
     (M2 * (1 + 1e-9j), K2, None, "M is complex, imaginary parts up to 1e-09 of the real ones"),
     (M2, K2, 1j * K2, "C is complex"), (M2, [[1.0, 2.0], [3.0]], None, "K is not a matrix of real numbers"),
     (1e-300 * np.eye(2), 1e20 * np.eye(2), None, "K/M exceeds any number; check that both are in SI units"),

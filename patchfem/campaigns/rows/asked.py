@@ -49,8 +49,8 @@ class Asked:
         scene, drive = self.scene, self.scene.drive
         where = f"{scene.path}: fit --to {measured.name}: "
         if scene.kind not in ("rig", "linear"):
-            raise PatchfemError(f"{where}rows of frequency and input need a rig, but this is a {scene.kind} scene; "
-                                "fit a bench to a loop with a displacement column")
+            raise PatchfemError(f"{where}rows of frequency and input need a rig, but this is a {scene.kind} scene; to "
+                                "fit a loop with a displacement column, use a scene with [slide]")
         if drive.kind != "base" or drive.waveform != "sine":
             raise PatchfemError(f"{where}each row is one sine of the base; set drive.kind = 'base' and drive.waveform "
                                 "= 'sine'")

@@ -111,7 +111,7 @@ def cells_of(path: Path) -> Cells:
         if not (one.frequency > 0 and one.input > 0):
             raise PatchfemError(f"{path}: row {k + 1}: frequency and input above zero are needed")
         if one.acceleration == 0:
-            raise PatchfemError(f"{path}: row {k + 1}: an acceleration of 0 has no ratio; leave the cell empty")
+            raise PatchfemError(f"{path}: row {k + 1}: an acceleration of 0 has no logarithm; leave the cell empty")
         for value, is_felt in ((one.acceleration, True), (one.displacement, False)):
             if value is not None:
                 row.append(k)

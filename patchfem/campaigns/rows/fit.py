@@ -201,13 +201,14 @@ def _said(cells: Cells, asked: Asked, found: Found, logs, how: Search) -> list:
     if count:
         means = {"bound": "count in the fit as lower bounds", "out": "are left out of the fit",
                  "read": "count in the fit like all others"}[how.unstable]
-        out.append(f"{count} readings flagged U {means}; scores_stable are without them")
+        out.append(f"{count} readings flagged U {means}; scores_stable leaves them out")
     lost = sorted({f"{cells.rows[k].frequency:.6g} Hz, {cells.rows[k].input:.4g} m/s^2"
                    for k, log in zip(cells.row, logs) if abs(log) >= MOST})
     if lost:
-        out.append(f"no bounded motion is found at {'; '.join(lost)}: each counts as a factor of {np.exp(MOST):.0f}")
+        out.append(f"no bounded motion is found at {'; '.join(lost)}: each of these rows counts as a deviation by a "
+                   f"factor of {np.exp(MOST):.0f}")
     alone = int((found.rms <= np.nanmin(found.rms) * 1.01).sum())
     if alone == 1 and how.starts > 1:
         out.append(f"only one of {how.starts} starts ends within 1 % of the best training score: more --starts may "
-                   "find a better one")
+                   "find a better fit")
     return out

@@ -55,8 +55,8 @@ def cases_of(asked: Asked, request: Request) -> Cases:
     """
     parts, wrong = [], []
     if min(request.count, request.seed) < 0 or (request.sobol and not request.count):
-        raise SceneError([f"a draw of {request.count} cases with seed {request.seed}: whole numbers >= 0 are "
-                          "needed, and at least one case for Sobol's sequence"])
+        raise SceneError([f"{request.count} random cases with seed {request.seed}: whole numbers >= 0 are needed, and "
+                          "at least one case for Sobol's sequence"])
     if request.file is not None:
         rows, wrong = table.read(request.file)
         parts += [rows] if rows is not None else []
@@ -68,7 +68,7 @@ def cases_of(asked: Asked, request: Request) -> Cases:
         if not axes and not mistakes:
             wrong.append(f"{asked.path}: nothing to sweep over; add --over table.key=v1,v2,... or a table [sweep]")
     twice = {axis.key for part in parts for axis in part.axes} & {axis.key for axis in axes}
-    wrong += [f"--over {key}: is also in {request.file}" for key in sorted(twice)]
+    wrong += [f"--over {key}: this key is also in {request.file}" for key in sorted(twice)]
     if not wrong:
         wrong += _same(asked, [axis.key for axis in (*axes, *(one for part in parts for one in part.axes))])
     if wrong:
@@ -78,7 +78,7 @@ def cases_of(asked: Asked, request: Request) -> Cases:
     count = prod([*map(len, parts), *([request.count] if request.count else [len(axis.texts) for axis in axes])])
     if count > MOST:
         raise SceneError([f"{asked.path}: {count} cases are more than one sweep may have ({MOST}); sweep parts of the "
-                          "ranges, or draw from them with --sobol N"])
+                          "ranges, or take N cases from them with --sobol N"])
     if request.count and axes:
         parts.append(samples.drawn(axes, request.count, request.sobol, request.seed))
     elif axes:
@@ -95,7 +95,7 @@ def _same(asked: Asked, keys: Sequence[str]) -> list[str]:
     for key in keys:
         place = asked.place(key)
         if first.setdefault(place, key) != key:
-            wrong.append(f"--over {key}: is given twice, also as {first[place]}")
+            wrong.append(f"--over {key}: this key is given twice, also as {first[place]}")
     return wrong
 
 

@@ -86,12 +86,11 @@ def grid(modes: ModalBasis, drive, laws, over: tuple, start: Start | None, stick
     h = drive.period / steps_per_cycle
     most = MOST_NUMBERS / (2 * n + 2 * i + 3)
     if not 0.5 < duration / h <= most:
-        raise PatchfemError(f"a run of {duration:g} s in steps of {h:g} s takes {duration / h:.3g} of them; 1 to "
-                            f"{most:.3g} are possible: change drive.cycles or accuracy.steps_per_cycle")
+        raise PatchfemError(f"a run of {duration:g} s in steps of {h:g} s takes {duration / h:.3g} steps; 1 to "
+                            f"{most:.3g} steps are possible: change drive.cycles or accuracy.steps_per_cycle")
     idle = np.flatnonzero(~np.any(modes.interfaces, axis=1))
     if idle.size:
-        raise PatchfemError(f"interface {idle[0] + 1} slides in no mode: give slide for a mode, or leave the interface "
-                            "out")
+        raise PatchfemError(f"no mode moves interface {idle[0] + 1}: give slide for a mode, or leave the interface out")
     count = round(duration / h) + 1
     filled = *(np.zeros((count, size)) for size in (n, n, i, i)), np.zeros(count, np.int64)
     if start is not None:

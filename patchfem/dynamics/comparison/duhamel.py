@@ -69,8 +69,8 @@ def _admitting(convergence: str, tolerance: float, share: float) -> list:
         return []
     cure = f"divide accuracy.convergence_tolerance by {np.ceil(share / ADMITTED):.0f}" if convergence == "force" else \
         'set accuracy.convergence = "force"'
-    return [f"a {convergence} that changes by less than {tolerance:g} allows a friction error of {share:.3g} of its "
-            f"limit; {cure}"]
+    return [f"iterating until the {convergence} changes by less than {tolerance:g} leaves a friction error of "
+            f"{share:.3g} of the friction limit; {cure}"]
 
 
 def _warnings(modes, laws, found: Grid, failures, steps: int) -> list:

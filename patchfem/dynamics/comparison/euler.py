@@ -42,7 +42,7 @@ def _warnings(modes, laws, h, steps: int) -> list:
             damped = np.all(own[modes.omega > 0] > 0)
             times = int(np.ceil(np.nanmax(lost / own))) if damped else 0
             grows = ", so its free vibration grows; " + (f"set accuracy.steps_per_cycle = {steps * times}" if times else
-                                                      "no step of this method damps it")
+                                                      "no step of this method damps this vibration")
         out.append(f"explicit Euler lowers the damping ratio of mode '{modes.names[i]}' by {lost[i]:.3g}, from "
                    f"{own[i]:.3g} to {left[i]:.3g}{grows}")
     for one, face in zip(laws, modes.interfaces):

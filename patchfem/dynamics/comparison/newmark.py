@@ -40,10 +40,10 @@ def _warnings(modes, laws, found: Grid, by_force, stops) -> list:
             continue
         static = row[2] + added_static(modes, face, row[3], h)
         if not by_force and static > 1.01 * row[1]:
-            out.append(f"with the stick speed {row[3]:g} m/s and steps of {h:.3g} s the interface sticks up to "
-                       f"{static:.3g} N instead of {row[1]:.3g} N, and even longer with smaller steps; set "
+            out.append(f'with the stick speed {row[3]:g} m/s and steps of {h:.3g} s the interface sticks up to a force '
+                       f'of {static:.3g} N instead of {row[1]:.3g} N, and smaller steps make this worse; set '
                        f'accuracy.stick_speed = "{low_speed(modes, face, row[1], h):.2g} m/s"')
         drop = 0.5 * stops * modes.mass * row[3]**2 / np.sum(face**2)
-        out.append(f"below {row[3]:g} m/s the interface is stopped at once ({stops} times, up to {drop:.3g} J in all): "
-                   "its speed drops at once to zero, which does not happen with rigid friction")
+        out.append(f"below {row[3]:g} m/s the method stops the interface at once ({stops} times, taking out up to "
+                   f"{drop:.3g} J in all), which rigid friction does not do")
     return out

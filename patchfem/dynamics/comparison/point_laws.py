@@ -86,7 +86,7 @@ def rows(laws, interfaces: int, stick_speed: float | None = None) -> np.ndarray:
     PatchfemError where they do not fit the number of interfaces, are not finite or positive, or kinetic exceeds static.
     """
     if len(laws) != interfaces:
-        raise PatchfemError(f"{len(laws)} friction laws for {interfaces} interfaces: give each interface its own")
+        raise PatchfemError(f"{len(laws)} friction laws for {interfaces} interfaces: give one law for each interface")
     found, number = [law.row(stick_speed) for law in laws], number_of(SMOOTH)
     out = np.zeros((len(laws), max([HEAD + 1, *(len(row) for row in found)])))
     for k, (law, row) in enumerate(zip(laws, found)):

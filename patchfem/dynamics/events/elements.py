@@ -64,7 +64,7 @@ def coulomb(static: float, kinetic: float | None = None) -> Elements:
     """
     kinetic = static if kinetic is None else kinetic
     if not 0 <= kinetic <= static:
-        raise PatchfemError("friction.kinetic: it must lie between 0 and static")
+        raise PatchfemError("friction.kinetic: a value between 0 and static is needed")
     none = frozen_array([])
     return Elements(none, none, frozen_array([], np.int64), float(static), float(kinetic))
 

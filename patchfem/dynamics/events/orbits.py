@@ -90,7 +90,7 @@ class Orbits:
             if code == self.kernels.DONE:
                 return used, float(max(books.extremes[0, 1], -books.extremes[0, 0]))
             if code != self.kernels.FULL:
-                raise NotConverged("dynamics: events pile up within a period")
+                raise NotConverged("dynamics: events of stick and slip follow each other without end within a period")
             self.rows, self.held = np.zeros((2 * len(self.rows), self.wide)), {}
 
     def _held(self, name: str, plant, moving: float = 0.0) -> tuple:

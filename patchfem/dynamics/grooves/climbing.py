@@ -26,15 +26,16 @@ def refuse_heavy(grooves: Grooves, static: float, modes) -> None:
     own = modes.mass / float(modes.slide @ modes.slide)
     taken = -grooves.lifted_mass * grooves.least_mass(static)
     if taken >= own:
-        raise PatchfemError(f"{grooves.lifted_mass:.6g} kg press so hard on the downward flank that friction exceeds "
-                            f"the inertia of the sliding {own:.6g} kg, so that the motion is not determined; less than "
-                            f"{own / -grooves.least_mass(static):.6g} kg is needed", f"{grooves.key}.lifted_mass")
+        raise PatchfemError(f"a lifted mass of {grooves.lifted_mass:.6g} kg presses so hard on the downward flank that "
+                            f"friction exceeds the inertia of the sliding mass of {own:.6g} kg; the motion is then not "
+                            f"determined; less than {own / -grooves.least_mass(static):.6g} "
+                            "kg is needed", f"{grooves.key}.lifted_mass")
 
 
 def lifts(grooves: Grooves, time: float) -> str:
     """The sentence on a lifted mass that leaves its grooves at a time [s]."""
-    return (f"the lifted mass of {grooves.lifted_mass:.3g} kg leaves the grooves at {time:.6g} s: its inertia takes "
-            f"all of the load; lower {grooves.key}.lifted_mass or the drive, or raise the load")
+    return (f"the lifted mass of {grooves.lifted_mass:.3g} kg leaves the grooves at {time:.6g} s: the inertia of this "
+            f"mass takes all of the load; lower {grooves.key}.lifted_mass or the drive, or raise the load")
 
 
 def model_of(grooves: Grooves, load: float, static: float, law, modes) -> "FlankModel":

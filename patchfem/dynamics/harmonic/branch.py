@@ -92,8 +92,8 @@ def _curve(modes, drives, group, parameter, how: How) -> Branch:
         if harmonics or above <= tolerance / 4:
             return Branch(points, parameter, tuple(f / scale for f in path.folds),
                           tuple(f / scale for f in path.crossings), path.ended)
-    raise NotConverged(f"accuracy.tolerance: {LADDER[-1]} harmonics leave {above:.1e} of the motion on the branch, "
-                       f"more than the limit of {tolerance / 4:g}; raise the tolerance")
+    raise NotConverged(f"a balance of {LADDER[-1]} harmonics misses {above:.1e} of the motion on the curve, more than "
+                       f"the limit of {tolerance / 4:g}; raise the tolerance")
 
 
 def _followed(modes, drives, group, parameter, h, first, longest) -> tuple:
@@ -146,7 +146,7 @@ def between(modes, drive, one: Periodic, other: Periodic, share: float, width: f
                     + share * size * step[:-1], one.omega + share * width * step[-1], step[:-1] / length,
                     step[-1] / length, size, width, GOAL)
     if found is None:
-        raise NotConverged("accuracy.method: the branch has no point between two of its own")
+        raise NotConverged("accuracy.method: no steady motion was found between two neighbouring points of the curve")
     return plain(balance, found[0], replace(drive, omega=float(found[1])), h)[0]
 
 

@@ -33,7 +33,7 @@ class Group:
             rows[key] = vector
             laws.setdefault(key, []).append(law)
         if not rows:
-            raise PatchfemError("the balance needs at least one law at an interface")
+            raise PatchfemError("harmonic balance needs a friction law on at least one interface")
         self.rows, self.laws = frozen_array(np.array(list(rows.values()))), [tuple(v) for v in laws.values()]
         self.samples = samples
 

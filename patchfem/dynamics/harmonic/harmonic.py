@@ -297,6 +297,6 @@ def newton(balance: Balance, x, omega: float, level: float, harmonics: int, most
     found = damped(lambda v: balance.system(v, omega, level, harmonics), x, met, most=most)
     if found is None:
         at = f"{harmonics} harmonics at {omega / (2 * np.pi):.6g} Hz"
-        raise NotConverged(f"accuracy.harmonics: the balance with {at} did not converge in {most} steps; give a start, "
-                           "or follow the branch from a lower level")
+        raise NotConverged(f"accuracy.harmonics: harmonic balance with {at} did not converge in {most} steps; give a "
+                           "start, or follow the curve from a lower level")
     return found

@@ -321,7 +321,7 @@ def law_of_model(model):
     if form == "flow" or (form == "points" and one.numbers[2] < 0 and not one.numbers[7]):
         return Flow(one)
     if model.set_valued:
-        raise PatchfemError("accuracy.method: \"harmonic\" cannot balance set-valued friction; use the event map, or "
-                            "law = \"elastic-plastic\" with a short bond_length")
+        raise PatchfemError("accuracy.method: \"harmonic\" cannot treat rigid friction, whose force jumps; use the "
+                            "event map, or law = \"elastic-plastic\" with a short bond_length")
     raise PatchfemError('accuracy.method: "harmonic" works only with reading = "stretch", order = 1, a constant bond '
                         'length, friction.breakaway = 0 and a rigid slide; use method = "march"')

@@ -227,10 +227,11 @@ def _along_levels(balance, omega, level, h: int) -> np.ndarray:
                   (0.0, level), True, 0.05, 0.5, 1000, 1e-6)
     if path.ended != "end":
         bare = any(k for k, *_ in balance.linear(omega, h).free)
-        why = ("; an undamped mode driven at its natural frequency stays bounded only if friction can hold it: give it "
-               "damping") if bare else ", neither from the sticking contact nor by raising the drive from zero"
+        why = ("; an undamped mode driven at its natural frequency stays bounded only if friction can hold it: give "
+               "the mode damping") if bare else ", neither from the sticking contact nor by raising the drive from zero"
         raise (_Unbounded if bare else NotConverged)(
-            f"accuracy.harmonics: no balance with {h} harmonics was found at {omega / (2 * np.pi):.6g} Hz{why}")
+            f"accuracy.harmonics: harmonic balance with {h} harmonics found no steady motion at "
+            f"{omega / (2 * np.pi):.6g} Hz{why}")
     return path.x[-1]
 
 

@@ -124,7 +124,7 @@ def _balanced(modes, group, held: tuple, share: float, near, samples: int) -> np
         found = root(left, start, jac=slopes, tol=1e-13)
         if np.abs(found.fun).max() < 1e-9:
             return found.x
-    raise NotConverged(f"backbone: no equilibrium was found at a share of {say(share, 3)}")
+    raise NotConverged(f"backbone: no equilibrium was found at the amplitude {say(share, 3)} of the static curve")
 
 
 def _slope(laws, u: float, samples: int) -> float:

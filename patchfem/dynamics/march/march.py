@@ -453,8 +453,8 @@ class Run:
                 for array, old in zip((*self.contact, *self._moving()), begin):
                     array[...] = old
                 did, status = self._steps(did - 1, rows)[0], 1
-                self.message = (f"from {say(self._out(rows[did]), 3)} on the motion diverges, because nothing holds it "
-                                "beyond the barrier of the softening spring; the run ended there")
+                self.message = (f"from {say(self._out(rows[did]), 3)} on the motion diverges, because nothing holds "
+                                "the block beyond the barrier of the softening spring; the run ended there")
             self.done += did
             parts.append(rows[:did + 1])
             self._judge(status)

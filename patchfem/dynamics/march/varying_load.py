@@ -237,8 +237,8 @@ def model_of(modes: ModalBasis, law: Rubbing, sets: ContactSets | None, load=Non
     if shear is not None and shear.points.size != sets.x.size:
         raise PatchfemError("contact.shear: under a load that changes the shear modes must span every node")
     if load is not None and any(part is not None and np.any(part) for part in (modes.normal, modes.pitch)):
-        raise PatchfemError("structure.mode.normal: one rigid point cannot heave or pitch; use [contact] in place of "
-                            "[normal]")
+        raise PatchfemError("structure.mode.normal: a single contact point cannot heave or pitch; use [contact] in "
+                            "place of [normal]")
     return VaryingLoadModel(law, sets, rows_of(modes), load, shear)
 
 

@@ -276,7 +276,7 @@ class Motion:
             self.outcome = Outcome.LEAVES_GROOVES
         elif status in (WILD, ENDLESS):
             self.outcome = Outcome.NOT_CONVERGED
-            self.message = (f"no step meets the tolerance at {self.time:.6g} s; use accuracy.method = \"march\"")
+            self.message = (f"no time step meets the tolerance at {self.time:.6g} s; use accuracy.method = \"march\"")
 
     def book(self) -> dict:
         """The energy ledger [J] as the motion stands, and the steps taken."""

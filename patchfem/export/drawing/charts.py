@@ -104,7 +104,7 @@ def interface(x, fields: dict) -> list:
         frame = int(np.argmax(np.abs(tau @ np.gradient(x))))
         shown = np.unique(np.linspace(1, len(tau) - 1, min(FRAMES, len(tau) - 1)).round().astype(int))
         frames = [line(x * size, tau[k] * scale, "soft", most=FAINT, width=0.6, alpha=0.6) for k in shown]
-        title = f"Shear stress at {len(shown)} times, the largest in colour"
+        title = f"Shear stress at {len(shown)} instants; the one with the largest stress is in colour"
         out.append(chart(title, place, axis("shear stress", unit),
                          [*frames, line(x * size, tau[frame] * scale, "warm")]))
     return out

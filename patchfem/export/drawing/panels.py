@@ -39,7 +39,8 @@ class Panel:
         text += f", top colour {self.top * scale:.3g} {unit} and more" if self.over and scaled else ""
         if self.aside != 1:
             return text + f"\nthe slide of {self.slide * 1e3:.3g} um {self.aside:g} times as large"
-        return text + (f"\nthe slide of {self.slide * 1e3:.3g} um as it is" if self.slide and self.factor > 1 else "")
+        return text + (f"\nthe slide of {self.slide * 1e3:.3g} "
+                       "um, drawn to scale" if self.slide and self.factor > 1 else "")
 
 
 def panels(frame: Frame, magnify: float | tuple | None = None, close: tuple | None = None, aside: float = 1.0) -> tuple:

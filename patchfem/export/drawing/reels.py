@@ -78,4 +78,4 @@ def _mp4(path: Path, images: Iterator, seconds: float) -> None:
     said = run.communicate()[1].decode(errors="replace").strip().splitlines()[-1:]
     if run.returncode:
         said = said or [f"code {run.returncode}"]
-        raise Missing(f"{path}: ffmpeg could not write it ({said[0]}); use a .gif or .html")
+        raise Missing(f"{path}: ffmpeg could not write this file ({said[0]}); use .gif or .html")

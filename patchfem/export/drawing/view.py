@@ -84,13 +84,13 @@ def no_opengl() -> str | None:
     try:
         done = subprocess.run([sys.executable, "-P", "-c", PROBE], capture_output=True, text=True, timeout=SECONDS)
     except subprocess.TimeoutExpired:
-        return f"a trial picture took more than {SECONDS:g} s"
+        return f"the test drawing of a small picture took more than {SECONDS:g} s"
     if done.returncode == 0:
         return None
     if done.returncode < 0:
-        return f"a trial picture was ended by signal {-done.returncode}"
+        return f"the test drawing of a small picture was killed by signal {-done.returncode}"
     last = [line for line in done.stderr.splitlines() if line.strip()][-1:]
-    return last[0].strip() if last else f"a trial picture ended with exit code {done.returncode}"
+    return last[0].strip() if last else f"the test drawing of a small picture ended with exit code {done.returncode}"
 
 
 def plotter(one: Frame, head: str, magnify: float | None, off_screen: bool = False):

@@ -102,7 +102,7 @@ class Series:
         sizes = np.diff(ends.astype(np.int64))
         wanted(len(sizes) == len(types) and ends[0] == 0 and ends[-1] == len(nodes) and sizes.min() >= 2
                and sizes.max() <= MOST and nodes.min() >= 0 and nodes.max() < len(points),
-               f"{name}: its cells refer to points that it lacks")
+               f"{name}: its cells refer to points that are not in the file")
         for kind, size in ("PointData", len(points)), ("CellData", len(types)):
             lacks = sorted(set(LEAST[name][kind]) - set(group[kind]))
             wanted(not lacks, f"{name}/{kind} lacks {', '.join(lacks)}")
@@ -129,7 +129,7 @@ class Series:
         """
         count = len(self)
         if not -count <= number < count:
-            raise PatchfemError(f"--frame: {number} is not there, {self.path} has frames 0 to {count - 1}")
+            raise PatchfemError(f"--frame: there is no frame {number}; {self.path} has frames 0 to {count - 1}")
         number %= count
         with readable(self.path, f"frame {number}"):
             blocks = {name: self._block(self.root[name], number) for name in self.parts}

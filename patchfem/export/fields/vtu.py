@@ -49,7 +49,7 @@ def export(folder: Path, out: Path, frame: int | None = None) -> str:
 def _export(series: Series, out: Path, number: int) -> str:
     if out.suffix == ".vtkhdf":
         if out.exists() and out.samefile(series.path):
-            raise PatchfemError(f"{out}: is the file to export; choose another -o")
+            raise PatchfemError(f"{out}: this is the file to export; choose another name with -o")
         with whole(out, series.path.stat().st_size) as partial:
             shutil.copyfile(series.path, partial)
         return f"{out}: {len(series)} frames"

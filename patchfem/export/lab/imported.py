@@ -37,12 +37,12 @@ def imported(file: Path, out: Path, asked: Iterable[str], zero: bool, how: Estim
     if ending not in (".csv", ".toml", ".uff", ".unv"):
         raise PatchfemError(f"{out}: records are written as .csv, modes as .toml, a frequency response as .uff")
     if ending == ".csv" and how != Estimate(decay=how.decay, begin=how.begin if how.decay else ""):
-        raise PatchfemError("--segment, --window, --band and, without --decay, --begin can only be used for modes (-o "
+        raise PatchfemError("--segment, --window, --band and, without --decay, --begin can be used only for modes (-o "
                             "modes.toml) and responses (-o response.uff)")
     if zero and how.decay:
-        raise PatchfemError("--zero can only be used for a table of records, not with --decay")
+        raise PatchfemError("--zero can be used only when importing a table of records, not with --decay")
     if zero and ending != ".csv":
-        raise PatchfemError("--zero can only be used for a table of records (-o table.csv)")
+        raise PatchfemError("--zero can be used only when importing a table of records (-o table.csv)")
     if ending == ".csv":
         return _decay(file, out, asked, how.begin) if how.decay else _table(file, out, asked, zero)
     return (_modes if ending == ".toml" else _response)(file, out, asked, how)
@@ -90,7 +90,7 @@ def _modes(file: Path, out: Path, asked, how: Estimate) -> dict:
 
 def _response(file: Path, out: Path, asked, how: Estimate) -> dict:
     if how.decay or how.begin or how.band:
-        raise PatchfemError("--decay, --begin and --band can only be used for modes (-o modes.toml)")
+        raise PatchfemError("--decay, --begin and --band can be used only for modes (-o modes.toml)")
     values, notes = _records(file, asked)
     found, step, drive, response = measured.estimated(values, _segment(how.segment), _window(how.window))
     write.write_response(out, found, drive, response)

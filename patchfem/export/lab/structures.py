@@ -69,7 +69,8 @@ def _left_out(model: Model) -> str:
     out = ["[wear]"] * (model.wear is not None) + ["structure.travel"] * (rig.travel < BEYOND)
     out += ["the initial motion"] * (rig.start is not None)
     unit = "" if isinstance(rig.drive, BaseSine) or rig.kind == "free" else \
-        f"; Fex1 is that of {'1 N' if rig.kind == 'force' else '1 m/s^2'}, not of waveform = '{rig.waveform}'"
+        (f"; Fex1 is the excitation for {'1 N' if rig.kind == 'force' else '1 m/s^2'}, not for waveform = "
+         f"'{rig.waveform}'")
     return unit + ("; not written: " + ", ".join(out) if out else "")
 
 

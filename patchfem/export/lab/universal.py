@@ -29,7 +29,7 @@ def write(path: Path, found: Histories) -> int:
     for one in found.columns:
         if not np.isfinite(one.values).all():  # pyuff would write them as 0
             raise PatchfemError(f"{path}: {one.label} has values that are not finite, which a universal file cannot "
-                                "hold; export .mat or .csv")
+                                "contain; export .mat or .csv instead")
     sets = [] if found.time is None else [
         _function(one.label, Column("time", "s", found.time, 0), one, HISTORY, found.title) for one in found.columns]
     sets += [_function(f"{force.label} over {slide.label}", slide, force, LOOP, found.title)

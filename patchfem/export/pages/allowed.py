@@ -173,7 +173,7 @@ def _moving(limits: Limits) -> str:
     held = f"before {f'{others} or ' if others else ''}{final} changes by {within}"
     if least.beyond is None:
         far = _at(limits, least) + _brackets(_gap(limits, least))
-        return f"{name} may reach at least {far} {held}; the limit lies beyond, where no case decides it"
+        return f"{name} may reach at least {far} {held}; the limit lies beyond the cases that were computed"
     between = f"between cases at {_between(limits, least)}"
     later = "" if last is least or last.beyond is None else f"; {label(last.name)} {_where(limits, last)}"
     return (f"{name} may reach {_at(limits, least)}{_brackets(_gap(limits, least), between)} {held} "
@@ -246,17 +246,17 @@ def table(limits: Limits, measures: dict) -> str:
             far = f"between {bare(at(one.inside), at(one.beyond))} and {at(one.beyond)}" + (
                 f", at about {_at(limits, one)}" if isfinite(one.about) else "")
         else:
-            far = "in no case" if one.whole else f"not up to {at(one.inside)}; no case beyond decides it"
+            far = "in no case" if one.whole else f"not up to {at(one.inside)}; no case beyond shows the limit"
         by = f"{100 * WITHIN:g} %" if abs(one.change) < 1 else "double"
         first = short(one.first, measures[one.name][2], 4, zero_below(one.name))
         rows.append([linked(label(one.name), one.name), escape(first), _change(one.changed), by, escape(far)])
     several = int(np.sum(np.asarray(key["values"], float) == np.min(np.asarray(key["values"], float)))) > 1
-    least = " The values of the other keys are those that allow the least." if several else ""
+    least = " The other keys have the values that allow the smallest change." if several else ""
     return (f"<p class=soft>{escape(key['name'])} grows from {escape(at(limits.found[0].start))}. A measure counts as "
             "changed if it differs from its value in the first case by this much and by more than both numerical "
-            "errors. Cases that miss their tolerance do not count, nor do unsettled cases if settled ones have the "
+            "errors. Cases that miss their tolerance do not count, nor do unsettled cases if settled cases have the "
             f"measure.{least}</p>"
-            + document.table(("measure", ">first case", ">change up to the last "
+            + document.table(("measure", ">first case", ">change between the first and the last "
                                                         "case", "changed by", "where"), rows, "wide"))
 
 

@@ -14,7 +14,7 @@ from . import library
 DIGITS = 9  # of the numbers in a page: a picture shows four, a hovered value seven
 NUMBER = f"%.{DIGITS}g,"
 OLD = ("The pictures of this page are packed, and this browser cannot unpack them: it has no DecompressionStream, "
-       "which browsers have had since 2023. Texts and tables are whole.")
+       "which browsers have had since 2023. Texts and tables are complete.")
 NOT_FINITE = re.compile("nan|-?inf")
 # colours of `drawing.pictures`, and those of the page that stand for them in either theme
 INKS = {"#ffffff": "paper", "#000000": "ink", "#4d4d4d": "ink", "#e3e3e3": "line", "#1f5f99": "accent",

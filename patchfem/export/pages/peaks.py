@@ -147,8 +147,8 @@ def edge(keys: list, measures: dict, trusted: dict, grid: bool) -> str:
         return ""
     place = ", ".join(f"{one['name']} {one['texts'][top] if one['words'] else shown_of(one)(top)}" for one in keys
                       if varies(one))
-    return (f"The largest {label(name)}, {short(height[top], measures[name][2], 4)}, lies at {place}, on the edge of "
-            "the swept frequencies; it may be larger beyond.")
+    return (f"The largest {label(name)}, {short(height[top], measures[name][2], 4)}, lies at {place}, at the edge of "
+            "the swept frequencies; it may be larger outside this range.")
 
 
 def _lost(peaks: list, others: bool) -> str:
@@ -158,8 +158,8 @@ def _lost(peaks: list, others: bool) -> str:
     more = f" and {len(peaks) - 1} other{'s' * (len(peaks) > 2)}" if len(peaks) > 1 else ""
     held = f" with {peaks[0].held}{more}" if peaks[0].held else ""
     what = "it" if others else label(peaks[0].name)
-    return (f"Where {what} peaks{held} is not known: cases beside the largest have not settled or miss the tolerance; "
-            "raise drive.cycles to let them settle.")
+    return (f"Where {what} peaks{held} is not known: cases next to the largest value have not settled or miss the "
+            "tolerance; raise drive.cycles so that they settle.")
 
 
 def _known(peaks: list) -> str:
@@ -193,9 +193,10 @@ def table(peaks: list) -> str:
             for one in peaks]
     rows = [[escape(one.held), *cells, told(*one.width, unit="Hz") if np.isfinite(one.width[0]) else "&ndash;"]
             for one, cells in zip(peaks, cells_of)]
-    return (f"<p class=soft>The largest {linked(label(peaks[0].name), peaks[0].name)} of each curve, by a parabola of "
-            "1/y&sup2; over f&sup2; through the largest case and its neighbours. The errors combine those of the cases "
-            "and the differences to polynomials through more of them. For an unsettled case the steady estimate is "
-            "used if the error of that is at most 1 %; otherwise it is left out. A half-power width is given if the "
-            "curve falls to its peak/&radic;2 on both sides within the swept range.</p>"
+    return (f"<p class=soft>The largest {linked(label(peaks[0].name), peaks[0].name)} of each curve is found from a "
+            "parabola of 1/y&sup2; over f&sup2; through the largest case and its neighbours. The errors combine the "
+            "errors of the cases and the differences from polynomials through more cases. For an unsettled case the "
+            "estimate of the steady value is used if the error of this estimate is at most 1 %; otherwise the case is "
+            "left out. A half-power width is given if the curve falls to its peak/&radic;2 on both sides within the "
+            "swept range.</p>"
             + document.table(("", ">at", ">height", ">half-power width"), rows, "wide"))

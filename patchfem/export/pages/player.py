@@ -141,7 +141,8 @@ def section(film: dict) -> Section:
         still = (f"{frames} frames from {film['times'][0] * scale:.6g} to {film['times'][-1] * scale:.6g} {label}, "
                  f"{cells} cells")
     less = [f"{film['of']} frames"] * (film["of"] > frames) + [f"{fine} cells"] * (fine > cells)
-    sample = f"; a sample of {' and '.join(less)}, each cell with the mean of those it stands for" if less else ""
+    sample = (f"; only a sample of {' and '.join(less)} is drawn, each cell with the mean of the cells that it "
+              "replaces") if less else ""
     text = f"{still}{sample}. Motion and gap are magnified by one factor"
     text += (", the slide of the upper piece as a whole by another; colours and scales are the same in every frame. "
              "Press space to play and the arrow keys to step.") if frames > 1 else "."

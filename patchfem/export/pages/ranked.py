@@ -54,7 +54,7 @@ def sentence(ranks: dict, left: int = 0, moves: bool = True) -> str:
     said += [f"then on {one.key} ({percent(one)})" for one in others[:NAMED - 1]]
     if len(others) >= NAMED:
         said.append(f"least on {others[-1].key} ({percent(others[-1])})")
-    why = "have not settled are included as they ended" if moves else "miss the tolerance are included"
+    why = "have not settled are included with their last values" if moves else "miss the tolerance are included"
     ended = f"; {left} cases that {why}" if left else ""
     return f"{label(name).capitalize()} {', '.join(said)}{ended}."
 
@@ -91,13 +91,13 @@ def scatter(found: dict, of: int, settled: bool = True) -> str:
     said, most = [], max((found[name][2] for name in SPREAD if name in found), default=0)
     if most and most < SETTLED * of:
         missed = "have not settled within the tolerance" if settled else "have no value"
-        return (f"{of - most} of {of} random cases {missed}, perhaps those that move most: "
-                "how far the answers scatter is not known.")
+        return (f"{of - most} of {of} random cases {missed}, perhaps the cases that move most, so the scatter of the "
+                "results is not known.")
     for name in [name for name in SPREAD if name in found]:
         unit, (low, _, high), count, misses = found[name]
         low, high = (short(one, unit, 3, zero_below(name)) for one in (low, high))
         some = [f"in the {count} that have one"] * (count < most) + \
-            [f"{misses} of {count} miss the tolerance and count with their values"] * (misses > 0)
+            [f"{misses} of {count} miss the tolerance and are included with their values"] * (misses > 0)
         said.append(f"{'an' if name[0] in 'aeio' else 'a'} {label(name)} from {low} to {high}"
                     + (f" ({'; '.join(some)})" if some else ""))
     count = "settled" if settled else "have a value"
@@ -115,8 +115,9 @@ def picture(ranks: dict) -> str:
                  f"<td class=bars>{_bar(one)}</td>"] for one in shares]
         parts.append(f"<h3>{linked(label(name), name)}</h3>"
                      + document.table(("key", ">alone", ">total", ">from, to", ""), rows, "wide", "shares"))
-    return ("<p class=soft>Shares of the variance over the cases: a key alone (dark) and with its interactions "
-            "(light). The line is the interval of the total.</p>" + "".join(parts))
+    return ("<p class=soft>The bars show the share of each key in the variance over the cases: the key alone (dark) "
+            "and with its interactions (light). "
+            "The line is the interval of the share with interactions.</p>" + "".join(parts))
 
 
 def _bar(one) -> str:
@@ -140,5 +141,5 @@ def spread(found: dict) -> str:
     if not rows:
         return ""
     return (document.table(("measure", ">5 %", ">half", ">95 %", "unit", ">cases", ">miss the tolerance"), rows, "wide")
-            + "<p class=soft>Share of the random cases with a smaller value; if any case has settled, only settled "
-            "cases count. Cases that miss the tolerance count with their values.</p>")
+            + "<p class=soft>The curve gives the share of the random cases with a smaller value. If any case has "
+              "settled, only settled cases count. Cases that miss the tolerance are included with their values.</p>")

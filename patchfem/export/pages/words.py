@@ -25,7 +25,7 @@ GROUPS = ("motion", "friction", "energy", "patch", "wear")
 FEW = 3  # interfaces that are all told of first
 NO_SLIP = 1e-15  # m, the last digits of a slide
 WHOLE_RUN = "over the whole run"
-LOOPS = "over the two cycles of the steady motion that are kept"
+LOOPS = "over the two stored cycles of the steady motion"
 OVER = {"harmonic": LOOPS}  # what energies are told over, by engine
 MARCHED = "over the cycles of the motion, not those of wear"
 OF_WHAT = {  # said behind a value that would otherwise be taken for another, or for more than it says
@@ -122,7 +122,7 @@ def _holds(patch: bool, cycles: str) -> str:
     """The sentence where no slip is found. On a patch an edge where the pressure ends slips under any force: on a mesh
     that does not show it, nothing is said of what lies within an element."""
     return f"The interface sticks: no slip in the last {cycles}" + \
-        (" beyond the error of this mesh; a slip zone smaller than an element is not seen." if patch else ".")
+        (" beyond the error of this mesh; a slip zone smaller than an element cannot be seen." if patch else ".")
 
 
 def _slid(slip: dict | None, done: str, patch: bool) -> str:
@@ -210,7 +210,7 @@ def least_known(result: Result) -> str:
     if not name:
         return f"{of_steps}."
     but = f"; {of_steps}, which the scene sets" if steps else ""
-    least = f"; closest to it is {known(name)}" if "±" in told[name] else ""
+    least = f"; closest to the tolerance is {known(name)}" if "±" in told[name] else ""
     sharp = "" if all("±" in one for one in told.values()) else f"; {SHARP}"
     return f"Every measure with an error meets the tolerance {tolerance:g}{least}{but}{sharp}."
 

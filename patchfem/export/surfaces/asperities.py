@@ -40,8 +40,8 @@ def lines_of(told: Told | None, cutoff: float | None) -> list:
     soft, stiff = (1 / (share * fine.height) for share in reversed(PERSSON))
     decay = sum(PERSSON) / 2 * fine.height
     half = one["stiffness_half_sampled"]
-    sampled = "every second sample alone describes no such surface" if half is None else \
-        f"every second sample of the trace gives {_per(half)}, {100 * (half / one['stiffness'] - 1):+.2g} %"
+    sampled = "every second sample alone gives no such surface" if half is None else \
+        f"with every second sample of the trace the ratio is {_per(half)}, {100 * (half / one['stiffness'] - 1):+.2g} %"
     return ["  paste this into a scene if the other face is smooth (Greenwood-Williamson peaks, radius "
             f"{short(one['radius'], 'm', 3)}, {one['density']:.3g} 1/m^2):",
             "    [contact.asperities]", '    law = "hertz"', f'    rms_height = "{fine.height * 1e6:.5g} um"',
@@ -57,10 +57,10 @@ def lines_of(told: Told | None, cutoff: float | None) -> list:
 def _split(cutoff: float | None) -> str:
     """Which waves of a trace its peaks are, and which are left to the profile."""
     if cutoff is None:
-        return ("It contains all waves of the trace. If [contact.profile] takes the same trace, split the trace with "
-                "--cutoff; otherwise the long waves count twice.")
-    return (f"It contains only waves below the cut-off of {say(cutoff)}. If [contact.profile] takes the same trace, "
-            "the longer waves shape the gap, so that no wave counts twice.")
+        return ("This table describes all waves of the trace. If [contact.profile] takes the same trace, split the "
+                "trace with --cutoff; otherwise the long waves count twice.")
+    return (f"This table describes only waves below the cut-off of {say(cutoff)}. If [contact.profile] takes the same "
+            "trace, the longer waves shape the gap, so that no wave counts twice.")
 
 
 def _steep(one) -> float:

@@ -40,9 +40,10 @@ WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_ma
          "shift_x": "shift along x", "shift_y": "shift along y", "rotation": "rotation",
          "worn_depth_mean_from_abbott": "worn depth, mean, from Abbott curves"}
 DRAWN = 1_000_000  # heights that a histogram and an Abbott curve are drawn from, spread over a larger scan
-NOTE = ("Interval: 95 %. The intervals of shift, depth and area hold for this place and come from the noise of the "
-        "unworn heights. Those of ratios hold for the whole surface and assume Gaussian heights with the same "
-        "statistics everywhere; if both traces are of one place they vary together, and the intervals are narrower.")
+NOTE = ("All intervals are 95 % intervals. Those of shift, depth and area hold for the measured place and come from "
+        "the noise of the unworn heights. Those of ratios hold for the whole surface and assume Gaussian heights with "
+        "the same statistics everywhere. If both traces are of the same place, their heights vary together, and the "
+        "intervals are narrower.")
 
 
 def shown(one: Quantity) -> tuple:
@@ -178,7 +179,8 @@ def write_difference(folder: Path, one: Comparison) -> None:
     if one.change is None or one.change.found is None:
         return
     place = one.change.before.x, one.change.before.y, one.change.found.depth
-    write_x3p(folder / "difference.x3p", *place, "worn depth: height before minus height after, once registered")
+    write_x3p(folder / "difference.x3p", *place, "worn depth: height before minus height after, once the surfaces are "
+                                                 "aligned")
     write_columns(folder / "difference.csv", *place)
 
 
@@ -200,8 +202,9 @@ def page(parts: list, found: tuple, directions: list = (), pressing: Pressed | N
     if directions:
         said = "; ".join(f"{when} {' '.join(shown(one)[:2])}" for when, one, _ in directions)
         sections.append(Section("directions", "x over y", figure(
-            "xy", pictures.crossed(parts, directions), "Left: spectra of both directions. Right: amplitude of the band "
-            "and slope along x over those along y, with their 95 % intervals; 1 is a surface that is alike both ways.",
+            "xy", pictures.crossed(parts, directions),
+            "Left: spectra of both directions. Right: amplitude of the band and slope along x over those along y, with "
+            "their 95 % intervals; the value 1 means that the surface is alike in both directions.",
             f"Waves along x over those along y: amplitude {said}")))
     for number, one in enumerate(parts):
         body = [*(figure(f"{number}{place}", *each) for place, each in enumerate(figures(one))), _table(one),
@@ -227,22 +230,25 @@ def figures(one: Comparison) -> list:
         tilt = np.polyval(np.polyfit(found.x, found.first, 1), found.x)
         worn = np.where(found.rest > 3 * found.noise, found.rest, 0.0)
         out.append((pictures.overlay(found.x, found.first - tilt, second - tilt, worn, _closer(found.x, worn)),
-                    "The trace after the wear, moved by shift, tilt and offset, is shown on the trace before.",
+                    "The trace measured after wear, moved by shift, tilt and offset, is drawn over the trace measured "
+                    "before.",
                     f"Both traces, registered: mean worn depth {' '.join(shown(one.worn.mean)[::2])}"))
         out.append((pictures.difference(found.x, found.rest, found.used, found.noise, None),
-                    "Depth of the trace after below the trace before. Blue: the unworn heights to which shift, tilt "
-                    "and offset were fitted.",
+                    "The curve is the depth of the second trace (after wear) below the first trace (before wear). "
+                    "Blue: the unworn heights to which shift, tilt and offset were fitted.",
                     f"Worn depth along the trace: largest {' '.join(shown(one.worn.largest)[::2])}"))
     elif one.change is not None and one.change.found is not None:
         out += _maps(one.change)
     elif isinstance(one.before, Profile):
-        out.append((pictures.apart(one.before, one.after), "Both traces, each about its least-squares line. They show "
-                    "no common place.", "Traces before and after, one above the other"))
+        out.append((pictures.apart(one.before, one.after), "Each trace is drawn about its own least-squares line. No "
+                                                           "common place was found in the two "
+                                                           "traces.", "Traces before and after, one above the other"))
     if flanks is not None:
         out.append((pictures.difference(flanks.x, flanks.depth, None, None, (flanks.start, flanks.end)),
-                    "Depth of the trace after below the line through its flanks.",
+                    "The curve is the depth of the second trace (after wear) below the line through its unworn flanks.",
                     f"Depth of the wear track: largest {' '.join(shown(one.worn.largest)[::2])}"))
-    about = "each one's own least-squares line or plane" if found is None else "the line of the trace before"
+    about = "the least-squares line or plane of each surface" if found is None else ("the line of the first trace "
+                                                                                     "(before wear)")
     curves = [_abbott(each) for each in (one.before, one.after)] if found is None else \
         [_bearing(z - tilt) for z in (found.first, second)]
     spectra = [each.spectrum for each in one.sizes]
@@ -257,24 +263,24 @@ def _maps(one: Change) -> list:
     """Pictures of two scans that lie on each other."""
     x, y, (first, second, depth) = one.before.x, one.before.y, line.laid(one)
     worn = one.volumes.values["worn_volume"]
-    out = [(pictures.maps(x, y, (first, second, depth)), "Left and middle: the scan before and, registered to it, the "
-                                                         "scan after, both about the plane of the scan before; white: "
-                                                         "no height. Right: depth of the scan after below the scan "
-                                                         "before, missing ones from their neighbours; white: beyond "
-                                                         "the scan after.",
+    out = [(pictures.maps(x, y, (first, second, depth)),
+            "Left and middle: the first scan (before wear) and the second scan (after wear), aligned with the first, "
+            "both about the reference plane of the first scan; white: no height. Right: depth of the second scan below "
+            "the first; missing depths are taken from their neighbours; white: outside the second scan.",
             f"Maps of both scans and of the worn depth: worn volume {' '.join(shown(worn)[::2])}")]
     known = np.isfinite(depth)
     there = np.flatnonzero(known & np.isfinite(first))
     there = there[::-(-there.size // DRAWN)]
     heights = [each.ravel()[there] for each in (first, second)]
-    out.append((pictures.both_heights(heights, [_bearing(z) for z in heights]), "Left: share of the heights in each "
-                "class. Right: Abbott curves. Both over the common region, about the plane of the scan before.",
+    out.append((pictures.both_heights(heights, [_bearing(z) for z in heights]),
+                "Left: share of the heights in each class. Right: Abbott curves. Both over the common region, about "
+                "the reference plane of the first scan (before wear).",
                 "Histograms and Abbott curves of the heights before and after"))
     if one.track is not None and not one.track.why:
         found = one.track.values
         out.append((pictures.mean_section(one.track, found["from"].value, found["to"].value),
-                    f"Mean of {one.track.sections} sections across the track; the band: one standard deviation of the "
-                    "sections to either side; between the lines: the track.",
+                    f"Mean of {one.track.sections} sections across the track. The band extends one standard deviation "
+                    "of the sections above and below the mean. The track lies between the lines.",
                     f"Mean section of the track: width {' '.join(shown(found['width'])[::2])}"))
     return out
 

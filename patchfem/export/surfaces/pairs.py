@@ -13,9 +13,10 @@ from ..pages.document import Section, document, figure, table, warned
 from . import compare, pictures, worn
 
 TRACES, SCANS = ("worn_depth_mean", "amplitude_ratio"), ("worn_volume", "worn_depth_mean")  # the main numbers
-ABOUT = ("Mean over the pairs that have a value, each with equal weight. Interval: 95 % of the mean, by Student's t "
-         "from the scatter of the pairs, or from their own intervals where that is wider; an error that all pairs "
-         "share, such as calibration, is not included. Scatter: standard deviation of one pair.")
+ABOUT = ("The mean is taken over the pairs that have a value, each with equal weight. The interval is the 95 % "
+         "interval of the mean, by Student's t from the scatter of the pairs, or from the intervals of the pairs where "
+         "that is wider. It does not include an error that all pairs share, such as calibration. The scatter is the "
+         "standard deviation of one pair.")
 
 
 def answers(asked: list, direction: str = "", done=None, **how) -> list[dict]:
@@ -25,7 +26,7 @@ def answers(asked: list, direction: str = "", done=None, **how) -> list[dict]:
         if not any(one.is_dir() for one in paths):
             return compare.data_of(*verdict.judged(paths, own or direction, **how))
         if own or how.get("shift") is not None:
-            raise PatchfemError(f"{'a direction' if own else 'a shift'} can only be given for traces, not for results "
+            raise PatchfemError(f"{'a direction' if own else 'a shift'} can be given only for traces, not for results "
                                 "folders")
         lost = worn.lost(*paths)
         return worn.data_of(lost, worn.verdict(lost))
@@ -50,8 +51,8 @@ def notes(rows: list) -> list:
     done, out = [row for row in rows if row["outcome"] == "done"], []
     firsts = [(pairs.group_of(row), row["before"]) for row in done]
     if len(set(firsts)) < len(firsts):
-        out.append("some pairs have the same surface before; its errors are then common to them, and the intervals of "
-                   "the means do not include this")
+        out.append("some pairs share the surface measured before wear; the errors of this surface are then common to "
+                   "these pairs, which the intervals of the means do not include")
     for group, count, found in pairs.means_of(rows):
         less = [f"{words(name)} ({one.count})" for name, one in found.items() if one.count < count]
         if less:
@@ -166,8 +167,9 @@ def _means(number: int, group: tuple, rows: list, found: dict) -> str:
     of = [row for row in rows if row["outcome"] == "done" and pairs.group_of(row) == group]
     panels = [(words(name), [(row["line"], pairs.quantity(row[name])) for row in of], found[name].mean)
               for name in _leading(of[0]) if name in found]
-    drawn = [figure(f"m{number}", pictures.each_and_mean(panels), "Each pair with its interval, against its line in "
-                                                                  "the table. The band is the mean with its interval.",
+    drawn = [figure(f"m{number}", pictures.each_and_mean(panels), "Each point is one pair with its interval, plotted "
+                                                                  "over the line number of the pair in the table. The "
+                                                                  "band is the mean with its interval.",
                     "; ".join(f"{name}: mean {' '.join(compare.shown(mean)[::2])}" for name, _, mean in panels))
              ] if panels else []
     cells = []

@@ -58,7 +58,7 @@ def statistics(abbott: tuple, core, spectrum, band: tuple, cutoff: float | None)
     marks = _density(spectrum, scale, "accent", "95 % band", "")
     ends = marks[-1]["x"]
     if band[1] > 1 / spectrum.frequency[-1] and band[0] < 1 / spectrum.frequency[0]:
-        marks.append(mark("span", "soft", "band of band_amplitude", left=band[0] * scale, right=band[1] * scale))
+        marks.append(mark("span", "soft", "wavelengths of band_amplitude", left=band[0] * scale, right=band[1] * scale))
     if spectrum.dominant is not None:
         marks.append(mark("rule", "warm", "dominant wavelength", x=spectrum.dominant * scale, dash="dashed"))
     if cutoff is not None:
@@ -166,7 +166,7 @@ def overlay(x, first, second, rest, where: tuple) -> str:
                       high=first * um))
     inside = (x >= where[0]) & (x <= where[1])
     both = np.concatenate([first[inside], second[inside]]) * um
-    label, up = "x of the trace after", axis("height", up)
+    label, up = "x of the second trace", axis("height", up)
     ends = [both.min() - 0.1 * np.ptp(both), both.max() + 0.15 * np.ptp(both)]
     return draw([chart("Both traces", _place(label, along, x * mm), up, marks),
                  chart("A part of them", _place(label, along, np.array(where) * mm), up | {"range": ends}, marks)],
@@ -187,16 +187,16 @@ def apart(before, after) -> str:
 def difference(x, rest, used, noise: float | None, ends: tuple | None) -> str:
     """The depth (n,) [m] of the trace after below its reference, and the unworn heights that carry it."""
     (along, mm), (up, um) = axis_unit(x, "m"), axis_unit(rest, "m")
-    marks = [line(x * mm, rest * um, "warm", "depth of the trace after", most=POINTS, width=1.0),
+    marks = [line(x * mm, rest * um, "warm", "depth of the second trace", most=POINTS, width=1.0),
              line(x[[0, -1]] * mm, [0.0, 0.0], "#4d4d4d", width=0.8)]
     if used is not None:
-        marks.append(mark("dots", "accent", "unworn: carries the registration", x=x[used] * mm, y=rest[used] * um,
+        marks.append(mark("dots", "accent", "unworn heights, used for the alignment", x=x[used] * mm, y=rest[used] * um,
                           size=1.5))
     if ends is not None:
         marks.append(mark("span", "soft", "track", left=ends[0] * mm, right=ends[1] * mm))
     room = 0.05 * np.ptp(rest)
     down = axis("worn depth", up) | {"range": [(rest.max() + room) * um, (rest.min() - room) * um]}
-    return draw([chart("", _place("x of the trace after", along, x * mm), down, marks)], height=2.5)
+    return draw([chart("", _place("x of the second trace", along, x * mm), down, marks)], height=2.5)
 
 
 def both_statistics(curves: tuple, spectra: tuple, band: tuple) -> str:
@@ -248,7 +248,7 @@ def each_and_mean(panels: list) -> str:
                   if one.high is not None]
         marks.append(mark("dots", "accent", "each pair", x=np.array([k for k, _ in known], float),
                           y=np.array([one.value * scale for _, one in known]), size=4.0))
-        made.append(chart(title, axis("line of the table") | {"range": wide}, axis("", unit), marks))
+        made.append(chart(title, axis("line number in the table") | {"range": wide}, axis("", unit), marks))
     return draw(made, height=2.7)
 
 

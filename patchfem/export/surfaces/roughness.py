@@ -62,11 +62,12 @@ def heading(report: RoughnessReport) -> str:
     if report.cutoff is None:
         fits = fitting_cutoff(report.length + report.step, report.step)  # a step for each sample
         text += "; no cut-off, so no roughness profile" + (
-            f' (--cutoff "{say(fits)}" is the longest standard one that fits five times here)' if fits else
-            ", and no standard cut-off fits five times here")
+            f' (--cutoff "{say(fits)}" '
+            'is the longest standard cut-off that fits five times into the trace)' if fits else
+            ", and no standard cut-off fits five times into the trace")
         return text + (f"; S-filter at {say(short)}, half of it trimmed at each end" if short else "")
     return (f"{text}; Gaussian filter at {say(report.cutoff)}, half of it trimmed at each end, "
-            + (f"S-filter at {say(short)}, the same" if short else "no filter for short waves"))
+            + (f"S-filter at {say(short)}, trimmed in the same way" if short else "no filter for short waves"))
 
 
 def _areal_filters(short: float | None, cutoff: float | None, holes: bool) -> str:

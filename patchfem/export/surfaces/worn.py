@@ -31,14 +31,14 @@ NEEDED = {"x": (1,), "weight": (1,), "unloaded_gap": (1, 2), "normal_stress": (2
 FLOOR = 5  # parts of a track, the deepest of which is its floor
 FLAT = 1e-12  # m, below which a new surface has no waves
 TEXTS = {"worn_volume": ("m3", "material lost over the whole patch, both pieces together"),
-         "worn_depth_max": ("m", "largest worn depth"), "worn_depth_mean": ("m", "mean worn depth: worn volume over "
-                                                                                 "the area"),
-         "worn_area": ("m2", "worn area of the section: worn volume over the width"),
+         "worn_depth_max": ("m", "largest worn depth"), "worn_depth_mean": ("m", "mean worn depth: worn volume divided "
+                                                                                 "by the area"),
+         "worn_area": ("m2", "worn area of the section: worn volume divided by the width"),
          "worn_share": ("1", "share of the patch that lost more than the error of the depth"),
-         "hidden_wear": ("m", "mean of the highest straight line below all worn depths: even and wedge-shaped wear, "
-                              "which a trace of this part alone could not show")}
-PLANE = ("mean of the highest plane below all worn depths: even and wedge-shaped wear, which a scan of this part alone "
-         "could not show")
+         "hidden_wear": ("m", "mean of the highest straight line that nowhere exceeds the worn depth: uniform and "
+                              "wedge-shaped wear, which a trace of this part alone could not show")}
+PLANE = ("mean of the highest plane that nowhere exceeds the worn depth: uniform and wedge-shaped wear, which a scan "
+         "of this part alone could not show")
 
 
 class Worn(NamedTuple):
@@ -119,7 +119,7 @@ def read(path: Path) -> Worn:
         size = held["x"].size
         wanted(size > 1 and all(held[name].shape[-1] == size for name in (*NEEDED, "worn_depth") if name in held),
                "its fields differ in length")
-        wanted((np.diff(held["x"]) > 0).all() and held["weight"].sum() > 0, "x is not a row of places")
+        wanted((np.diff(held["x"]) > 0).all() and held["weight"].sum() > 0, "x is not a row of positions")
         y = held.get("strip_offset")
         shape = (size,) if y is None else (y.size, size)
         depth = held["worn_depth"][-1] if "worn_depth" in held else np.zeros(size)
@@ -152,7 +152,7 @@ def _one_patch(first: Worn, second: Worn) -> None:
     news = [_at(second.x, each.x, each.gap - each.depth) for each in (first, second)]
     off = float(np.abs(news[0] - news[1]).max())
     if off > SAME * float(np.ptp(news[1])) + FLAT:
-        raise PatchfemError(f"{first.path} and {second.path}: these are two different patches: their new surfaces "
+        raise PatchfemError(f"{first.path} and {second.path}: these are two different patches: their unworn surfaces "
                             f"differ by {say(off, 3)}")
     volumes = [0.0 if (one := each.measure("worn_volume")) is None else one["value"] for each in (first, second)]
     if volumes[1] < volumes[0]:
@@ -303,7 +303,8 @@ def _track(x, depth, off: float, area: float) -> dict:
     floor = float(np.convolve(even, np.full(100, 0.01), "valid").max())
     under = max(float(np.mean(hidden_line(x[a:b + 1], depth[a:b + 1]))), 0.0)
     return {"from": ends[0], "to": ends[1], "hidden_wear": _with(under, off, *TEXTS["hidden_wear"]),
-            "depth_mean": _with(area / width, off + area / width * sum(cells) / width, "m", "lost area over its width"),
+            "depth_mean": _with(area / width, off + area / width * sum(cells) / width, "m", "area lost divided by the "
+                                                                                            "width"),
             "depth_floor": _with(floor, off, "m", "mean over the deepest fifth of its width"),
             "area_net": _with(area, off * width, "m2", "lost area less pile-up, which is zero in a computed run"),
             "area_gross": _with(area, off * width, "m2", "lost area"),
@@ -347,7 +348,7 @@ def _kind(ends: tuple) -> str:
     """What wear along a straight line with these depths at both ends, or along a plane with
     these at its corners, is."""
     low, high = min(ends), max(ends)
-    return "a wedge" if low < 0.2 * high else "even wear" if low > 0.8 * high else "even wear with a wedge"
+    return "a wedge" if low < 0.2 * high else "uniform wear" if low > 0.8 * high else "uniform wear with a wedge"
 
 
 def data_of(one: Lost, found: tuple) -> dict:
@@ -382,8 +383,8 @@ def _rows(one: Lost) -> list:
     track = {f"track_{name.removesuffix('_mean')}": each for name, each in one.track.items()}
     words = WORDS | {"track_from": "worn part from", "track_to": "worn part to", "track_depth": "worn part, mean",
                      "track_depth_floor": "worn part, floor",
-                     "track_hidden_wear": "worn part, even wear and wedge",
-                     "hidden_wear": "even wear and wedge, mean", "worn_share": "worn share of the patch"}
+                     "track_hidden_wear": "worn part, uniform wear and wedge",
+                     "hidden_wear": "uniform wear and wedge, mean", "worn_share": "worn share of the patch"}
     of_part = ("track_from", "track_to", "track_depth", "track_depth_floor", "track_hidden_wear")
     shown_of = one.values | {name: track[name] for name in of_part if name in track}
     return [(words[name], each) for name, each in shown_of.items()]
@@ -411,7 +412,8 @@ def write_page(path: Path, one: Lost, found: tuple) -> None:
             for name, each in _rows(one)]
     body = [figure(number, *each) for number, each in enumerate(_figures(one))]
     body.append(table(("quantity", ">value", ">interval", "unit", "meaning"), rows))
-    body.append("<p class=soft>Interval: the numerical errors of the runs, which hold in 19 of 20 scenes.</p>")
+    body.append("<p class=soft>The intervals are the numerical errors of the runs, which contain the true error in 19 "
+                "of 20 scenes.</p>")
     runs = [figure("p", pressures([(each.x, each.pressure, name) for each, (_, name) in
                                    zip((one.before, one.after), SIDES)]), "Normal stress of the pressed patch"
                    f"{'' if one.after.y is None else ', mean over the width'}.",
@@ -441,7 +443,7 @@ def _figures(one: Lost) -> list:
     marks.append(mark("band", "warm", "worn off", x=x * mm, low=one.gaps[0] * um, high=one.gaps[1] * um))
     deep, scale = axis_unit(one.depth, "m")
     depths = [line(x * mm, one.depth * scale, "warm", "worn depth"),
-              line(x[[0, -1]] * mm, np.array(under) * scale, "#4d4d4d", "even wear and wedge", width=0.9,
+              line(x[[0, -1]] * mm, np.array(under) * scale, "#4d4d4d", "uniform wear and wedge", width=0.9,
                    dash="dashed")]
     ends = [*under, 0.0, float(one.depth.max()), float(one.depth.min())]
     down = axis("worn depth", deep) | {"range": [(max(ends) + 0.05 * np.ptp(ends)) * scale,

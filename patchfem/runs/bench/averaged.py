@@ -35,7 +35,8 @@ def limit_share(model, patch) -> float:
     if abs(forward - back) > ALIKE * max(forward, back):
         raise PatchfemError(unbuilt(
             f"'{f.law}' on a pressure that is not symmetric (slip force {forward * f.static:.6g} N forward, "
-            f"{back * f.static:.6g} N back)", "make the patch symmetric or use a bench, [slide]"), "friction.law")
+            f"{back * f.static:.6g} N back)", "make the patch symmetric, or prescribe "
+                                              "the sliding with a [slide] table"), "friction.law")
     return (forward + back) / 2 / patch.pressure.load
 
 

@@ -56,7 +56,8 @@ def _overhang(asked, patch, fine) -> list:
     """Warnings of a bench whose slide leaves the patch."""
     out = []
     if fine.lateral is not None and (aside := largest_slide(fine.lateral) / asked.width) > FAR:
-        out.append(f"the slide across is {aside:.2g} of the width, but the overhang is not modelled")
+        out.append(f"the slide across the sliding direction is {aside:.2g} of the width, but the overhang is not "
+                   "modelled")
     lost = 1 - float(fine.load.min() / fine.load[0]) if fine.load[0] > 0 else 0.0
     if lost > 0.01:
         out.append(f"the upper piece slides off the pressed area: {100 * lost:.0f} % of the load is not carried at the "

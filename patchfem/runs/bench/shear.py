@@ -55,7 +55,7 @@ def _climbing(model, patch, time, slide, frames, watch) -> Slid:
 def refuse_missed(done) -> None:
     """NotConverged where a step missed its residual."""
     if done.missed:
-        raise NotConverged(f"{done.missed} steps of the bench did not reach the force residual; raise "
+        raise NotConverged(f"{done.missed} steps of the prescribed slide did not reach the force residual; raise "
                            "accuracy.steps_per_cycle", "")
 
 

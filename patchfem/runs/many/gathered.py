@@ -70,10 +70,10 @@ def refuses(model: Model) -> str:
     """Why all points of a model move; "" where a few may stand for them."""
     if model.patch is None or not model.soft or model.friction is None or not has(model.friction.law, "bonds") \
             or listed(model.friction):
-        return "it is not a patch with bonds behind shear"
+        return "the case is not a patch with bonds behind shear"
     if model.rig.load_varies or model.patch.strips is not None or model.grooves is not None or model.wear is not None:
         return "its load changes, or it wears"
-    return "" if engine_of(model) is MARCH else "it does not march"
+    return "" if engine_of(model) is MARCH else "the case is not integrated in time"
 
 
 def group(model: Model) -> Hashable:
@@ -90,11 +90,11 @@ def no_lanes(model: Model) -> str:
     """Why a model that is not refused does not march in lanes; "" where it may."""
     rig, law = model.rig, model.bonds
     if rig.waveform != "sine" or rig.kind != "base" or rig.levels or rig.start is not None or rig.bends or rig.names:
-        return "it is not a rig at rest under one sine of the base"
+        return "the case is not a rig at rest under one sine of the base"
     if rig.modes.gauge is not None or rig.richer is not None or np.isfinite(rig.travel):
-        return "it has a gauge, a reduced structure or a stop"
+        return "the case has a gauge, a reduced structure or a stop"
     if rig.cycles != int(rig.cycles) or rig.cycles < 20:
-        return "it has too few or broken cycles"
+        return "the case has too few or broken cycles"
     if law.grows or law.order != 1 or law.initial != 1 or law.breakaway or law.ratio != 1 or not law.static > 0:
         return "its bonds change in number or length"
     if model.heat is not None or model.accuracy.shear_modes is not None or unread(model):

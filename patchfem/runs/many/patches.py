@@ -32,7 +32,7 @@ class _Nodes(NamedTuple):
 
 def refuses(model: Model) -> str:
     """Why a model is not pressed together with others; "" where it may be."""
-    return static.not_together(model.patch) if model.kind == "patch" else "it is no static patch"
+    return static.not_together(model.patch) if model.kind == "patch" else "the case is no static patch"
 
 
 def group(model: Model) -> Hashable:

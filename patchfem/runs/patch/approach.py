@@ -49,10 +49,10 @@ def closed_by(asked, pieces: Compliance, gap, under, stiff: Compliance) -> tuple
     if abs(best[1].approach - distance) > MISSED * distance + ROUND * np.ptp(gap):
         reached = [one[1].approach for one in tried]
         below, above = max(a for a in reached if a < distance), min(a for a in reached if a > distance)
-        raise NotConverged(f"{distance:.6g} m is passed in a jump from {below:.6g} m to {above:.6g} m, where the load "
-                           "line passes one of the few nodes that touch, so it cannot be reached; lower "
-                           "contact.element_size or give contact.load in place of the "
-                           "approach", "contact.approach.distance")
+        raise NotConverged(f"an approach of {distance:.6g} m cannot be reached: the approach jumps from {below:.6g} m "
+                           f"to {above:.6g} m when the load line passes one of the few nodes that touch; lower "
+                           "contact.element_size, or give "
+                           "contact.load in place of the approach", "contact.approach.distance")
     return best
 
 

@@ -129,11 +129,11 @@ def left_out(model, patch, coarse) -> list:
     out = [f"scikit-fem assembles the stiffness of the {' and the '.join(by_forms)} piece"] if by_forms else []
     out += [*drawn_otherwise(patch.pair), *slender(asked, patch.pressure.load / patch.pieces.interface.weight.sum())]
     if patch.sharper and patch.averaging is not None:
-        out.append(f"static measures with a smaller error that way are computed on points {say(patch.averaging, 3)} "
-                   f"apart (short waves as in infinite layers); fields and motion come from the mesh of {patch.x.size} "
+        out.append(f"static measures are computed on points {say(patch.averaging, 3)} apart where this gives a smaller "
+                   f"error (short waves as in infinite layers); fields and motion come from the mesh of {patch.x.size} "
                    "interface points")
     elif patch.sharper:
-        out.append("static measures with a smaller error that way are computed on Gauss-Lobatto cells of order 4; "
+        out.append("static measures are computed on Gauss-Lobatto cells of order 4 where this gives a smaller error; "
                    f"fields and motion come from the bilinear mesh of {patch.x.size} interface points")
     elif patch.averaging is not None and not asked.gap.rough:
         out.append(f"the profile is averaged over {say(patch.averaging, 3)} where it carries load; the errors include "
@@ -169,8 +169,8 @@ def frictionless(asked, patch) -> list:
     more = one @ np.linalg.solve(stuck, one) / (one @ np.linalg.solve(normal, one)) - 1
     beta = abs(_dundurs(asked))
     return [f"the pieces differ (Dundurs' beta {beta:.2g} at the interface) and the pressure is that of a frictionless "
-            f"contact; with perfect stick normal_stiffness would be {100 * more:.2g} % larger, with friction it lies "
-            "in between"]
+            f"contact; with perfect stick normal_stiffness would be {100 * more:.2g} % larger, with friction the "
+            "stiffness lies in between"]
 
 
 def _dundurs(asked) -> float:
@@ -194,7 +194,7 @@ def drawn_otherwise(pair) -> list:
         count, area = recognise.holes(body)
         if count:
             out.append(f"contact.mesh: the {side} piece has {count} hole{'s' * (count > 1)} inside, {area:.3g} m2 in "
-                       "all; fill any that is not intended")
+                       "all; fill any hole that is not intended")
         held, whole = recognise.held_share(body)
         if held < WHOLE * whole:
             out.append(f"contact.mesh: {side}_far covers {held:.6g} m of a face of {whole:.6g} m, {held / whole:.3g} "

@@ -49,9 +49,9 @@ def ranged(asked, pressure: float) -> list:
         half = f" (from every second sample: {_half(asked, found.coarse, pressure)})"
         told = [f"contact.asperities: {found.doubt}"] if found.doubt else []
     elif asked.gap.profile is not None and part.cutoff is None:
-        told = [f"contact.asperities.rms_height: the profile contains the waves longer than "
-                f"{say(2 * asked.gap.average)}; if both are of one trace, give the rms values of the shorter waves "
-                "(from patchfem profile --cutoff)"]
+        told = ["contact.asperities.rms_height: the profile already contains all waves longer than "
+                f"{say(2 * asked.gap.average)}; if rms_height comes from the same trace as the profile, give the rms "
+                "values of the shorter waves only (patchfem profile --cutoff prints them)"]
     return [f"contact.asperities: under the mean pressure of {short(pressure, 'Pa', 3)} the peaks{waves} have "
             f"a stiffness of {mean_stiffness(asked, pressure):.3g} Pa/m{half}; Persson's theory, which includes "
             "waves of all lengths, "

@@ -22,10 +22,10 @@ def climbing_as_one(model, patch) -> list:
         return []
     limit = model.friction.static * patch.pressure.sigma_n * patch.pieces.interface.weight
     apart = float((patch.giving @ limit).max())
-    return [f"{model.soft} with grooves: all points climb together, with the height and slope at the slide of the "
-            f"holders; for a point at its friction limit this slide is wrong by up to {say(apart, 3)}, "
-            f"{apart / model.grooves.wavelength:.2g} of the wavelength; the normal force is shared among the points "
-            "like the load"]
+    return [f"{model.soft} with grooves: all points rise together, with the height and slope at the slide of the "
+            f"holders; for a point at its friction limit this slide is wrong by up to {say(apart, 3)}, which is "
+            f"{apart / model.grooves.wavelength:.2g} of the wavelength; the normal force is distributed over the "
+            "points in proportion to the load"]
 
 
 def warming(model, patch, response, work: float | None = None) -> list:
@@ -45,9 +45,9 @@ def unripe(law, speed: float) -> list:
     if a <= RIPE:
         return []
     least = law.ratio / (1 / (RIPE * law.length) - law.rest_growth / speed**2)  # ripening(law, speed) = RIPE with it
-    return [f"at the peak speed of {speed:.3g} m/s bonds need {a:.2g} of their length to form (limit {RIPE:g}), so the "
-            f'printed law gives less friction than eqs. 2.18-2.21; set friction.slip_growth = "{0.95e6 * least:.2g} '
-            'um", or friction.reading = "stretch"']
+    return [f'at the peak speed of {speed:.3g} m/s bonds need {a:.2g} of their length to form (limit {RIPE:g}), so the '
+            'law as printed in the report gives less friction than eqs. 2.18-2.21; set friction.slip_growth = '
+            f'"{0.95e6 * least:.2g} um", or friction.reading = "stretch"']
 
 
 def creeping(law, outcome, found) -> list:
@@ -58,7 +58,7 @@ def creeping(law, outcome, found) -> list:
     if law.reading != "stretch" or abs(drift.value) <= drift.error + 1e-2 * law.length:
         return []
     return [f"the mean position creeps by {drift.value / law.length:.2g} bond lengths per cycle, because bonds damaged "
-            "in each cycle creep under a biased load"]
+            "in each cycle creep under a force with a nonzero mean"]
 
 
 def unbounded_bonds(law) -> list:
@@ -81,15 +81,16 @@ def of_growth(law, peak: float | None) -> list:
         return []
     if law.reading == "report":
         return [] if law.initial == 0 else [
-            "in the law as printed in the report, the initial bonds keep the bond length eps_0, while bonds that form "
-            "later grow"]
+            "in the law as printed in the report, the initial bonds keep the bond length eps_0, even though the length "
+            "of later bonds grows"]
     out = []
     if law.order > 1:
-        out.append(f"order = {law.order:g} with growth does not limit friction: a bond that formed while short pulls "
-                   "harder and breaks later as the bond length grows; set order <= 1 to stay near mu_s N")
+        out.append(f"order = {law.order:g} with a growing bond length does not limit friction: a bond that formed "
+                   "while the bond length was small pulls harder and breaks later as the bond length grows; set order "
+                   "<= 1 to stay near mu_s N")
     if peak is not None and peak > 1 + BOUND:
-        out.append(f"friction reaches {peak:.3g} mu_s N, because bonds that formed while short persist as the bond "
-                   'length grows; set reading = "report" with order <= 0 to stay within mu_s N')
+        out.append(f'friction reaches {peak:.3g} mu_s N, because bonds that formed while the bond length was small '
+                   'persist as the bond length grows; set reading = "report" with order <= 0 to stay within mu_s N')
     return out
 
 
@@ -112,7 +113,7 @@ def work_check_warning(values: dict, steps: int | None, harmonics: int | None = 
         remedy = f"set accuracy.steps_per_cycle = {steps * 2**halvings}" if steps else \
             "compare with accuracy.method = \"march\""
     return [f"work_check is {found.value:.2g} (limit {BOOKS:g}): friction work by the trapezoidal rule on the samples "
-            f"differs from the energy ledger of the run; {remedy}"]
+            f"differs from the energy balance of the run; {remedy}"]
 
 
 def more_harmonics(found: int, sharp: float = 0.0) -> str:
@@ -145,8 +146,9 @@ def heating(model, patch, work: float, duration: float) -> list:
     rises = [f"{temperature.surface_rise(flux, duration, *stuff):.2g} K after {duration:.3g} s"]
     if period is not None:
         rises.insert(0, f"{temperature.surface_rise(flux, period, *stuff):.2g} K in a cycle")
-    return [f"friction of {work / duration:.2g} W on {1e6 * area:.3g} mm2 would warm the face of one half-space that "
-            f"takes all the heat by {', '.join(rises)}; the run keeps friction.temperature.surface as given"]
+    return [f"friction of {work / duration:.2g} W on {1e6 * area:.3g} mm2 would raise the surface temperature by "
+            f"{', '.join(rises)} if one half-space took all the heat; the run keeps friction.temperature.surface as "
+            "given"]
 
 
 def _cycle(model) -> float | None:

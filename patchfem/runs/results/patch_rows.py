@@ -32,20 +32,22 @@ ROWS = (
     Row("rotational_stiffness", "N m rad-1", 0.0, "derivative of the moment with respect to the rotation at fixed "
                                                   "approach",
         group="patch"),
-    Row("pressure_centre_lateral", "m", 1e-12, "lateral position of the resultant of the pressure, with strips",
+    Row("pressure_centre_lateral", "m", 1e-12, "lateral position of the resultant of the pressure; needs "
+                                               "[contact.strips]",
         group="patch"),
     Row("worn_volume", "m3", 0.0, "volume worn off both pieces together", group="wear"),
     Row("worn_depth_max", "m", 1e-15, "largest worn depth on the interface, both pieces together", group="wear"),
     Row("worn_through_cycle", "1", 0.0, "number of cycles after which a coating is worn through at its deepest place",
         group="wear"),
-    Row("groove_amplitude", "m", 1e-12, "half the height of the grooves after wear, peak to valley",
+    Row("groove_amplitude", "m", 1e-12, "half the peak-to-valley height of the grooves after wear",
         group="wear"),
-    Row("static_coefficient", "1", 0.0, "coefficient of static friction after wear, with "
-                                        "[wear.friction]", group="wear"),
-    Row("bond_length", "m", 0.0, "bond length after wear, with [wear.friction]",
+    Row("static_coefficient", "1", 0.0, "coefficient of static "
+                                        "friction after wear; needs [wear.friction]", group="wear"),
+    Row("bond_length", "m", 0.0, "bond length after wear; needs [wear.friction]",
         group="wear"),
-    Row("roll_moment", "N m", 1e-10, "moment of the pressure about x, with strips that roll", group="patch"),
-    Row("roll", "rad", 1e-12, "rotation of the upper piece about x, with strips; positive opens the gap at "
+    Row("roll_moment", "N m", 1e-10, "moment of the pressure about "
+                                     "x; needs strips that may rotate about x", group="patch"),
+    Row("roll", "rad", 1e-12, "rotation of the upper piece about x; needs [contact.strips]; positive opens the gap at "
                               "+y", group="patch"),
 )
 # what a mesh is chosen for

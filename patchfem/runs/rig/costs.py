@@ -147,7 +147,7 @@ def dear_events(model: Model) -> str:
     """Why the march is to run what the engine of events takes: its events cost more than steps and more than an exact
     motion is worth."""
     worth = PATIENCE if steps_wanted(model) > MOST_STEPS else max(WORTH, seconds_of_steps(model))
-    return "its yields cost more than steps" if seconds_of_pieces(model) > worth else ""
+    return "yielding events cost more than time steps" if seconds_of_pieces(model) > worth else ""
 
 
 def dear_elements(model: Model) -> str:
@@ -159,9 +159,9 @@ def refuse_endless(model: Model, numerics=None) -> None:
     """Raise Missing when a run from event to event would take longer than LONGEST seconds."""
     seconds = seconds_of_pieces(model)
     if seconds > LONGEST:
-        raise Missing(f"the exact motion (about {pieces_per_cycle(model):.2g} pieces per cycle, set by events, rows of "
-                      f"the drive and the fastest free vibration) would take about {seconds:.0f} s, more than "
-                      f"{LONGEST:.0f} s; lower drive.cycles or the stiffness of modes and elements, or use "
+        raise Missing(f'the exact motion (about {pieces_per_cycle(model):.2g} time intervals per cycle, set by events, '
+                      f'rows of the drive and the fastest free vibration) would take about {seconds:.0f} s, more than '
+                      f'{LONGEST:.0f} s; lower drive.cycles or the stiffness of modes and elements, or use '
                       'accuracy.method = "march"', "")
 
 
@@ -173,8 +173,8 @@ def exact_cost(model: Model, numerics, unknowns: dict) -> tuple:
 def exact_words(model: Model, engine: str) -> list:
     """The sentence of a plan on which engine takes the elements, and why."""
     count, exact, march = expected_elements(model)[0], expected_seconds(model), seconds_of_steps(model)
-    return [f"{count} element{'s' * (count > 1)} by engine {engine}: about {exact:.2g} s by exact solution from yield "
-            f"to yield, about {march:.2g} s by time steps at this tolerance"]
+    return [f"{count} element{'s' * (count > 1)} by engine {engine}: about {exact:.2g} s by the exact solution between "
+            f"yield events, about {march:.2g} s by time steps at this tolerance"]
 
 
 def not_smooth(model: Model) -> str:

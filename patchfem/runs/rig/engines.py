@@ -137,9 +137,10 @@ class Finder(NamedTuple):
 
 
 FINDERS = {one.name: one for one in (
-    Finder("events", "the map from event to event, exact", "steady.maps EventFinder", "exact"),
-    Finder("yields", "the map from yield to yield, exact", "steady.maps YieldFinder", "piecewise"),
-    Finder("march", "a march whose start is corrected until the motion repeats", "steady.marched MarchFinder", "march"),
+    Finder("events", "the exact solution from event to event", "steady.maps EventFinder", "exact"),
+    Finder("yields", "the exact solution between yield events", "steady.maps YieldFinder", "piecewise"),
+    Finder("march", "a time integration whose start "
+                    "is corrected until the motion repeats", "steady.marched MarchFinder", "march"),
     Finder("balance", "harmonic balance", "steady.balance BalanceFinder", "harmonic"))}
 
 
@@ -317,8 +318,8 @@ def unbalanced(engine: Engine, measures: dict) -> str:
     bar = max(CLOSED, found.error or 0.0) if engine.closes is None else engine.closes
     if not found.value > bar:  # a motion that is not finite has been seen before
         return ""
-    return f"the energy balance of engine {engine.name} misses {found.value:.2g} of the energy that passed, beyond " \
-        f"{bar:.2g}, so a step made or lost energy"
+    return (f"the energy balance of engine {engine.name} is off by {found.value:.2g} of the energy exchanged, more "
+            f"than the limit of {bar:.2g}, so a step created or lost energy")
 
 
 @lru_cache(8)

@@ -23,7 +23,7 @@ def flutter_of(run) -> tuple:
     that does not last, with its error, or the reason why it is not known."""
     model, unit, floor = run.model, TABLE[NAME].unit, TABLE[NAME].floor
     found, reason = _cycles(model, run.numerics, run.patch)
-    far = [f"the run ended after {run.raw.response.time[-1]:.4g} s, where the motion passed {BEYOND:g} m"] \
+    far = [f"the run ended after {run.raw.response.time[-1]:.4g} s, where the motion exceeded {BEYOND:g} m"] \
         if run.raw.outcome is Outcome.EXCEEDS_TRAVEL and model.rig.travel == BEYOND else []
     edges = [one for one in found if not one.lasts]
     if not edges:

@@ -91,11 +91,9 @@ def level_measures(rig, levels, probe, tolerance: float, rubs: bool, coarser=())
         width = size * float(leap[2])  # it lies between two levels
         out["jump_level"] = Measure(size * leap[0], unit, width, width)
     else:
-        out["jump_level"] = Measure(None, unit, None, TABLE["jump_level"].floor, reason="between no two neighbouring "
-                                                                                        "levels does the amplitude "
-                                                                                        f"grow by a factor of {JUMP:g} "
-                                                                                        "or more beyond the growth of "
-                                                                                        "the drive")
+        out["jump_level"] = Measure(None, unit, None, TABLE["jump_level"].floor, reason=
+                                    f"no two neighbouring levels have an amplitude ratio of at least {JUMP:g} times "
+                                    "the ratio of the levels")
     if (loop := hysteresis(levels)) is not None:
         out["level_hysteresis"] = Measure(float(loop[0]), "m", float(loop[1]), 1e-10)
     return out

@@ -210,14 +210,14 @@ def _held_words(model: Model) -> str:
     """How bonds hold the block whose list of them grows."""
     turns = "it reverses in almost every step, and each reversal makes the list of bonds longer"
     if lists.stalls(model):
-        return ("the printed law keeps the block from sliding from its release on, so that it vibrates on its bonds or "
-                "reverses in almost every step; the estimate is for the slowest case")
+        return ("the law as printed in the report keeps the block from sliding from its release on, so that the block "
+                "vibrates on its bonds or reverses in almost every step; the estimate is for the slowest case")
     if lists.limp(model):
         return f"bonds of order 0 keep the block from sliding but give it no stiffness: {turns}"
     if lists.chatters(model):
-        return f"the printed law keeps the block from sliding, however small its stroke: {turns}"
-    return ("the printed law keeps the block from sliding at some level, or nearly so: the list of bonds grows with "
-            "every step")
+        return f"the law as printed in the report keeps the block from sliding, however small its stroke: {turns}"
+    return ("the law as printed in the report keeps the block from sliding at some level, or nearly so: the list of "
+            "bonds grows with every step")
 
 
 def steady_cost(model: Model, numerics, unknowns: dict) -> tuple:

@@ -112,10 +112,10 @@ def unmoved_elements(model, numerics, patch, raw) -> list:
     for group, slide in zip(pieces.YieldingElements(model, numerics, patch).groups, slides.T):
         most, half = float(group.yield_slide.max(initial=0.0)), float(np.ptp(slide)) / 2
         if most > half:
-            return [f"part of the joint yields only at {length(most)} and never slips in this motion of "
-                    f"{length(half)}: it keeps any force that it was left with, so the steady motion is not unique; "
-                    'the one given has no mean force; set accuracy.method = "auto" for the one that is reached from '
-                    "rest"]
+            return [f'part of the joint yields only at {length(most)} and never slips in this motion of '
+                    f'{length(half)}: this part keeps the force left in it by earlier motion, so the steady motion is '
+                    'not unique; the motion given here has no mean force; set accuracy.method = "auto" for the motion '
+                    'that is reached from rest']
     return []
 
 
@@ -133,8 +133,9 @@ def created_warning(model, book: dict, cycles: float) -> list:
     made, work = book.get("created", 0.0), book.get("dissipated", 0.0)
     if made <= 1e-9 * work or made <= 0:
         return []
-    return [f"the printed law created {made / cycles:.3g} J per cycle, {100 * made / max(work, 1e-300):.3g} % of what "
-            'it dissipated; set reading = "stretch", which creates none']
+    return [f'the law as printed in the report created {made / cycles:.3g} J per cycle, '
+            f'{100 * made / max(work, 1e-300):.3g} '
+            '% of what it dissipated; set reading = "stretch", which creates none']
 
 
 def modes_note(model, kept: int, nodes: int) -> list:

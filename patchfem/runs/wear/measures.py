@@ -178,8 +178,8 @@ def _beyond_table(model, found) -> list:
     deep, out = [mean_depth(found.patch, one.depth) for one in found.moments], []
     if deep[-1] > change.depth[-1]:
         out.append(f"the mean worn depth, {say(deep[-1], 3)}, is larger than the last value of wear.friction.depth, "
-                   f"{say(change.depth[-1], 3)}, and friction stays constant from there; add a depth of at least "
-                   f"{say(deep[-1], 3)}")
+                   f"{say(change.depth[-1], 3)}, and friction is taken as constant beyond that value; add a row with a "
+                   f"depth of at least {say(deep[-1], 3)}")
     past = max(sum(one < row < two for row in change.depth) for one, two in pairwise(deep)) if len(deep) > 1 else 0
     if model.wear.jumps and past > 1:
         out.append(f"one jump of the wear passes {past} rows of wear.friction and misses the values between them; "

@@ -18,7 +18,7 @@ Piece = Literal["upper", "lower"]
 class Material(Table):
     """Elastic constants of a piece or a coating, written inline or looked up by name."""
 
-    name: key(str | None, "the name under which the material table lists it") = None
+    name: key(str | None, "name of the material in the material table") = None
     young: key(quantity("pressure", gt=0), "Young's modulus")
     poisson: key(number(gt=-1, lt=0.5), "Poisson's ratio")
     density: key(quantity("density", gt=0), "mass per volume")
@@ -110,8 +110,8 @@ class Crown(Table):
 class Step(Table):
     """A step of the gap at one position along x."""
 
-    height: key(Place, "height of the step: the gap is wider by it where x > at")
-    at: key(Place, "position x of the step, 0 at the middle of the patch")
+    height: key(Place, "height of the step, by which the gap is wider where x > `at`")
+    at: key(Place, "position x of the step; 0 is the middle of the patch")
     on: key(Piece, "the piece that carries the shape") = "upper"
 
 
@@ -144,7 +144,7 @@ class Asperities(Table):
     rms_slope: key(Positive | None, "root mean square slope of that trace", "as rms_height") = None
     rms_curvature: key(quantity("curvature", gt=0) | None, "root mean square curvature of that trace",
                        "as rms_height") = None
-    cutoff: key(Length | None, "wavelength that splits a trace (Gaussian filter of ISO 16610-21): longer waves belong "
+    cutoff: key(Length | None, "wavelength that divides a trace (Gaussian filter of ISO 16610-21): longer waves belong "
                                "to [contact.profile], shorter ones to the asperities; default: length/100 with a "
                                "profile, all waves of `from` without one") = None
     tangential_ratio: key(Positive | None, "tangential over normal stiffness of the rough layer; default: rigid along "
@@ -156,15 +156,15 @@ class Shear(Table):
 
 
 class Grooves(Table):
-    """Matched grooves whose flanks the load climbs."""
+    """Matched grooves in both surfaces; the upper piece rides up their flanks against the load."""
 
     wavelength: key(Length, "wavelength of the grooves along x")
     amplitude: key(quantity("length", ge=0), "half the height of the grooves from valley to peak; with 0 the friction "
                    "law acts alone")
-    phase: key(quantity("angle"), "phase 2 pi x/wavelength of a groove's bottom, x counted from the start of the "
+    phase: key(quantity("angle"), "phase 2 pi x/wavelength of a groove's bottom, where x counts from the start of the "
                                   "run") = 0.0
-    lifted_mass: key(quantity("mass", ge=0), "mass that rises as the load climbs the grooves; it adds inertia "
-                     "only, because its weight is part of the load") = 0.0
+    lifted_mass: key(quantity("mass", ge=0), "mass that rises as the upper piece rides up the grooves; it adds inertia "
+                                             "only, because the weight is part of the load") = 0.0
 
 
 def outermost(width: float, count: int) -> float:
@@ -177,11 +177,12 @@ class Strips(Table):
 
     count: key(whole(1, 10_000), "number of equal strips side by side over the width")
     roll: key(quantity("angle"), "rotation of the holder about x, which shifts the pressure sideways") = 0.0
-    offset: key(Place | None, "lateral position of the load line; if given, the upper piece is free to roll") = None
+    offset: key(Place | None, "lateral position of the load "
+                              "line; if given, the upper piece is free to rotate about x") = None
 
 
 class Contact(Table):
-    """The patch: two equal pieces pressed together; sub-tables change one piece or the gap, or add compliance."""
+    """Two equal pieces pressed together; sub-tables change one piece or the gap, or add compliance."""
 
     length: key(Length, "length of both pieces along the sliding direction x")
     width: key(Length, "width of the patch perpendicular to the plane of the model")

@@ -40,8 +40,9 @@ class Yield(NamedTuple):
 
 YIELD: dict[str, Yield] = {
     "Ti-8Al-1Mo-1V": Yield(930e6, "MatWeb MTA816: annealed 8 h at 790 degC; 828 MPa is the specified minimum."),
-    "steel": Yield(235e6, "EN 10025-2: minimum of S235 up to 16 mm thick, the softest of the common grades."),
-    "stainless steel": Yield(205e6, "ASTM A240: minimum of annealed 304; 310 MPa is typical."),
+    "steel": Yield(235e6, "EN 10025-2: minimum yield strength of S235 up to 16 mm thick, the softest of the common "
+                          "grades."),
+    "stainless steel": Yield(205e6, "ASTM A240: minimum yield strength of annealed 304; 310 MPa is typical."),
     "aluminium": Yield(240e6, "ASTM B209: minimum of 6061-T6."),
 }
 
@@ -55,6 +56,7 @@ class Thermal(NamedTuple):
 
 
 THERMAL: dict[str, Thermal] = {
-    "Ti-8Al-1Mo-1V": Thermal(7.0, 526.0, "Handbook values of the alloy; 2.3e6 J/m3/K by its density."),
+    "Ti-8Al-1Mo-1V": Thermal(7.0, 526.0, "Handbook values of the alloy; with its density the volumetric heat capacity "
+                                         "is 2.3e6 J/m3/K."),
     "steel": Thermal(50.0, 490.0, "Handbook values of plain carbon steel."),
 }

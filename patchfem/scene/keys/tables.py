@@ -74,27 +74,30 @@ class Friction(Table):
     reference_speed: key(Speed | None, "speed v_0 over which law tanh saturates") = None
     bond_length: key(Length | None, "bond length eps_0 at rest: the slide over which a bond forms and breaks; "
                      "law elastic-plastic may take stiffness in its place") = None
-    stiffness: key(quantity("stiffness", gt=0) | None, "initial slope of force over slide, for the whole contact; a "
-                   "patch shares it in proportion to the normal force") = None
+    stiffness: key(quantity("stiffness", gt=0) | None, "initial slope of force over slide, for the whole contact; over "
+                                                       "a patch this stiffness is distributed in proportion to the "
+                                                       "normal force") = None
     chi: key(number(gt=-1, le=0) | None, "exponent of the distribution of sliders: in micro-slip the energy "
              "dissipated per cycle grows as force amplitude to the power chi + 3") = None
-    beta: key(NotNegative | None, "stiffness of the last slider over that of all other sliders together") = None
+    beta: key(NotNegative | None, "stiffness of the last slider "
+                                  "divided by the stiffness of all other sliders together") = None
     exponent: key(Positive, "exponent n, which sets how sharp the transition from stick to slip is") = 1.0
-    shape: key(number(gt=0, le=1), "shape s of the unloading: at 1/2 it follows the elastic line; from 1/2 on, the "
-               "law creates no energy") = 0.5
+    shape: key(number(gt=0, le=1), "shape s of the unloading: with s = 1/2 unloading follows the elastic line; with s "
+                                   ">= 1/2 the law creates no energy") = 0.5
     stribeck_speed: key(Speed | None, "speed v_s over which friction falls from static to kinetic") = None
     micro_damping: key(quantity("damping", ge=0), "force per rate of the bristle deflection, for the whole "
                                                   "contact") = 0.0
     viscous: key(quantity("damping", ge=0), "viscous force per sliding speed, for the whole contact") = 0.0
-    reading: key(Literal["stretch", "report"], "'stretch': eq. 2.17 with the stretch of a bond kept apart from its "
-                 "damage, which never creates energy; 'report': eq. 2.17 as printed in the report") = "stretch"
+    reading: key(Literal["stretch", "report"], "'stretch': eq. 2.17 with the stretch of a bond separate from its "
+                                               "damage, so that no energy is created; 'report': eq. 2.17 as printed in "
+                                               "the report") = "stretch"
     order: key(number(le=100), "power p with which the strength of a bond rises along its path; > -1, and >= 0 with "
                "reading stretch") = 1.0
-    rest_growth: key(Acceleration | None, "growth a_s of the bond length at rest (2.10); without it and slip_growth "
-                     "the bond length is constant", "with slip_growth") = None
+    rest_growth: key(Acceleration | None, "growth a_s of the bond length at rest (2.10); without rest_growth and "
+                                          "slip_growth the bond length is constant", "with slip_growth") = None
     slip_growth: key(Length | None, "slip length l_k over which the bond length approaches its value in fast slip "
                      "(2.10)", "with rest_growth") = None
-    rest_speed: key(Speed | None, "least speed v_h taken for |v| in a_s/|v|; default 1e-3 of the peak speed") = None
+    rest_speed: key(Speed | None, "lower limit v_h of |v| in a_s/|v|; default 1e-3 of the peak speed") = None
     initial_bonds: key(Share, "share m_0 of the bonds that exist when the run begins") = 1.0
     breakaway: key(number(ge=0, le=1), "share of the bond length over which a bond stretches without damage") = 0.0
     spread: key(Length | None, "width rho of the bonds across the path (2.15); default: ignored") = None
@@ -109,8 +112,8 @@ class Slide(Table):
     amplitude: key(Length | None, "half the peak-to-peak motion, which starts in the middle and rises") = None
     frequency: key(Frequency | None, "frequency of the sine") = None
     speed: key(Speed | None, "speed of the slide") = None
-    distance: key(quantity("length", ge=0) | None, "sliding distance; of a dwell the part before the rest, of a "
-                                                   "triangle a first part before the cycles (default 0)") = None
+    distance: key(quantity("length", ge=0) | None, "sliding distance; for a dwell, the distance before the rest; for a "
+                                                   "triangle, a first slide before the cycles (default 0)") = None
     hold: key(quantity("time", ge=0) | None, "duration of the rest") = None
     distance_after: key(quantity("length", ge=0) | None, "sliding distance after the rest; default 0") = None
     cycles: key(Positive | None, "number of cycles, may be fractional; default 1") = None
@@ -213,9 +216,9 @@ class Reduced(Table):
     modes: key(whole(0, 1000), "number of modes kept in addition to the boundary coordinates") = 12
     method: key(Literal["craig-bampton", "free-interface"], "'craig-bampton': modes with the boundary "
                 "held; 'free-interface': modes of the whole structure with residual attachment modes") = "craig-bampton"
-    moved: key(Annotated[tuple[Coordinate, ...], Field(min_length=1)] | None, "coordinates that a base drive moves "
-               "along x, by row, range a..b:n of rows, node or direction; unless given, all in direction x, or all "
-               "if the files name no directions") = None
+    moved: key(Annotated[tuple[Coordinate, ...], Field(min_length=1)] | None,
+               "coordinates that a base drive moves along x, by row, range a..b:n of rows, node or direction; unless "
+               "given, all coordinates in direction x, or all coordinates if the files name no directions") = None
     slide: key(Between | None, "the two boundary coordinates that the joint of [contact] or [normal] connects: "
                                   "the first minus the second is the slide; 0 is the base",
                "with [friction]") = None
@@ -232,14 +235,14 @@ class Start(Table):
 
 
 class Structure(Table):
-    """The rig, as modes, as masses with springs, or from a file; `..._at` names a place in a file of measured modes."""
+    """The rig: modes, masses with springs, or a file; keys `..._at` name a place in a file of measured modes."""
 
     moving_mass: key(Mass | None, "modal mass of every mode", "with modes") = None
     travel: key(Length | None, "stop of the flexure: a larger motion ends the run; default none") = None
     mode: tuple[Mode, ...] = ()
-    measured: key(Literal["free", "stuck"], "'free': the modes are those without the joint; 'stuck': "
-                  "frequencies and damping were measured with the joint bolted, and its stiffness is "
-                  "subtracted") = "free"
+    measured: key(Literal["free", "stuck"], "'free': the modes are those without the joint; 'stuck': frequencies and "
+                                            "damping were measured with the joint bolted, and the stiffness of the "
+                                            "joint is subtracted") = "free"
     stiffening: Stiffening | None = None
     bonded: Bonded | None = None
     masses: key(tuple[Mass, ...] | None, "masses that are connected by springs, in place of modes") = None
@@ -250,12 +253,13 @@ class Structure(Table):
     interface: tuple[Interface, ...] = ()
     file: key(Text | None, "file of matrices, modes or measured responses (.npz, .mat, .uff), in place of modes") = None
     reduced: Reduced | None = None
-    slide_at: key(Text | None, "node and direction in the file that moves the patch along x, such as 12:+x") = None
-    output_at: key(Text | None, "node and direction in the file that carries the accelerometer") = None
-    base_at: key(Text | None, "node and direction in the file that is driven as the base") = None
-    force_at: key(Text | None, "node and direction in the file at which the force acts") = None
-    normal_at: key(Text | None, "node and direction in the file that moves the patch away from the contact") = None
-    pitch_at: key(Text | None, "node and direction in the file that rotates the patch") = None
+    slide_at: key(Text | None, "node and direction, as named in the file, whose motion is the motion of the patch "
+                               "along x, such as 12:+x") = None
+    output_at: key(Text | None, "node and direction, as named in the file, of the accelerometer") = None
+    base_at: key(Text | None, "node and direction, as named in the file, that is driven as the base") = None
+    force_at: key(Text | None, "node and direction, as named in the file, on which the force acts") = None
+    normal_at: key(Text | None, "node and direction, as named in the file, whose motion opens the contact") = None
+    pitch_at: key(Text | None, "node and direction, as named in the file, whose motion rotates the patch") = None
     start: Start | None = None
 
 
@@ -282,8 +286,8 @@ class Drive(Table):
                       "acceleration; for kind `free` the displacement at release", "kind `free` unless "
                                                                                    "[structure.start]") = None
     levels: key(Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=1)] | None,
-                "accelerations of the base, or forces, run one after the other; each level starts from the state "
-                "that the one before it reached") = None
+                "accelerations of the base, or forces, applied one after the other; each level starts from the final "
+                "state of the previous level") = None
     frequencies: key(Annotated[tuple[Frequency, ...], Field(min_length=2, max_length=100)] | None, "frequencies of "
                      "tones that act at the same time") = None
     accelerations: key(Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=2)] | None, "amplitude "
@@ -316,8 +320,9 @@ class Drive(Table):
 class WornFriction(Table):
     """Friction that changes with the worn depth: a table, interpolated linearly, constant beyond its last row."""
 
-    depth: key(Annotated[tuple[quantity("length", ge=0), ...], Field(min_length=2)], "mean worn depth of both pieces "
-               "together, which is the worn volume over the area of the patch; rising from 0")
+    depth: key(Annotated[tuple[quantity("length", ge=0), ...], Field(min_length=2)],
+               "mean worn depths, rising from 0; a mean worn depth is the worn volume of both pieces divided by the "
+               "area of the patch")
     coefficient_factor: key(Annotated[tuple[Positive, ...], Field(min_length=2)] | None, "factor on static and kinetic "
                             "at each depth; 1 at depth 0", "unless bond_length_factor") = None
     bond_length_factor: key(Annotated[tuple[Positive, ...], Field(min_length=2)] | None, "factor on bond_length at "
@@ -327,17 +332,17 @@ class WornFriction(Table):
 class Wear(Table):
     """Material removed over many cycles."""
 
-    coefficient: key(quantity("wear coefficient", ge=0), "volume worn off both pieces per load and slip path; for form "
-                     "'energy' per friction work")
+    coefficient: key(quantity("wear coefficient", ge=0), "volume worn off both pieces together, divided by load and "
+                                                         "slip path; for form 'energy', divided by the friction work")
     upper_share: key(Share, "share of the worn depth that is worn off the upper piece") = 0.5
     cycles: key(Positive, "number of cycles over which material is removed, each assumed equal to the "
                        "converged last cycle of the run")
-    jumps: key(Literal["auto"] | whole(1, 1_000_000), "number of equal steps into which these cycles are divided; "
-                                                      "default: set by the tolerance") = "auto"
+    jumps: key(Literal["auto"] | whole(1, 1_000_000), "number of equal steps into which the cycles of wear are "
+                                                      "divided; default: set by the tolerance") = "auto"
     form: key(Literal["archard", "energy"], "'archard': depth proportional to pressure and slip path; 'energy': to "
               "friction work per area") = "archard"
-    scheme: key(Literal["implicit", "explicit"], "'explicit' uses the pressure at the start of each step; steps "
-                "too long for it to be stable are refused") = "implicit"
+    scheme: key(Literal["implicit", "explicit"], "'explicit' uses the pressure at the start of each step; steps too "
+                                                 "long for stability are refused") = "implicit"
     start: key(Text | None, "result.nc of a run with [wear], such as out/before/result.nc, whose worn depth this run "
                "starts from; unless given, the pieces are new") = None
     friction: WornFriction | None = None
@@ -356,7 +361,7 @@ class Measured(Table):
 
 
 class Tables(Table):
-    """Keys at the top of the file, before the first table."""
+    """These keys stand at the top of the file, before the first table."""
 
     title: key(Title, "title of the results, one line of text") = ""
     contact: Contact | None = None

@@ -75,7 +75,7 @@ def _printable(value: str) -> str:
     """A text without signs that no file of results can hold: control characters and halves of a pair."""
     wrong = next((sign for sign in value if category(sign) in ("Cc", "Cs") and sign not in "\n\t"), None)
     if wrong is not None:
-        raise ValueError(f"contains the character U+{ord(wrong):04X}, which cannot be displayed; remove it")
+        raise ValueError(f"contains the character U+{ord(wrong):04X}, which cannot be displayed; remove this character")
     return value
 
 

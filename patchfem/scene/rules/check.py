@@ -32,10 +32,10 @@ def _normal(draft: Draft) -> None:
     if draft.tables.normal is None:
         return
     if draft.given("normal.amplitude") and not draft.given("normal.frequency"):
-        draft.lacks("normal.frequency", "normal.amplitude needs it")
+        draft.lacks("normal.frequency", "normal.amplitude needs this key")
     for key in ("frequency", "phase"):
         if draft.given(f"normal.{key}") and not draft.given("normal.amplitude"):
-            draft.lacks("normal.amplitude", f"{key} needs it")
+            draft.lacks("normal.amplitude", f"{key} needs this key")
     if draft.given("normal.width") and not draft.given("friction.spread"):
         draft.remark("normal.width has no meaning without friction.spread and is not used")
 
@@ -45,7 +45,7 @@ def _measured(draft: Draft) -> None:
         return
     low, cut = draft.tables.measured.reading == "lowpass", draft.given("measured.reading_cutoff")
     if low and not cut:
-        draft.lacks("measured.reading_cutoff", "reading 'lowpass' needs it, such as '600 Hz'")
+        draft.lacks("measured.reading_cutoff", "reading 'lowpass' needs this key, such as '600 Hz'")
     drive = draft.tables.drive
     if draft.tables.measured.reading != "peak" and (drive is None or drive.kind == "free" or drive.waveform != "sine"):
         draft.remark("measured.reading has a meaning only under one sine drive and is not used")
@@ -144,4 +144,5 @@ def _sliding(draft: Draft, kind: str) -> None:
     modes = structure.mode if kind == "rig" and structure is not None else ()
     if modes and all(mode.slide == 0 for mode in modes):
         draft.say("structure.mode.0.slide", "slide is 0 in every mode, so nothing slides at the patch; give slide for "
-                                            "the mode that moves it, or leave out [friction] and its load")  # fmt: skip
+                                            "the mode that moves the patch, "
+                                            "or leave out [friction] and its load")  # fmt: skip

@@ -96,8 +96,8 @@ def _contact(draft: Draft) -> None:
             _peaks(draft)
         if draft.given("contact.asperities.cutoff") and not any(
                 draft.given(f"contact.{one}") for one in ("profile", "asperities.from", "asperities.rms_height")):
-            draft.say("contact.asperities.cutoff", "splits the waves of a trace, and none stands here: add "
-                      "[contact.profile] or from, or leave the key out")
+            draft.say("contact.asperities.cutoff", "divides the waves of a trace, but the scene has no trace: add "
+                                                   "[contact.profile] or from, or leave the key out")
         bare = contact.asperities.law == "exponential" and contact.asperities.normal_stiffness is None
         if contact.approach and bare:
             draft.lacks("contact.asperities.normal_stiffness", "law 'exponential' with [contact.approach] needs "
@@ -114,18 +114,19 @@ def _peaks(draft: Draft) -> None:
     for one in (told or PEAKS)[0]:
         if len(told) < 2 and not draft.given(f"{at}.{one}"):
             others = "" if told else "; or give from, or rms_height, rms_slope and rms_curvature"
-            draft.lacks(f"{at}.{one}", f"law 'hertz' needs it{others}")
+            draft.lacks(f"{at}.{one}", f"law 'hertz' needs this key{others}")
 
 
 def _free_roll(draft: Draft, contact) -> None:
     """A load line over the width leaves the roll free, which a load alone determines, and two strips at least."""
     at, strips = "contact.strips.offset", contact.strips
     if draft.given("contact.strips.roll"):
-        draft.say(at, "offset frees the roll that contact.strips.roll prescribes: keep one of the two")
+        draft.say(at, "offset leaves the rotation about x free, but contact.strips.roll prescribes it: keep one of the "
+                      "two")
     if draft.given("contact.approach"):
         draft.say(at, "a load line needs a load: use contact.load in place of [contact.approach]")
     if strips.count is not None and strips.count < 2:
-        draft.say(at, f"{strips.count} strip does not feel a roll: raise contact.strips.count")
+        draft.say(at, f"{strips.count} strip does not react to a rotation about x: raise contact.strips.count")
     elif strips.count and contact.width and strips.offset is not None:
         most = outermost(contact.width, strips.count)
         if abs(strips.offset) >= most:

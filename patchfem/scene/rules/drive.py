@@ -20,7 +20,7 @@ def check_drive(draft: Draft) -> None:
     if drive.kind in ("base", "force") and drive.waveform in WAVEFORMS:
         for key in WAVEFORMS[drive.waveform].keys[0].split():
             if not draft.given(f"drive.{key}"):
-                draft.lacks(f"drive.{key}", f"waveform '{drive.waveform}' needs it")
+                draft.lacks(f"drive.{key}", f"waveform '{drive.waveform}' needs this key")
         for key in sorted(waveform_unused(drive)):
             if draft.given(f"drive.{key}"):
                 draft.remark(f"drive.{key} has no meaning for waveform '{drive.waveform}' and is not used")
@@ -43,7 +43,7 @@ def check_drive(draft: Draft) -> None:
 def _onset(draft: Draft, drive: Any) -> None:
     given = draft.given("drive.onset_length")
     if drive.onset == "gauge" and not given:
-        draft.lacks("drive.onset_length", "onset 'gauge' needs it, such as '0.01 mil'")
+        draft.lacks("drive.onset_length", "onset 'gauge' needs this key, such as '0.01 mil'")
     if given and drive.onset != "gauge":
         draft.remark(f"drive.onset_length has no meaning for onset '{drive.onset}' and is not used")
 
@@ -96,10 +96,11 @@ def _size(draft: Draft, drive: Any) -> None:
         if not acceleration and not displacement:
             draft.lacks("drive.acceleration", "or drive.displacement instead")
     if drive.kind == "force" and sized and not draft.given("drive.force"):
-        draft.lacks("drive.force", "kind 'force' needs it")
+        draft.lacks("drive.force", "kind 'force' needs this key")
     begins = draft.given("structure.start")
     if drive.kind == "free" and not displacement and not begins:
-        draft.lacks("drive.displacement", "kind 'free' needs it as the point of release; or give [structure.start]")
+        draft.lacks("drive.displacement", "kind 'free' needs this key as the point of release; or give "
+                                          "[structure.start]")
     if drive.kind == "free" and displacement and begins:
         draft.say("structure.start", "[structure.start] and drive.displacement exclude each other: keep one")
     drives_mass(draft)

@@ -14,9 +14,9 @@ def check_spread(draft: Draft, at: str, law: Friction) -> None:
     if law.spread is None:
         return
     if not takes(law.law, "spread"):
-        draft.say(f"{at}.spread", f"law '{law.law}' has no spread; only these have one: {using('spread')}")
+        draft.say(f"{at}.spread", f"law '{law.law}' has no spread; laws with a spread are {using('spread')}")
     elif at == "friction" and draft.tables.normal is not None and not draft.given("normal.width"):
-        draft.lacks("normal.width", "friction.spread needs it")
+        draft.lacks("normal.width", "friction.spread needs this key")
 
 
 def remark_temperature(draft: Draft, at: str, law: Friction) -> None:
@@ -47,7 +47,7 @@ def _frictions(draft: Draft) -> None:
 def _friction(draft: Draft, at: str, law: Friction, contact: Contact | None) -> None:
     _needs(draft, at, law, "law", LAWS)
     if draft.given(f"{at}.kinetic") and not takes(law.law, "kinetic"):
-        draft.say(f"{at}.kinetic", f"law '{law.law}' has only one coefficient; a kinetic one exists for "
+        draft.say(f"{at}.kinetic", f"law '{law.law}' has only one coefficient; laws with a kinetic coefficient are "
                                    f"{using('kinetic')}")
     elif law.kinetic is not None and law.static is not None and law.kinetic > law.static:
         draft.say(f"{at}.kinetic", f"{law.kinetic} is larger than static = {law.static}; kinetic <= static is needed")
@@ -60,7 +60,7 @@ def _friction(draft: Draft, at: str, law: Friction, contact: Contact | None) -> 
     remark_temperature(draft, at, law)
     for key, other in (("rest_growth", "slip_growth"), ("slip_growth", "rest_growth")):
         if draft.given(f"{at}.{key}") and not draft.given(f"{at}.{other}"):
-            draft.lacks(f"{at}.{other}", f"{key} needs it; leave both out for a constant bond length")
+            draft.lacks(f"{at}.{other}", f"{key} needs this key; leave both out for a constant bond length")
     printed = law.reading != "stretch" or has(law.law, "averaged")
     if law.order is not None and (law.order <= -1 or (law.order < 0 and not printed)):
         wanted = ">= 0 (reading 'stretch')" if not printed else "> -1 (reading 'report')"
@@ -83,10 +83,10 @@ def _stretches(draft: Draft, at: str, contact: Contact | None) -> None:
     """Say a stiffness beside a load that changes or is not given."""
     cause = changing_load(draft.tables) or climbed(draft.tables)
     if cause:
-        draft.say(f"{at}.stiffness", f"{cause} changes the load, and springs come and go with it; give bond_length in "
-                                     "its place")
+        draft.say(f"{at}.stiffness", f"{cause} changes the load, and springs enter and leave the contact with it; give "
+                                     "bond_length in place of stiffness")
     elif contact is not None and contact.load is None and contact.approach is not None:
-        draft.say(f"{at}.stiffness", "[contact.approach] leaves the load open; give bond_length, or contact.load in "
+        draft.say(f"{at}.stiffness", "[contact.approach] does not fix the load; give bond_length, or contact.load in "
                                      "place of the approach")
 
 

@@ -25,7 +25,8 @@ def check_grooves(draft: Draft, kind: str) -> None:
         return
     _locks(draft, at, grooves, law)
     if kind == "bench" and grooves.lifted_mass:
-        draft.remark(f"{at}.lifted_mass has no meaning with [slide], because a bench has no inertia, and is not used")
+        draft.remark(f"{at}.lifted_mass has no meaning with [slide], because a prescribed slide has no inertia, and is "
+                     "not used")
     if grooves.amplitude:
         _beside(draft, at, grooves, law)
 

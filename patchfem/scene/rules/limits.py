@@ -155,7 +155,7 @@ def _under_changing_load(draft: Draft, law: Friction, shear: str, cause: str) ->
     """Say what a load that changes in a run cannot stand beside."""
     contact, structure, beside = draft.tables.contact, draft.tables.structure, beside_load(cause)
     if contact is None and cause != "normal.amplitude":
-        draft.say(cause, "one rigid point cannot heave or pitch: use [contact] in place of [normal]")
+        draft.say(cause, "a single contact point cannot heave or pitch: use [contact] in place of [normal]")
     carried = "grooves" if climbed(draft.tables) else "varying-load"
     if not has(law.law, "bonds") and not carries(law, carried):
         draft.say("friction.law", unbuilt(f"'{law.law}' {beside}", refusal(carried)))

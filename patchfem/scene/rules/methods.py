@@ -193,10 +193,10 @@ def _harmonic(m: Motion, method: str) -> str:
         return ""  # over grooves by a balance, or a march that is brought to repeat
     law = m.laws[0]
     if len(m.laws) > 1:
-        return unbuilt("'harmonic' with several interfaces where a law has no exact solution or a spring bends",
+        return unbuilt("'harmonic' with several interfaces where a law has no exact solution or a spring is nonlinear",
                        "march")
     if has(law.law, "set-valued") and not m.soft:
-        return unbuilt(f"'harmonic' with law '{law.law}', which jumps, and {m.spring}", "march or stiff")
+        return unbuilt(f"'harmonic' with law '{law.law}', whose force jumps, and {m.spring}", "march or stiff")
     if not has(law.law, "set-valued") and not carries(law, "harmonic"):
         return unbuilt(f"'harmonic' with {named(law)}", f"use 'march', or {refusal('harmonic', odd=law)}")
     beside = next((key for key in ("rest_growth", "breakaway") if getattr(law, key)), "")

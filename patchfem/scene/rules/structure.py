@@ -24,8 +24,8 @@ def check_structure(draft: Draft) -> None:
     if len(forms) > 1:
         draft.say(f"structure.{forms[1]}", f"{' and '.join(forms)} exclude each other: keep one description of the rig")
     if not forms:
-        draft.lacks("structure.mode", "at least one [[structure.mode]] is needed; a mass on a spring is one with "
-                                      "frequency sqrt(k/m)/(2 pi)")  # fmt: skip
+        draft.lacks("structure.mode", "at least one [[structure.mode]] is needed; a mass on a spring is a mode with "
+                                      "the frequency sqrt(k/m)/(2 pi)")  # fmt: skip
     if not draft.given("structure.moving_mass") and forms in ([], ["mode"]):
         draft.lacks("structure.moving_mass", "")
     for key in ("spring", "damper", "output_mass"):
@@ -35,9 +35,9 @@ def check_structure(draft: Draft) -> None:
                 draft.say(f"structure.{key}", f"joins masses, which cannot be used with [contact]; "
                                               f"{modes_instead(draft)}")
             else:
-                draft.lacks("structure.masses", f"structure.{key} needs them")
+                draft.lacks("structure.masses", f"structure.{key} needs this key")
     if not {"masses", "file", "reduced"} & set(forms) and draft.given("structure.interface"):
-        draft.lacks("structure.masses", "structure.interface needs them, or structure.file or [structure.reduced]")
+        draft.lacks("structure.masses", "structure.interface needs this key, or structure.file or [structure.reduced]")
     for key in PLACES:
         if "file" not in forms and draft.given(f"structure.{key}"):
             draft.say(f"structure.{key}", "names a place in a file of modes or responses; give structure.file")
@@ -64,7 +64,7 @@ def modes_instead(draft: Draft) -> str:
     pairs = [sorted(pair) if pair else None for pair, _ in springs + dampers]
     if len(masses) != 1 or not masses[0] or not k or pairs != [[0, 1]] * len(pairs):
         return ("with [contact], give the modes of these masses and springs: structure.moving_mass and for each a "
-                "[[structure.mode]] with its frequency, that of one mass on one spring being sqrt(k/m)/(2 pi)")
+                "[[structure.mode]] with its frequency, which for one mass on one spring is sqrt(k/m)/(2 pi)")
     frequency, ratio = sqrt(k / masses[0]) / (2 * pi), c / (2 * sqrt(k * masses[0]))
     damping = f"damping = {ratio:.3g} (c/(2 sqrt(k m)))" if dampers else "its damping ratio"
     return (f"with [contact], give structure.moving_mass = \"{masses[0]:g} kg\" and a [[structure.mode]] with "
@@ -155,7 +155,7 @@ def _between(draft: Draft, key: str, pair: Any, count: int | None) -> None:
         return
     what = "mass" if draft.tables.structure.reduced is None else "boundary coordinate"
     if pair[0] == pair[1]:
-        draft.say(key, f"joins {'the base' if pair[0] == 0 else f'{what} {pair[0]}'} to itself; two different ones are "
+        draft.say(key, f"joins {'the base' if pair[0] == 0 else f'{what} {pair[0]}'} to itself; two different ends are "
                        f"needed, or a {what} and 0, the base")
     for one in dict.fromkeys(pair):
         _known(draft, key, one, count)
@@ -175,7 +175,7 @@ def drives_mass(draft: Draft) -> None:
     if drive.mass is None or structure is None or drive.kind == "base":
         return
     if draft.given("structure.mode"):
-        draft.say("drive.mass", "is for structure.masses; [[structure.mode]] is driven at its output: leave "
+        draft.say("drive.mass", "applies to structure.masses, but [[structure.mode]] is driven at its output: leave "
                                 "drive.mass out")  # fmt: skip
     else:
         _known(draft, "drive.mass", drive.mass, _numbered(structure))
@@ -196,7 +196,7 @@ def _file(draft: Draft, structure: Any) -> None:
     if measured and not draft.given("structure.moving_mass"):
         draft.lacks("structure.moving_mass", "the modes of a universal file are scaled to this mass")
     if measured and not draft.given("structure.slide_at"):
-        draft.lacks("structure.slide_at", "the place and direction that slide, such as slide_at = \"12:+x\"")
+        draft.lacks("structure.slide_at", "the node and direction that slide, such as slide_at = \"12:+x\"")
     if measured and draft.given("structure.interface"):
         draft.say("structure.interface", "a universal file has nodes, not masses; use slide_at with [friction]")
 
@@ -222,16 +222,17 @@ def _reduced(draft: Draft, reduced: Any) -> None:
             draft.say("structure.reduced.slide", "is given with [friction]; an interface names its two sides with "
                                                  "the key between")
     elif draft.given("friction") and reduced.slide is None:
-        draft.lacks("structure.reduced.slide", "which two boundary coordinates rub, such as slide = [1, 0] for the "
-                                               "first on the base; or write [[structure.interface]] with its own law")
+        draft.lacks("structure.reduced.slide", "which two boundary coordinates rub against each other, such as slide = "
+                                               "[1, 0] for coordinate 1 against the base (0); or write "
+                                               "[[structure.interface]] with its own law")
 
 
 def _bonded(draft: Draft, structure: Any) -> None:
     """The spring beside the contact needs to know which contact."""
     if structure.bonded is None or structure.masses is None or len(structure.interface or ()) == 1:
         return
-    draft.say("structure.bonded", f"is for one contact, but there are {len(structure.interface or ())} "
-                                  "interfaces; write a [[structure.spring]] between the same masses")  # fmt: skip
+    draft.say("structure.bonded", f"applies to one contact, but there are {len(structure.interface or ())} interfaces; "
+                                  "write a [[structure.spring]] between the same masses")  # fmt: skip
 
 
 def _bolted(draft: Draft, structure: Any) -> None:

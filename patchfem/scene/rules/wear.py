@@ -57,8 +57,8 @@ def _friction(draft: Draft, change: WornFriction) -> None:
     if law is None:
         return
     if change.bond_length_factor is not None and not takes(law.law, "bond_length"):
-        draft.say(f"{at}.bond_length_factor", f"law '{law.law}' has no bond_length; leave it out, or use "
-                                              f"{using('bond_length')}; leave it out")
+        draft.say(f"{at}.bond_length_factor", f"law '{law.law}' has no bond_length; leave this key out, or use "
+                                              f"{using('bond_length')}")
     elif change.bond_length_factor is not None and law.stiffness is not None:
         draft.say(f"{at}.bond_length_factor", "has no meaning beside friction.stiffness; give friction.bond_length")
     if change.coefficient_factor is not None and law.static == 0:

@@ -1,4 +1,4 @@
-"""What carries a registration: unworn parts, valleys, or nothing, so that even wear, a wedge and a bend may hide."""
+"""What carries a registration: unworn parts, valleys, or nothing, so that uniform wear, a wedge and a bend may hide."""
 
 from typing import NamedTuple
 
@@ -14,7 +14,8 @@ PART, SAMPLES, FILLED = 0.05, 40, 0.7  # of the length, samples, and share of un
 WORN, BROAD, LEAST = 2 * REACH, 16, 0.005  # deviations of a rubbed place, its samples at half of them, share of x
 CURVED, BOWED = 30.0, 0.75  # chi-squared of a bow in an unworn part, and its size in noises, from which it is none
 TURNS, HIGHER, VALLEYS = 8, 0.65, 0.1  # worn tops, share of unworn heights that lie lower than they, share of valleys
-HIDDEN = "mean worn depth if the tilt, up to the end of its interval, is a wedge of wear; even wear has no limit"
+HIDDEN = ("mean worn depth if the tilt between the traces, up to the end of its interval, is wedge-shaped wear; "
+          "uniform wear has no such limit")
 NO_LIMIT = "no limit"
 
 
@@ -91,12 +92,12 @@ def hidden_wear(found: Registration | None, by: Carried | None) -> Quantity:
     """What a wedge may hide [m]: half of the tilt times the common length; no numbers where nothing can hide.
 
     A tilt between both traces is that of their mounting or of a wedge that wore off; its mean depth is then half of the
-    tilt times the length. Even wear adds any depth, as does a mounting that turns a wedge back: there is no limit.
+    tilt times the length. Uniform wear adds any depth, as does a mounting that turns a wedge back: there is no limit.
     """
     if found is None:
         return refused("m", HIDDEN, "the traces are not registered to each other")
     if by.by:
-        return refused("m", HIDDEN, f"{_what(by)} carry the registration")
+        return refused("m", HIDDEN, f"{_what(by)} are used for the alignment")
     length = float(found.x[-1] - found.x[0])
     return Quantity((abs(found.slope) + SIDE * found.errors[1]) * length / 2, 0.0, None, "m", HIDDEN)
 
@@ -109,21 +110,22 @@ def told(by: Carried) -> str:
     """What the worn depths count from, as a sentence."""
     if by.by == "valleys":
         return (f"Depths are measured from the valleys between the worn tops, {100 * by.share:.0f} % of the heights, "
-                "which agree in both traces and are taken as unworn; if they wore evenly too, all depths are larger "
-                "by that wear.")
+                "which agree in both traces and are taken as unworn; if these heights wore uniformly too, all depths "
+                "are larger by that wear.")
     spans = ", ".join(f"{say(a, 4)} to {say(b, 4)}" for a, b in by.parts[:4])
     more = f" and {len(by.parts) - 4} more" if len(by.parts) > 4 else ""
-    return (f"Depths are measured from the parts that agree, x = {spans}{more} of the trace after, which are taken as "
-            "unworn; if they wore evenly or as a wedge too, all depths are larger by that wear.")
+    return (f"Depths are measured from the parts that agree, x = {spans}{more} of the second trace (after wear), which "
+            "are taken as unworn; if these parts wore uniformly or as a wedge too, all depths are larger by that wear.")
 
 
 def may_hide(found: Registration, hidden: Quantity) -> str:
     """What may hide where nothing carries the registration, and what would settle it, as a sentence."""
-    bow = f" A bow of {say(abs(found.bend), 3)}, now subtracted, may be a bent datum or wear." if found.bend else ""
+    bow = (f" A curvature (bow) of {say(abs(found.bend), 3)} "
+           "was subtracted; it may be a bent datum or wear.") if found.bend else ""
     tilt, most = (plain(1e6 * one, 3) for one in (abs(found.slope), 2 * hidden.value / float(found.x[-1] - found.x[0])))
-    return ("Even wear of any depth would look the same, and so would wedge-shaped wear that the mounting levelled "
-            f"out. The tilt of {tilt} urad between the traces, up to {most} urad by its interval, may hide "
-            f"up to {say(hidden.value, 3)} of mean wear: half the tilt times the length.{bow} To settle it, "
+    return ("Uniform wear of any depth would look the same, as would wedge-shaped wear that was removed when the part "
+            f"was mounted level. The tilt of {tilt} urad between the traces, up to {most} urad by its interval, may "
+            f"hide up to {say(hidden.value, 3)} of mean wear: half the tilt times the length.{bow} To find out, "
             "measure an unworn flank beside the rubbed part, or a reference mark, in both traces.")
 
 

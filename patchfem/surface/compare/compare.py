@@ -22,11 +22,12 @@ from .same import Place, found_place
 from .specks import without_specks
 from .tracks import Tracks, beside_flanks, of_flanks, pieces_of, tracks_of
 
-SHIFT = "a place at x of the trace before is at x + shift of the trace after"
-STRETCH = "length of the trace after over that of the trace before, from their unworn valleys"
-TILT = "slope of the trace after against the trace before"
-AMPLITUDE = "amplitude of a sine with the same mean square as the waves of 60 um to 110 um, after over before"
-SLOPE = "root mean square slope between neighbouring samples, after over before"
+SHIFT = "the place at x in the first trace (before wear) is at x + shift in the second (after wear)"
+STRETCH = "length of the second trace (after wear) divided by that of the first, found from their unworn valleys"
+TILT = "tilt of the second trace (after wear) relative to the first (before wear)"
+AMPLITUDE = ("amplitude of a sine with the same mean square as the waves of 60 um to 110 um: value after wear divided "
+             "by value before")
+SLOPE = "root mean square slope between neighbouring samples: value after wear divided by value before"
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,8 +150,8 @@ def _placed(place: Place, direction: str, band: tuple, removed: tuple) -> Compar
     if by.by:
         tracks = tracks_of(found, worn_depth.neighbours(found), band[1])
     else:
-        worn = worn_depth.nowhere("no part of the traces is known to be unworn, so even, wedge-shaped or bow-shaped "
-                                  "wear cannot be told from no wear", worn.deposited if raised(found) else 0.0)
+        worn = worn_depth.nowhere("no part of the traces is known to be unworn, so uniform, wedge-shaped or bow-shaped "
+                                  "wear cannot be distinguished from no wear", worn.deposited if raised(found) else 0.0)
     pieces = pieces_of(found, tracks, band[1])
     flat = pieces_of(found, tracks, band[1], True)
     ratios, sizes = [], [tuple(_pooled(side, step, band) for side in zip(*one)) for one in (flat, pieces)]
@@ -225,7 +226,7 @@ def _told(found: Registration) -> list:
     value, error, out = found.stretch
     if not np.isfinite(value) or abs(value) < max(SIDE * 2 * error, 1e-4):
         return []
-    text = (f"the trace after is {1 + value:.5g} times as long as the same place in the trace before (+- "
+    text = (f"the second trace (after wear) shows the same place {1 + value:.5g} times as long as the first (+- "
             f"{SIDE * error:.1g})")
     return [text + ("; the difference is corrected" if out else "; calibrate x of the instrument")]
 

@@ -88,7 +88,7 @@ def extent_of(found: Registration, together: float) -> Extent | None:
         return None
     x, last = found.x, rest.size - 1
     places = [tuple(float(x[k]) for k in ends[0]), tuple(float(x[last - k]) for k in (ends[1][0], *ends[1][:0:-1]))]
-    after = tuple(Quantity(*place, "m", f"{text}, as x of the trace after")
+    after = tuple(Quantity(*place, "m", f"{text}, as x of the second trace (after wear)")
                   for place, text in zip(places, (FROM, TO)))
     scale = 1 + (found.stretch[0] if found.stretch[2] else 0.0)
     moved = SIDE * found.errors[2]
@@ -96,8 +96,9 @@ def extent_of(found: Registration, together: float) -> Extent | None:
     def back(place: float) -> float:
         return found.middle + (place - found.middle) / scale - found.shift
 
-    before = tuple(Quantity(back(place), back(low) - moved, back(high) + moved, "m", f"{text}, as x of the trace "
-                            "before") for (place, low, high), text in zip(places, (FROM, TO)))
+    before = tuple(Quantity(back(place), back(low) - moved, back(high) + moved, "m",
+                            f"{text}, as x of the first trace (before "
+                            "wear)") for (place, low, high), text in zip(places, (FROM, TO)))
     return Extent(before, after)
 
 
@@ -176,7 +177,7 @@ def abbott_estimate(before: Profile, after: Profile) -> Quantity:
     spectrum = spectrum_of(one.z, one.length / (one.x.size - 1))
     text = "mean worn depth estimated from the valley tails of both Abbott curves"
     if not spectrum.density.any():
-        return refused("m", text, "the trace before is flat")
+        return refused("m", text, "the first trace (before wear) is flat")
     tails = []
     for each, half in ((one, 0), (other, 1)):
         heights = Heights(each.z, each.length / (each.x.size - 1))

@@ -116,7 +116,7 @@ def ratio(part: str, text: str, over: Size, under: Size, alike: float = 0.0) -> 
     place = ("amplitude", "slope").index(part)
     one, other = over[place], under[place]
     if other <= 0:
-        return refused("1", text, f"the {part} before is zero")
+        return refused("1", text, f"the {part} before wear is zero")
     value, (first, second) = one / other, (over.freedom[place], under.freedom[place])
     tail = (1 - LEVEL) / 2
     if alike <= 0:

@@ -150,7 +150,7 @@ def _same(found: Registration, match: Match) -> bool:
 
 
 def _alike(found: Registration, match: Match, most: float = np.inf) -> bool:
-    """The same for noise that may be wear: a floor that wore evenly is no proof of the other order of the traces.
+    """The same for noise that may be wear: a floor that wore uniformly is no proof of the other order of the traces.
 
     most [m]: height that counts at most; a deep track is none of the roughness beside which noise is small.
     """

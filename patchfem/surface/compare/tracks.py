@@ -21,16 +21,18 @@ LONG = 3.0  # longest waves of the band, and a track is longer; so is a piece of
 MEDIAN, UNWORN = 5, 0.05  # samples of the running median that is worn in a track, share of unworn heights in it
 NEW = 10.0  # noises that a new valley is deeper than the trace before, and 3 below all of it nearby
 FORM = 2.5  # longest waves, from which the shape of the depth is the form of a track
-FROM, TO = ("x of the trace after where the longest track begins",
-            "x of the trace after where the longest track ends")
+FROM, TO = ("x in the second trace (after wear) at which the longest track begins",
+            "x in the second trace (after wear) at which the longest track ends")
 DEPTH, BOTTOM = ("mean depth: lost area of the longest track over its width",
                  "floor of the longest track: bottom of the parabola through the deepest fifth of its width")
 WIDTH, STEP = ("width of the longest track",
                "step: mean depth over the middle third of the longest track, as of a groove in ISO 5436-1, type A1")
-LEFT, RIGHT = (f"pile-up: area above the trace before, within one track width {side} the longest track" for side in
+LEFT, RIGHT = ("pile-up: area above the first "
+               f"trace (before wear), within one track width {side} the longest track" for side in
                ("before", "behind"))
-GROSS, PILED, NET = ("area lost in the longest track", "pile-up: area above the trace before, within one track width "
-                     "of the longest track, both sides together", "lost area less pile-up")
+GROSS, PILED, NET = ("area lost in the longest track", "pile-up: area above the first trace (before wear), within one "
+                                                       "track width of the longest track, both "
+                                                       "sides together", "lost area less pile-up")
 
 
 class Valley(NamedTuple):
@@ -172,7 +174,7 @@ def of_flanks(found: Flanks) -> Tracks:
     many = max(inside.size // FLOOR, 1)
     floor = float(np.convolve(inside, np.full(many, 1 / many), "valid").max())
     off = found.largest[2] - found.largest[0]
-    why = "the height beside the track before is not known"
+    why = "the height of the first trace (before wear) beside the track is not known"
     width = Quantity(found.width, max(found.width - 2 * part, 0.0), found.width + 2 * part, "m", WIDTH)
     return Tracks((), {"from": ends[0], "to": ends[1], "width": width,
                        "depth_mean": Quantity(*(one / found.width for one in found.area), "m", DEPTH),

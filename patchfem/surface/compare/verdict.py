@@ -101,7 +101,7 @@ def _range(ratio: Quantity) -> str:
 def _amplitude(ratio: Quantity, word: str, name: str) -> str:
     if ratio.value is None:
         return f"Amplitude{name}: {ratio.reason}."
-    start = f"The waves of the band{name} have {_range(ratio)} of the amplitude before: "
+    start = f"The waves of the band{name} have {_range(ratio)} of their amplitude before wear: "
     if word == "no change shown":
         return start + "the interval contains 1, so no change is shown."
     return start + f"{word}, at {sure(ratio)}."
@@ -113,15 +113,15 @@ def _slope(ratio: Quantity, name: str) -> str:
     word = changed(ratio)
     tail = "no change is shown" if word == "no change shown" else \
         f"{'flatter' if word == 'reduced' else 'steeper'}, at {sure(ratio)}"
-    return f"The slope{name} is {_range(ratio)} of that before: {tail}."
+    return f"The slope{name} is {_range(ratio)} of the slope before wear: {tail}."
 
 
 def _gain(one: Comparison, name: str) -> list:
     """That waves or slopes changed by one factor of all heights, as a sentence."""
     if one.gain is None or {changed(one.amplitude_ratio), changed(one.slope_ratio)} == {"no change shown"}:
         return []
-    return [f"All heights{name} after are {one.gain:.4g} times those before: an instrument's gain does that, wear "
-            "does not; calibrate z of both measurements."]
+    return [f"All heights{name} after wear are {one.gain:.4g} times the heights before; the gain of an instrument "
+            "explains this, wear does not; calibrate z of both measurements."]
 
 
 def _sure(mean: Quantity) -> bool:
@@ -141,18 +141,18 @@ def _over(parts: list) -> str:
     """What was mirrored or turned over, for the headline."""
     names = [word for word, any_one in (("mirrored", any(one.mirrored for one in parts)),
                                         ("turned over", any(one.turned for one in parts))) if any_one]
-    return f"one trace is {' and '.join(names)} against the other" if names else ""
+    return f"one trace is {' and '.join(names)} relative to the other" if names else ""
 
 
 def _variant(one: Comparison, name: str) -> list:
     """What was turned for the comparison, as a sentence."""
     out = []
     if one.mirrored:
-        out.append(f"The trace after{name} was measured in the opposite direction: it was mirrored, so its x counts "
-                   "from the other end.")
+        out.append(f"The second trace{name} was measured in the opposite direction; it was mirrored here, so its x "
+                   "counts from the other end.")
     if one.turned:
-        out.append(f"The heights of both traces{name} have opposite signs: one was inverted so that wear is missing "
-                   "material; check in which file heights point into the material.")
+        out.append(f"The heights of both traces{name} have opposite signs: one was inverted here, so that wear counts "
+                   "as missing material; check in which file heights point into the material.")
     return out
 
 
@@ -162,9 +162,10 @@ def _worn(one: Comparison, name: str) -> str:
     mean = one.worn.mean
     above = ""
     if one.worn.deposited > DEPOSITED * (one.worn.area.value or 0.0) and one.worn.deposited > 0:
-        above = (f" {1e12 * one.worn.deposited:.3g} um^2 of material lie above the trace before: deposits, or the two "
-                 "files are in the wrong order." if one.exchanged else
-                 f" {1e12 * one.worn.deposited:.3g} um^2 of material lie above the trace before: deposits or pile-up.")
+        above = (f" {1e12 * one.worn.deposited:.3g} um^2 of material lie above the first trace (before wear): "
+                 "deposits, or the two files are in the wrong order." if one.exchanged else
+                 f" {1e12 * one.worn.deposited:.3g} um^2 of material lie above the first trace (before wear): deposits "
+                 "or pile-up.")
     if one.reference == "place" and not one.carried.by:
         return f"Worn depth{name}: none shown.{above} {may_hide(one.registration, one.hidden)}"
     if mean.value is None:
@@ -180,7 +181,7 @@ def _worn(one: Comparison, name: str) -> str:
             f"place.{above}")
     if one.worn.extent is not None and not one.tracks.sizes:
         before, after = (_span(*(end.value for end in ends)) for ends in one.worn.extent)
-        text += f" Worn from x = {before} of the trace before, that is from {after} of the trace after"
+        text += f" Worn from x = {before} in the first trace (before wear), that is from {after} in the second"
         mean = one.worn.within
         text += "." if mean is None else f", and between these places {_length(mean)} on average."
     return text
@@ -192,8 +193,8 @@ def _reference(one: Comparison) -> list:
         return []
     out, bend = [told(one.carried)], one.registration.bend
     if bend:
-        out.append(f"A bow of {say(abs(bend), 3)} over the common length is subtracted, because a bent datum and "
-                   "wear of that shape look alike.")
+        out.append(f"A curvature (bow) of {say(abs(bend), 3)} over the common length was subtracted, because a bent "
+                   "datum and wear of that shape look alike.")
     return out
 
 
@@ -201,10 +202,10 @@ def _track(one: Comparison) -> str:
     """The longest track as the begin of a sentence."""
     found = one.tracks.sizes
     if one.flanks is not None:
-        return f"a track from about x = {_span(one.flanks.start, one.flanks.end)} of the trace after; "
+        return f"a track from about x = {_span(one.flanks.start, one.flanks.end)} in the second trace (after wear); "
     if not found:
         return ""
-    return (f"a track from x = {_span(found['from'].value, found['to'].value)} of the trace after, "
+    return (f"a track from x = {_span(found['from'].value, found['to'].value)} in the second trace (after wear), "
             f"{_length(found['depth_mean'])} deep on average, its floor {_length(found['depth_floor'])}; ")
 
 
@@ -214,8 +215,8 @@ def _apart(one: Comparison) -> list:
     out = ["Amplitude and slope leave out the edges of the track."] if cut else []
     if one.tracks.valley is not None:
         place, depth = one.tracks.valley
-        out.append(f"A valley {say(depth, 3)} deep at x = {say(place, 4)} is in the trace after only: a scratch or a "
-                   "pit; the worn depths include it too.")
+        out.append(f"A valley {say(depth, 3)} deep at x = {say(place, 4)} is only in the second trace (after wear): a "
+                   "scratch or a pit; the worn depths include it too.")
     return out
 
 

@@ -87,7 +87,7 @@ def _step(path, axis: str, count: int, facts: dict, given: tuple | None) -> tupl
     """Step along x or y [m]; notes."""
     size, step = ("width", "step_x") if axis == "x" else ("height", "step_y")
     if given is not None and (pixel := pixel_of(given[0])) is not None:
-        told = f"{path}: its header gives its size along {axis}; the given pixel, {given[0]}, is used"
+        told = f"{path}: its header gives its size along {axis}; the given pixel size, {given[0]}, is used"
         return pixel, () if {size, step}.isdisjoint(facts) else (told,)
     if axis == "y" and step not in facts and size not in facts:
         step = "step_x"  # square pixels by a size of one number

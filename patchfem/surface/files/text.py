@@ -48,8 +48,8 @@ def columns(raw: Raw, given: tuple | None = None) -> Profile | Areal:
     if not head.named and is_matrix(len(head.row), names, facts):
         return matrix(path, head, facts, given, text[head.start:])
     if pixel:
-        raise PatchfemError(f"{path}: '{shown(given[0])}' is the pixel of a matrix of heights, and this file has "
-                            "columns; give their unit")
+        raise PatchfemError(f"{path}: '{shown(given[0])}' is the pixel size of a matrix of heights, but this file has "
+                            "columns; give the units of the columns")
     if len(head.named or head.row) < 2:
         raise PatchfemError(f"{path}:{head.number + 1}: one column, '{shown(head.row[0])}', where x and z are needed; "
                             f"{EXAMPLE}")

@@ -10,8 +10,8 @@ _WORDS |= {f"{prefix}{end}": factor for prefix, factor in (
     ("", 1.0), ("milli", 1e-3), ("micro", 1e-6), ("mikro", 1e-6), ("nano", 1e-9))
     for end in ("meter", "meters", "metre", "metres")}
 LISTED = ", ".join(UNITS)
-GIVE = 'give profile or compare the units, --units "mm,um" (in Python units=("mm", "um"))'
-PIXEL = 'give its pixel in place of the unit of x, --units "0.8 um,um"'
+GIVE = 'state the units of x and z, --units "mm,um" (in Python units=("mm", "um"))'
+PIXEL = 'give the pixel size in place of the unit of x, --units "0.8 um,um"'
 
 ASIDE = "the file has its own units; the given ones are ignored"
 

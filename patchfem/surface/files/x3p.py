@@ -66,7 +66,7 @@ def _surface(path, columns: list, axes: list, shape: tuple, listed: bool, notes:
         places.append(next(own) if axis[0] == "A" else index * axis[2] + axis[3])
     there = np.isfinite(places[0]) & np.isfinite(places[1])
     if there.sum() < 2:
-        raise PatchfemError(f"{path}: {there.sum()} points with a place; a trace needs at least two")
+        raise PatchfemError(f"{path}: {there.sum()} points with coordinates; a trace needs at least two")
     return raster(path, [one[there] for one in (*places, columns[-1])], None, (1.0, 1.0, 1.0), METRES)
 
 

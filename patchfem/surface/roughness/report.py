@@ -21,7 +21,7 @@ from .spectrum import BAND, amplitude_of, refuse_band, spectrum_of
 from .tip import Tip, tip_check
 
 FEWEST = 16  # samples of a trace with a report
-UNTOLD = "one trace gives no interval for it"
+UNTOLD = "a single trace gives no interval for this parameter"
 UNEVEN = "the heights are not Gaussian, which intervals of one trace assume; use the scatter of several traces"
 CUTOFFS = (25e-6, 80e-6, 250e-6, 800e-6, 2.5e-3, 8e-3, 25e-3)  # [m] of ISO 21920-3, and one more at each end
 SECTIONS = 6  # cut-offs in a trace: five that count and one that the filter takes
@@ -146,7 +146,8 @@ def windowed(surface: Profile | Areal, *ends: float) -> Profile | Areal:
     scan = isinstance(surface, Areal)
     if len(ends) != (4 if scan else 2):
         raise PatchfemError(f"{surface.source}: a window of " + (
-            "an areal scan needs four places, from and to in x, from and to in y" if scan else "a trace is two places"))
+            "an areal scan needs four "
+            "positions: from and to in x, from and to in y" if scan else "a trace needs two positions: from and to"))
     parts = [_between(surface.source, axis, *ends[2 * k:2 * k + 2], "xy"[k] if scan else "")
              for k, axis in enumerate((surface.x, surface.y) if scan else (surface.x,))]
     axes = {name: getattr(surface, name)[one] for name, one in zip("xy", parts)}
@@ -157,8 +158,8 @@ def _between(source: str, axis, first: float, last: float, name: str) -> slice:
     near = 1e-6 * float(axis[-1] - axis[0]) / (axis.size - 1)
     if not first < last or first < axis[0] - near or last > axis[-1] + near:
         what = f"scan runs in {name}" if name else "trace runs"
-        raise PatchfemError(f"{source}: a window from {say(first)} to {say(last)}; the {what} from {say(axis[0])} to "
-                            f"{say(axis[-1])}")
+        raise PatchfemError(f"{source}: the window runs from {say(first)} to {say(last)}, but the {what} from "
+                            f"{say(axis[0])} to {say(axis[-1])}")
     low, high = (max(int(np.searchsorted(axis, at + near, "right")) - 1, 0) for at in (first, last))
     return slice(low, high + 1)
 

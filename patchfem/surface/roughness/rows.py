@@ -70,10 +70,10 @@ _BASE = (  # name without its letter
      lambda heights: float(heights.z.max() - heights.z.min()), "extreme"),
     ("sk", "1", "skewness: mean cube of the heights over the cube of their root mean square",
      lambda heights: moment(heights, 3), "shift"),
-    ("ku", "1", "kurtosis: mean fourth power of the heights over that of their root mean square, 3 for a Gaussian "
-     "surface", lambda heights: moment(heights, 4), "ratio"),
-    ("Sm", "m", "mean length of a hill with its neighbouring dale; those lower than 10 % of the height from valley to "
-     "peak or, with a cut-off, narrower than 1 % of it do not count", mean_spacing, "ratio"),
+    ("ku", "1", "kurtosis: mean fourth power of the heights over the fourth power of their root mean square, 3 for a "
+                "Gaussian surface", lambda heights: moment(heights, 4), "ratio"),
+    ("Sm", "m", "mean length of a hill with its neighbouring dale; hills and dales lower than 10 % of the height from "
+                "valley to peak or, with a cut-off, narrower than 1 % of it do not count", mean_spacing, "ratio"),
     ("dq", "1", "root mean square of the slope between neighbouring samples (two points)", _slope, "slope"),
     ("k", "m", "core height: drop, from 0 to 100 %, of the straight line through the flattest 40 % of the Abbott curve",
      _core("core"), "ratio"),
@@ -142,8 +142,8 @@ AREAL = (
               "its two pairs of triangles", developed, ""),
     Parameter("Sal", "m", "autocorrelation length: shortest distance at which the autocorrelation falls to 0.2",
               shortest, ""),
-    Parameter("Str", "1", "texture aspect ratio: Sal over the longest distance of the same kind, 1 if "
-              "isotropic", aspect, ""),
+    Parameter("Str", "1", "texture aspect ratio: Sal divided by the longest distance at which the autocorrelation "
+                          "falls to 0.2; 1 if isotropic", aspect, ""),
     Parameter("Std", "rad", "texture direction: angle from x, anticlockwise, of the waves with the most power; the lay "
                             "is at right angles to it", direction, ""),
     Parameter("Sk", "m", "core height: drop, from 0 to 100 %, of the least-squares line through the flattest 40 % of "

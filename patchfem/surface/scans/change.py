@@ -13,9 +13,9 @@ from .search import CLEAR, variant
 from .track import ScanTrack, track_of
 from .volumes import Volumes, measured, nothing
 
-SHIFT = "shift along {}: position in the scan after the wear minus that in the scan before it, which is rotated "\
-    "about its middle"
-ROTATION = "rotation of the scan after the wear relative to the scan before it, anticlockwise"
+SHIFT = ("shift along {}: position in the second scan (after wear) minus position in the first, after rotation about "
+         "the middle of the first")
+ROTATION = "rotation of the second scan (after wear) relative to the first, anticlockwise"
 ALIKE = 0.95  # correlation of the unworn heights of both scans, from which on they show the same place
 LIKELY = 0.98  # the same where the search is no clearer than chance, as on a lay that repeats itself
 SPECK = 12.0, 48.0, 192.0  # noises that a speck of the depths jumps by
@@ -24,11 +24,11 @@ DIGITS = 4
 WORN, NONE = "worn", "no wear shown"
 GREW = "material grew, or the files are in the wrong order"
 ELSEWHERE = "not comparable place by place"
-HIDDEN = "mean depth of even or wedge-shaped wear that the scans cannot show"
+HIDDEN = "mean depth of uniform or wedge-shaped wear that the scans cannot show"
 OPEN = "changed: worn on one part or grown on another"
 EITHER = "two parts of the scans each agree up to a plane, and either may be unworn"
-UNSURE = "the scans agree up to a plane: even or wedge-shaped wear would look the same"
-GROWN = "apart from what grew, the scans agree up to a plane: even or wedge-shaped wear would look the same"
+UNSURE = "the scans agree up to a plane: uniform or wedge-shaped wear would look the same"
+GROWN = "apart from what grew, the scans agree up to a plane: uniform or wedge-shaped wear would look the same"
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,11 +135,11 @@ def without_spikes(scan: Areal) -> tuple:
 
 
 def hidden(one: Change) -> Quantity:
-    """Why no number tells what even wear or a wedge may hide."""
+    """Why no number tells what uniform wear or a wedge may hide."""
     if one.volumes is None:
         return refused("m", HIDDEN, one.why)
     carried = one.volumes.values["worn_volume"].low > 0
-    return refused("m", HIDDEN, "unworn parts carry the registration" if carried else _unshown(one.volumes))
+    return refused("m", HIDDEN, "unworn parts are used for the alignment" if carried else _unshown(one.volumes))
 
 
 def _unshown(found: Volumes) -> str:
@@ -171,19 +171,20 @@ def sentences(one: Change) -> list:
                    f"{_length(values['worn_depth_max'])} at the deepest place.")
         out += _unseen(one)
     elif one.volumes.open:
-        out.append(f"It is not known which part is unworn: {EITHER}. If the first is unworn, up to {_most(worn)} "
-                   f"wore off the second; if the second is unworn, up to {_most(grown)} grew on the first. To "
-                   "settle it, scan farther beyond the rubbed part.")
+        out.append(f"It is not known which part is unworn: {EITHER}. If the first is unworn, up to {_most(worn)} wore "
+                   f"off the second; if the second is unworn, up to {_most(grown)} grew on the first. To find out, "
+                   "scan farther beyond the rubbed part.")
     else:
-        out.append("Worn volume: none shown. Even wear of any depth, and wedge-shaped wear that the mounting levelled "
-                   "out, would look the same; to settle it, scan an unworn part beside the rubbed one both times.")
+        out.append("Worn volume: none shown. Uniform wear of any depth, and wedge-shaped wear that the mounting "
+                   "levelled out, would look the same; to find out, scan an unworn part beside the rubbed one both "
+                   "times.")
     out += [] if one.track is None or one.track.why else [_track(one.track)]
     if grown.low > 0:
-        out.append(f"{_volume(grown)} of material lie above the scan before: pile-up or deposits"
+        out.append(f"{_volume(grown)} of material lie above the first scan (before wear): pile-up or deposits"
                    + (", or the two files are in the wrong order." if headline(one) == GREW else "."))
     share = 100 * float(one.found.used.sum()) / max(float(np.isfinite(one.found.depth).sum()), 1.0)
     out.append(f"Depths are measured from the {share:.0f} % of the heights that agree up to a plane within "
-               f"{say(REACH * one.found.noise, 3)}; if these wore evenly or as a wedge too, all depths are larger "
+               f"{say(REACH * one.found.noise, 3)}; if these wore uniformly or as a wedge too, all depths are larger "
                "by that wear.")
     if one.found.other is not None and not one.volumes.open:
         out.append("Another part of the scans may be unworn instead, as where two planes meet in an edge; the "
@@ -213,9 +214,9 @@ def _track(one: ScanTrack) -> str:
 def _ways(one: Change) -> list:
     out, guess = [], one.found.guess
     if guess.mirrored:
-        out.append(f"The scan after the wear is mirrored: its {guess.mirrored} counts from the other end.")
+        out.append(f"The second scan (after wear) is mirrored: its {guess.mirrored} counts from the other end.")
     if abs(abs(one.registration["rotation"].value) - np.pi) < 0.2:
-        out.append("The scan after the wear is rotated by 180 degrees.")
+        out.append("The second scan (after wear) is rotated by 180 degrees.")
     if guess.turned:
         out.append("The heights of both scans have opposite signs: one was inverted so that more wears than "
                    "grows; check in which file heights point into the material.")
@@ -226,7 +227,7 @@ def over(one: Change) -> str:
     """What was mirrored or turned over, for the headline."""
     guess = one.found.guess if one.found is not None else None
     words = [] if guess is None else ["mirrored"] * bool(guess.mirrored) + ["turned over"] * guess.turned
-    return f"one scan is {' and '.join(words)} against the other" if words else ""
+    return f"one scan is {' and '.join(words)} relative to the other" if words else ""
 
 
 def _most(one: Quantity) -> str:

@@ -23,20 +23,21 @@ TOGETHER = 3.0  # neighbouring depths of a section that err alike, as between sa
 ENDS = 0.5  # of the median lost area, where a track ends along its direction
 TEXTS = {  # name: (unit, definition)
     "direction": ("rad", "of the track, measured anticlockwise from x, by the gradients of the depths"),
-    "from": ("m", "position across the track at which it begins, from the middle of the scan before the wear, positive "
-                  "to larger x or y"),
-    "to": ("m", "position across the track at which it ends"),
+    "from": ("m", "position across the track at which the track begins, measured from the middle of the first scan, "
+                  "positive to larger x or y"),
+    "to": ("m", "position across the track at which the track ends"),
     "width": ("m", "width of the track"),
-    "depth_mean": ("m", "lost area of a section over its width"),
+    "depth_mean": ("m", "area lost in a section divided by the width"),
     "depth_floor": ("m", "floor: bottom of the parabola through the deepest fifth of a section"),
     "step": ("m", "step: mean depth over the middle third of the width, as of a groove in ISO 5436-1, type A1"),
     "area_net": ("m2", "lost area less pile-up"),
     "area_gross": ("m2", "area lost in a section"),
-    "pile_up": ("m2", "pile-up: area above the scan before, within one track width of the track, both sides together"),
+    "pile_up": ("m2", "pile-up: area above the first scan (before wear), within one track width of the track, both "
+                      "sides together"),
     "pile_up_left": ("m2", "pile-up at the side of smaller x or y"),
     "pile_up_right": ("m2", "pile-up at the side of larger x or y"),
     "length": ("m", "length of the track, between the places at which the lost area is half of its median"),
-    "volume": ("m3", "lost area of the mean section times the length")}
+    "volume": ("m3", "area lost in the mean section times the length of the track")}
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,9 +23,9 @@ UNDER = 0.7  # of the slow errors of the scans beside a worn part, what they are
 TOGETHER = 3.0  # the noise of a volume over that of independent heights
 FEW = 0.25  # of a square, at least, is known
 WORN = {"worn_volume": "volume lost, over the region that both scans show",
-        "grown_volume": "volume that stands above the scan before: pile-up, deposits",
+        "grown_volume": "volume that stands above the first scan (before wear): pile-up, deposits",
         "worn_share": "share of the common region that wore",
-        "worn_depth_mean": "worn volume over the common region",
+        "worn_depth_mean": "worn volume divided by the area of the common region",
         "worn_depth_max": "largest worn depth, as the median of 3 x 3 measured heights"}
 BOTH = "worn_volume", "grown_volume"
 

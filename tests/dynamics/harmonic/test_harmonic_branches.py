@@ -66,7 +66,7 @@ def test_exact_a_pitchfork_is_a_crossing():
 
 
 def test_refuses_a_start_off_every_branch():
-    with pytest.raises(NotConverged, match="no first point"):
+    with pytest.raises(NotConverged, match="no first motion"):
         follow(lambda x, p: (x**2 + 1 + p**2, np.diag(2 * x), np.array([2 * p])), [0.3], 0.5, (0.0, 1.0))
 
 

@@ -144,7 +144,7 @@ def test_exact_counts_of_complex_and_even_functions(tmp_path):
 
 
 @pytest.mark.parametrize("words, code, says", [
-    (["-o", "a.uff", "--frame", "1"], 2, "used for fields"), (["-o", "a.vtu", "--histories"], 2, "not as .vtu"),
+    (["-o", "a.uff", "--frame", "1"], 2, "used only with fields"), (["-o", "a.vtu", "--histories"], 2, "not as .vtu"),
     (["-o", "nowhere/a.uff"], 4, "cannot be written"), (["-o", "nowhere/a.mat"], 4, "cannot be written"),
     (["-o", "a.xlsx"], 2, "histories and loops as .uff")])
 def test_refuses_exports_of_histories_by_name(bench, tmp_path, monkeypatch, words, code, says):

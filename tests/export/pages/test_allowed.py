@@ -108,7 +108,7 @@ def test_exact_nothing_that_moves_changes():
         "Tilt may reach 1 mrad (13 um over the patch): loop area changes by less than 5 %."
     assert sentence(limits({"loop_area": [1, 1.01, 1.02, 1.03, 0.96]}, trusted=[1, 1, 1, 1, 0])) == (
         "Tilt may reach at least 0.5 mrad (6.4 um over the patch) before loop area changes by 5 %; the limit lies "
-        "beyond, where no case decides it.")
+        "beyond the cases that were computed.")
 
 
 def test_exact_a_measure_that_cannot_be_told_is_not_among_what_moves():

@@ -61,7 +61,7 @@ def test_exact_a_largest_value_on_the_edge_of_the_swept_frequencies_is_told():
 
     assert edge(130, 121) == (
         f"The largest relative displacement amplitude, {1e6 * curve(120, 121, 0.02):.4g} um, lies at drive.frequency "
-        "120 Hz, drive.acceleration 2 g, on the edge of the swept frequencies; it may be larger beyond.")
+        "120 Hz, drive.acceleration 2 g, at the edge of the swept frequencies; it may be larger outside this range.")
     assert edge(100, 95) == ""
 
 
@@ -120,7 +120,7 @@ def test_always_a_scatter_that_unsettled_cases_hide_is_not_told():
     some = found | {"equivalent_damping": ("1", np.array([0.1, 0.2, 0.3]), 40, 3)}  # those that stick have none
     assert ranked.scatter(some, 100).startswith("40 of 100 random cases have not settled")
     assert ranked.scatter(some, 60).endswith("an equivalent damping from 0.1 to 0.3 (in the 40 that have one; 3 of 40 "
-                                             "miss the tolerance and count with their values).")
+                                             "miss the tolerance and are included with their values).")
 
 
 def test_exact_quantiles_are_those_of_all_cases_that_have_a_value():
@@ -132,7 +132,7 @@ def test_exact_quantiles_are_those_of_all_cases_that_have_a_value():
     unit, ends, count, misses = found["loop_area"]
     assert (unit, count, misses) == ("J", 40, 12)
     assert ends == pytest.approx(np.quantile(np.arange(1.0, 41), (0.05, 0.5, 0.95)))
-    assert "(12 of 40 miss the tolerance and count with their values)" in ranked.scatter(found, 41)
+    assert "(12 of 40 miss the tolerance and are included with their values)" in ranked.scatter(found, 41)
     assert "40 of 41 random cases that have a value" in ranked.scatter(found, 41, False)
 
 
@@ -152,4 +152,4 @@ def test_static_cases_are_not_said_to_move():
     """Of patches that only miss the tolerance nothing has to settle."""
     ranks = {"pressure_peak": [Share("contact.load", 0.8, 0.9, 0.8, 1.0)]}
     assert ranked.sentence(ranks, 3, False).endswith("; 3 cases that miss the tolerance are included.")
-    assert ranked.sentence(ranks, 3).endswith("; 3 cases that have not settled are included as they ended.")
+    assert ranked.sentence(ranks, 3).endswith("; 3 cases that have not settled are included with their last values.")

@@ -129,7 +129,7 @@ def test_refuses_a_measurement_beside_sweeps_or_without_a_channel(tmp_path):
     with pytest.raises(PatchfemError, match="none of time, displacement, acceleration, force in it"):
         report_of([folder], tmp_path / "x.html", tmp_path / "table.csv")
     (tmp_path / "sweep.csv").write_text("")
-    with pytest.raises(PatchfemError, match="plotted over runs, not over sweeps"):
+    with pytest.raises(PatchfemError, match="plotted only over runs, not over sweeps"):
         report_of([tmp_path], tmp_path / "x.html", tmp_path / "table.csv")
 
 

@@ -180,14 +180,14 @@ def test_exact_engine_of_a_scene(tmp_path):
 def test_refuses_engines_that_cannot_sum_the_law(tmp_path):
     with pytest.raises(scene.SceneError, match=r"accuracy\.quadrature.*order = 1"):
         rig(tmp_path, "recursion")
-    with pytest.raises(scene.SceneError, match=r"accuracy\.quadrature: 'exponential' is gone.*use 'merged'"):
+    with pytest.raises(scene.SceneError, match=r"accuracy\.quadrature: 'exponential' was removed.*use 'merged'"):
         rig(tmp_path, "exponential")
 
 
 def test_exact_warning_of_energy_created(tmp_path):
     found = build(rig(tmp_path))
     assert created_warning(found, {"created": 2e-6, "dissipated": 1e-3}, 4) == [
-        'the printed law created 5e-07 J per cycle, 0.2 % of what it dissipated; set reading = "stretch", which '
-        "creates none"]
+        'the law as printed in the report created 5e-07 J per cycle, 0.2 % of what it dissipated; set reading = '
+        '"stretch", which creates none']
     assert created_warning(found, {"created": 0.0, "dissipated": 1e-3}, 4) == []
     assert created_warning(build(rig(tmp_path, reading="stretch")), {"created": 1.0, "dissipated": 1.0}, 4) == []

@@ -88,7 +88,7 @@ def test_exact_a_rig_with_spread_is_a_rig_of_less_friction(more):
 
 
 def test_refuses_spread_without_a_width_and_for_laws_without_bonds():
-    with pytest.raises(SceneError, match=r"normal.width: missing.*friction.spread needs it"):
+    with pytest.raises(SceneError, match=r"normal.width: missing.*friction.spread needs this key"):
         loads(POINT + LONGER + TRIANGLE, sets=SPREAD)
     for law in ("coulomb", "tanh", "elastic-plastic"):
         with pytest.raises(SceneError, match=f"friction.spread: law '{law}' has no spread") as caught:

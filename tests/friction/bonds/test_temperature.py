@@ -184,7 +184,7 @@ def test_exact_rise_of_a_half_space_under_constant_heat(time, printed, within):
 
 def test_exact_the_rise_is_reported_beside_the_table_only():
     text = SMALL_PATCH + GROWING + WARM + TRIANGLE
-    lines = [w for w in run(plan(loads(text)), estimate=False).warnings if "would warm the face" in w]
+    lines = [w for w in run(plan(loads(text)), estimate=False).warnings if "would raise the surface temperature" in w]
     assert len(lines) == 1 and "in a cycle" in lines[0] and "the run keeps" in lines[0]
     found = run(plan(loads(SMALL_PATCH + GROWING + TRIANGLE)), estimate=False)
     assert not any("warm" in w for w in found.warnings)

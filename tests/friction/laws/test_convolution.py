@@ -292,7 +292,7 @@ def test_refuses_an_uneven_pressure_on_a_rig():
     (SHORT, ["contact.tilt.on=lower"], "'lower' in a rig with law 'convolution'"),
     (SLIDE, ["contact.strips.count=4"], "contact.strips: not supported yet with law 'convolution'"),
     (SLIDE, ["friction.order=-1"], "friction.order: must be > -1, not -1"),
-    (SLIDE, ["friction.kinetic=0.2"], "a kinetic one exists for coulomb, nonlocal and lugre")])
+    (SLIDE, ["friction.kinetic=0.2"], "laws with a kinetic coefficient are coulomb, nonlocal and lugre")])
 def test_refuses_what_the_averaged_law_cannot_do(text, sets, says):
     more = [one.replace(SHEAR, "contact.shear={}") for one in sets]
     with pytest.raises(SceneError, match=says):

@@ -123,7 +123,7 @@ def test_refuses_what_the_law_cannot_do():
     assert "friction.chi" in only(scene, "friction.chi=0.1") and "friction.chi" in only(scene, "friction.chi=-1")
     assert "5e6 N/m" in only(scene, "friction.stiffness=3")
     assert "static > 0 is needed" in only(scene, "friction.static=0")
-    assert "a kinetic one exists for coulomb" in only(scene, "friction.kinetic=0.2")
+    assert "laws with a kinetic coefficient are coulomb" in only(scene, "friction.kinetic=0.2")
     sliding = '[slide]\nkind = "sine"\namplitude = "1 um"\nfrequency = "1 Hz"\n'
     held = '[friction]\n' + LAW + sliding
     assert "'iwan' with [contact.shear]" in only(COATED + "[contact.shear]\n" + held)

@@ -23,9 +23,9 @@ contains the exact value of the model. A warning appears if the error exceeds to
 values end at the second digit of their error. A value that is printed without an error is exact to its last digit. A
 value that is 0 within its floor is printed as 0.
 
-Measures of a motion refer to the window: the last ten cycles, or the last tenth of a shorter run. A number at the end
-of a name counts the interfaces, or the strips if they slide separately: `slip_amplitude_2` is that of the second. The
-floor of a displacement is at most 1e-5 of the amplitude of the drive, a/omega^2.
+Measures of a motion refer to the window: the last ten cycles or the last tenth of the run, whichever is shorter. A
+number at the end of a name counts the interfaces, or the strips if they slide separately: `slip_amplitude_2` is the
+slip amplitude of the second. The floor of a displacement is at most 1e-5 of the amplitude of the drive, a/omega^2.
 """
 
     @classmethod

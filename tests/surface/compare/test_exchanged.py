@@ -79,4 +79,4 @@ def test_exact_a_place_near_zero_has_no_digits_that_the_far_one_lacks():
     places = tuple(end._replace(value=value) for end, value in zip(one.worn.extent.before, (76.58e-9, 7.9404e-3)))
     worn = replace(one.worn, extent=one.worn.extent._replace(before=places))
     text = next(text for text in verdicts([replace(one, worn=worn)])[1] if "Worn from x = " in text)
-    assert "Worn from x = 0 um to 7.94 mm of the trace before, that is from " in text
+    assert "Worn from x = 0 um to 7.94 mm in the first trace (before wear), that is from " in text

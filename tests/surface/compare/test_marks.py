@@ -190,7 +190,7 @@ def test_exact_a_valley_of_the_trace_after_alone_is_named():
     found = compared(before, Profile(after.x, frozen_array(after.z - cut), "after"))
     assert found.tracks.valley.place == pytest.approx(after.x[at], abs=25e-6)
     assert found.tracks.valley.depth == pytest.approx(6 * UM, abs=0.5 * UM)
-    assert any(" is in the trace after only" in one for one in verdicts([found])[1])
+    assert any(" is only in the second trace (after wear)" in one for one in verdicts([found])[1])
     both = Profile(before.x, frozen_array(before.z - cut), "before")
     assert compared(both, Profile(after.x, frozen_array(after.z - cut), "after")).tracks.valley is None
 

@@ -183,8 +183,8 @@ def test_exact_a_matrix_of_which_only_the_pixel_is_known(tmp_path):
     is_scan(found, (0.8e-6, 0.8e-6), z * 1e-9)
     sized = read(tmp_path, f"# Width: 4 um\n# Height: 3 um\n{rows}", ("0.8 um", "nm"))
     is_scan(sized, (0.8e-6, 0.8e-6), z * 1e-9)
-    assert len(sized.notes) == 2 and "the given pixel, 0.8 um, is used" in sized.notes[0]
-    for text, units, said in ((PAIRS, ("0.8 um", "nm"), "is the pixel of a matrix"),
+    assert len(sized.notes) == 2 and "the given pixel size, 0.8 um, is used" in sized.notes[0]
+    for text, units, said in ((PAIRS, ("0.8 um", "nm"), "is the pixel size of a matrix"),
                               (rows, ("-1 um", "nm"), "unknown unit '-1 um'"), (rows, ("0.8 um", "2 nm"), "unknown")):
         with pytest.raises(PatchfemError, match=said):
             read(tmp_path, text, units)
@@ -198,7 +198,7 @@ CURES = {  # what is refused, what is said, the same text after the remedy, the 
                   "# Width: 4 um\n# Height: 0.8 mm\n# Value units: um\n" + ROWS, None),
     "no unit of the heights": ("# Width: 4 um\n# Height: 3 um\n" + ROWS, "whose unit is not given; write `# Value",
                                "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS, None),
-    "no unit, but given": ("# Width: 4\n# Height: 3\n" + ROWS, 'or give profile or compare the units, --units "mm,um"',
+    "no unit, but given": ("# Width: 4\n# Height: 3\n" + ROWS, 'or state the units of x and z, --units "mm,um"',
                            "# Width: 4\n# Height: 3\n" + ROWS, ("mm", "um")),
     "a width without unit": ("# Width: 4\n# Height: 3\n# Value units: um\n" + ROWS, "the unit of its width and height, "
                              "'', is not known; write", "# Width: 1.2 mm\n# Height: 0.8 mm\n# Value units: um\n" + ROWS,

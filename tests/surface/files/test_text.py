@@ -110,7 +110,7 @@ def test_exact_rounded_x_is_evened(tmp_path, step):
         assert profile.notes == ()
 
 
-GIVE = 'or give profile or compare the units, --units "mm,um" (in Python units=("mm", "um"))'
+GIVE = 'or state the units of x and z, --units "mm,um" (in Python units=("mm", "um"))'
 REFUSED = {
     "": "{path}: the profile is empty",
     "\ufeff \n\n": "{path}: the profile is empty",

@@ -146,12 +146,13 @@ def test_exact_areal_parameters_of_white_noise(lost):
 
 @pytest.mark.parametrize("surface, more, says", [
     (made(10), {}, "made.csv: 10 samples; parameters need at least 16"),
-    (made(), {"window": (20 * UM, 10 * UM)}, "a window from 20 um to 10 um; the trace runs from 0 um to 4 mm"),
-    (made(), {"window": (20 * UM, 5e-3)}, "a window from 20 um to 5 mm"),
+    (made(), {"window": (20 * UM, 10 * UM)}, "the window runs from 20 "
+                                             "um to 10 um, but the trace runs from 0 um to 4 mm"),
+    (made(), {"window": (20 * UM, 5e-3)}, "the window runs from 20 um to 5 mm"),
     (made(), {"cutoff": 5e-3}, "the trace is 4 mm long; half a cut-off of 5 mm is trimmed at each end"),
-    (scan(), {"window": (0.0, 1e-4)}, "a window of an areal scan needs four places"),
+    (scan(), {"window": (0.0, 1e-4)}, "a window of an areal scan needs four positions"),
     (scan(), {"window": (0.0, 1e-5, 2e-5, 1e-3)}, "the scan runs in y from 0 um to 79 um"),
-    (made(), {"window": (0.0, 1e-5, 2e-5, 1e-3)}, "a window of a trace is two places"),
+    (made(), {"window": (0.0, 1e-5, 2e-5, 1e-3)}, "a window of a trace needs two positions"),
     (scan(), {"cutoff": 1e-4}, "scan.txt: the shorter side is 79 um long; half a cut-off of 100 um is trimmed"),
 ])
 def test_refuses(surface, more, says):

@@ -111,7 +111,7 @@ def test_exact_a_scan_that_is_turned_half_round_is_found(grooved, worn):
 def test_always_even_wear_and_none_are_told_alike_and_have_no_depth(depth):
     found = change.changed(*scans(lambda x, y, z: depth + 0 * x))
     assert change.headline(found) == change.NONE
-    assert all(one.value is None and "even or wedge-shaped wear" in one.reason for one in found.values.values())
+    assert all(one.value is None and "uniform or wedge-shaped wear" in one.reason for one in found.values.values())
 
 
 def test_always_files_in_the_wrong_order_are_named(grooved):
@@ -271,7 +271,7 @@ def test_always_the_verb_tells_volumes_and_draws_maps(grooved, worn, tmp_path, c
     assert {"shift_x", "shift_y", "rotation", "mirrored", "turned"} <= set(data["registration"])
     assert data["removed"] == {"before": 0, "after": 0} and data["hidden_wear"]["reason"].startswith("unworn parts")
     page = (tmp_path / "out" / "report.html").read_text()
-    assert "registered to it" in page and 'id="line"' in page and "scans" in data_of(page)
+    assert "with which the second scan" in page and 'id="line"' in page and "scans" in data_of(page)
     found = worn
     files = [read_surface(tmp_path / "out" / f"difference.{end}") for end in ("x3p", "csv")]
     for one in files:

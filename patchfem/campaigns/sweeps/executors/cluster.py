@@ -52,7 +52,7 @@ class Cluster:
         try:
             self.client = distributed.Client(self.own or address, timeout=PATIENCE, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
-            raise Missing(f"{self.name}: no scheduler answers there ({error})") from None
+            raise Missing(f"{self.name}: no scheduler answers at this address ({error})") from None
         found = self.client.run(own_of, on_error="return")
         self.workers = max(len(found), 1)
         for own in found.values():
@@ -90,7 +90,7 @@ class Cluster:
                 self.own.close()
 
     def _lost(self) -> Missing:
-        return Missing(f"{self.name}: its scheduler is lost")
+        return Missing(f"{self.name}: the connection to the scheduler is lost")
 
     def _other(self, found: dict | Exception, want: dict) -> Missing:
         """Why a worker cannot answer: what it said of itself, or how it failed to, beside what is wanted."""
@@ -100,7 +100,8 @@ class Cluster:
         names = [name for name in want if found[name] != want[name] and name != "files"]
         there, here = (", ".join(f"{name} {one[name]}" for name in names) for one in (found, want))
         if names:
-            return Missing(f"{self.name}: a worker has {there}; here it is {here}: install the same version there")
+            return Missing(f"{self.name}: a worker has {there}, this machine has {here}: install the same version on "
+                           "both")
         return Missing(f"{self.name}: a worker reads different files under the names in the scene; put the files where "
                        "all machines read them")
 
@@ -110,7 +111,8 @@ class Cluster:
             raise self._lost()
         error = future.exception()
         killed = type(error).__name__ == "KilledWorker"
-        return 0.0, Died("its worker died" if killed else f"its worker failed ({type(error).__name__}: {error})")
+        return 0.0, Died("its worker died" if killed else f"the worker of this case failed ({type(error).__name__}: "
+                                                          f"{error})")
 
 
 @cache

@@ -67,7 +67,7 @@ class Worker:
         try:
             seconds, found = self.pipe.recv()
         except (EOFError, OSError):
-            seconds, found = 0.0, Died(f"its process died ({_how(self.process.wait())})")
+            seconds, found = 0.0, Died(f"the process of this case died ({_how(self.process.wait())})")
         chunk, self.chunk = self.chunk, None
         return chunk, seconds, found
 

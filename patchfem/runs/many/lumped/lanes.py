@@ -91,7 +91,7 @@ def no_lanes(model: Model) -> str:
 def asks_more(model: Model) -> str:
     """Why the accuracy that a model asks for is not that of lanes; "" where it is."""
     if model.accuracy.method != "auto" or pinned(model.accuracy) or model.accuracy.tolerance < TIGHTEST:
-        return "it asks for another method, or for an accuracy beyond that of a batch"
+        return "the case asks for another method, or for an accuracy beyond that of a batch"
     return ""
 
 

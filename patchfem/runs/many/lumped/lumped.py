@@ -25,7 +25,7 @@ def not_one_point(model: Model) -> str:
     """Why a model is not one mode under one sine behind a point under a constant load; "" where it is."""
     rig = model.rig
     if model.kind != "rig" or model.patch is not None or model.wear is not None or unread(model):
-        return "it is not one lumped contact, or its table of measured responses cannot be read"
+        return "the case is not one lumped contact, or its table of measured responses cannot be read"
     if model.heat is not None or rig.load_varies or rig.names or rig.bends or len(rig.interfaces) != 1 \
             or not model.point.load > 0:
         return "its interface is not one point under a constant load"
@@ -39,7 +39,7 @@ def not_one_sine(rig) -> str:
     if rig.richer is not None:
         return "its structure is reduced"
     if rig.modes.omega.size != 1 or not isinstance(rig.drive, BaseSine) or rig.levels:
-        return "it is not one mode under one sine"
+        return "the case is not one mode under one sine"
     if np.isfinite(rig.travel):
         return "its motion may reach a stop, or may gain energy"
     if rig.cycles != int(rig.cycles) or not rig.modes.base[0] or not rig.modes.slide[0] or not rig.modes.output[0]:
