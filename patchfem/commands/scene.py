@@ -142,8 +142,8 @@ def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"],
     """
     found = model_of(scene, set_)
     if found.patch is None:
-        raise Refused(f"{scene}: missing [contact]: only a scene with a patch has a mesh; write that of an interface "
-                      "as the [contact] of a scene of its own")
+        raise Refused(f"{scene}: missing [contact]: only a scene with a patch has a mesh; write the patch of an "
+                      "interface as the [contact] of a separate scene")
     low, high = result.bodies(found)
     mesh_files.write_mesh(low, out, high)
     for name, body in (("lower", low), ("upper", high or low)):

@@ -69,9 +69,8 @@ def test_exact_wear_of_the_coefficient_leaves_the_stiffness():
 
 
 @pytest.mark.parametrize("sets, key, says", [
-    (["friction.bond_length=1 um"], "friction.stiffness", "in place of bond_length; leave one of them out"),
-    (["normal.amplitude=3 N", "normal.frequency=50 Hz"], "friction.stiffness", "give bond_length in place "
-                                                                               "of stiffness"),
+    (["friction.bond_length=1 um"], "friction.stiffness", "in place of bond_length; leave one of the two out"),
+    (["normal.amplitude=3 N", "normal.frequency=50 Hz"], "friction.stiffness", "give bond_length in"),
     (["normal.grooves.wavelength=80 um", "normal.grooves.amplitude=1 um"], "friction.stiffness", "give bond_length"),
     (["friction.static=0"], "friction.static", "static > 0 is needed")])
 def test_refuses_a_stiffness_that_is_not_one(sets, key, says):
