@@ -196,15 +196,15 @@ def key_rows(name: str) -> list:
     """The keys of the effect: of a table all of them, of a value those that it needs and may have."""
     table, key, value = table_of(name)
     if name == "sweep":
-        return ["Its keys are dotted keys of the scene in quotes. A value is a list, or a range with its number of "
-                "values."]
+        return ["The keys of this table are dotted keys of the scene in quotes. A value is a list, or a range with its "
+                "number of values."]
     model = TABLES[table]
     used = keys_page.NEEDS.get(f"{table}.{key}", {}).get(value, ("", ""))
     named = [key, *" ".join(used).split()] if value else list(keys(model))
     rows = [keys_page._row(model, one, table) for one in named
             if one in keys(model) and not keys_page._is_table(model, keys(model)[one])]
     head = ("key", "kind", "default", "required", "meaning")
-    return [keys_page.grid(head, rows)] if rows else ["It has no keys."]
+    return [keys_page.grid(head, rows)] if rows else ["This effect has no keys."]
 
 
 def limits(name: str) -> list:
@@ -223,7 +223,7 @@ def limits(name: str) -> list:
     rows = [(", ".join(dict.fromkeys(words)), sentence) for sentence, words in said.items()]
     more = "[Limits](../../../../patchfem/scene/LIMITS.md) has the bounds of all numbers and what the models neglect."
     return [*([keys_page.grid(("not with", "message"), rows)] if rows else
-              ["It can be combined with every other effect that its scene can hold."]), more]
+              ["This effect can be combined with every other effect that the scene can have."]), more]
 
 
 def beside(name: str, other: str) -> list:
