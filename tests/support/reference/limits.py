@@ -76,9 +76,9 @@ changes only through the table `[wear.friction]`, for the patch as a whole. Betw
 assumed to repeat its last cycle. Strips that yaw slide and wear along x only; a note says how far the ends of the patch
 move across x.
 
-**Errors.** Stated errors are estimates from coarser runs that contain the true numerical error in about 19 of 20
-scenes. Stated errors do not include what the model neglects. A step in the gap makes the pressure peak infinite, so
-that any number for it would depend on the mesh.
+**Errors.** Stated errors are estimates from coarser runs. The true numerical error is smaller than the stated error in
+about 19 of 20 scenes. Stated errors do not include what the model neglects. A step in the gap makes the pressure peak
+infinite, so that any number for it would depend on the mesh.
 
 **Harmonic balance, Duhamel, Newmark, Euler.** These methods serve for comparison. Harmonic balance finds only periodic
 motions. The other three support one force per interface and linear modes.
