@@ -89,7 +89,7 @@ def test_refuses_a_stiffness_that_is_not_positive_definite():
 @pytest.mark.parametrize("ratio, coating", [(1e12, 1e-8), (1e17, 1e-4)])
 def test_refuses_a_coating_that_is_beyond_the_arithmetic(ratio, coating):
     layers = Layers((TITANIUM[0] * ratio, CARBIDE[1]), TITANIUM, "strain")
-    with pytest.raises(NotConverged, match=r"Young's moduli of coating and substrate differ .* leave it out"):
+    with pytest.raises(NotConverged, match=r"Young's moduli of coating and substrate differ .* leave the coating out"):
         interface_compliance(piece_of(graded_grid(12.7e-3, 6.35e-3, 2e-4, coating), layers))
 
 
