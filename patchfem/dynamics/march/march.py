@@ -568,8 +568,8 @@ class Run:
         """Mark the run not_converged when a step missed its residual; what was computed is kept."""
         if self.ledger[7]:
             self.outcome = Outcome.NOT_CONVERGED
-            self.message = (f"{int(self.ledger[7])} of {self.done} steps did not reach the force residual {GOAL:.0e} "
-                            "of the friction limit; raise accuracy.steps_per_cycle")
+            self.message = (f"{int(self.ledger[7])} of {self.done} steps did not reach the required force accuracy of "
+                            f"{GOAL:.0e} of the friction limit; raise accuracy.steps_per_cycle")
 
     def watched(self, rows) -> tuple:
         """Slide rates (k, i) [m/s] and slips (k, i) [m] of the interfaces in booked rows."""

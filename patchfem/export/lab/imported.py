@@ -95,7 +95,7 @@ def _response(file: Path, out: Path, asked, how: Estimate) -> dict:
     found, step, drive, response = measured.estimated(values, _segment(how.segment), _window(how.window))
     write.write_response(out, found, drive, response)
     return {"lines": found.frequency.size, "segments": found.segments, "window": found.window, "notes": notes,
-            "told": f"{response} over {drive}, {found.frequency.size} lines from {found.segments} segments of "
+            "told": f"{response} over {drive}, {found.frequency.size} frequencies from {found.segments} segments of "
                     f"{found.segment * step:.4g} s, window {found.window}"}
 
 

@@ -211,7 +211,7 @@ def _differences(runs: list, names: list) -> str:
     if not keys:
         return "<p>Nothing: the resolved scenes are the same.</p>"
     rows = [[escape(key), *(_written(one.get(key)) for one in flat)] for key in keys]
-    return ("<p class=soft>Keys of the resolved scenes whose values are not the same everywhere, in SI.</p>"
+    return ("<p class=soft>The table lists the keys whose values differ between the resolved scenes, in SI.</p>"
             + table(("key", *map(escape, names)), rows))
 
 

@@ -208,7 +208,7 @@ def summed_words(model: Model, numerics) -> list:
 
 def _held_words(model: Model) -> str:
     """How bonds hold the block whose list of them grows."""
-    turns = "it reverses in almost every step, and each reversal makes the list of bonds longer"
+    turns = "the block reverses in almost every step, and each reversal makes the list of bonds longer"
     if lists.stalls(model):
         return ("the law as printed in the report keeps the block from sliding from its release on, so that the block "
                 "vibrates on its bonds or reverses in almost every step; the estimate is for the slowest case")

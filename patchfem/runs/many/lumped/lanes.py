@@ -84,7 +84,7 @@ def no_lanes(model: Model) -> str:
     if not SHORTEST <= model.rig.cycles <= LONGEST or not model.friction.static > 0:
         return "its cycles are too few or too many, or it has no friction"
     if model.friction.law not in KINDS:
-        return "its law has no batch form"
+        return "its law cannot be computed for many cases at once"
     return _manifold(model.friction) or asks_more(model)
 
 
