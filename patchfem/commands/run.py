@@ -100,4 +100,7 @@ def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
         place = shlex.quote(str(target))
         print(f"fields: {target / 'fields.vtkhdf'} for ParaView 5.13 or newer; for older versions run `patchfem export "
               f"{place} -o {shlex.quote(str(target / 'fields.pvd'))}`")
+    if inside := sorted(target.glob("interfaces/*")):
+        print(f"fields: of every interface in {target / 'interfaces'}; show them by `patchfem view "
+              f"{shlex.quote(str(inside[0]))}`")
     sys.stdout.flush()

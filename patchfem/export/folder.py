@@ -15,7 +15,7 @@ from . import netcdf, shown
 from .fields import bodies as body_fields
 from .histories import contents
 from .pages import player
-from .results import PAGE, STATE, Folder
+from .results import INTERFACES, MOST, PAGE, STATE, Folder
 from .summary import summary_of, write_json
 
 
@@ -73,6 +73,13 @@ def write(result: Result, path: Path) -> Written:
     netcdf.write(contents(result), path / "result.nc")
     if result.patch is not None:
         bodies = body_fields.write_fields(result, path / "fields.vtkhdf")
+    for face in result.extra.get("faces", ())[:MOST]:
+        place = path / INTERFACES / face.folder
+        place.mkdir(parents=True, exist_ok=True)
+        own = replace(result, plan=replace(result.plan, model=face.model), patch=face.patch, fields=face.fields,
+                      extra={})
+        body_fields.write_fields(own, place / "fields.vtkhdf")
+        result.extra["notes"] += [f"interface {face.name}: {text}" for text in own.extra["notes"]]
     result.seconds["files"] = perf_counter() - begin
     answer = summary_of(result)
     write_json(answer, path / "summary.json")

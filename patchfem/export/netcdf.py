@@ -216,16 +216,19 @@ def with_surfaces(data: Contents, gap) -> Contents:
 
 
 def with_faces(data: Contents, faces) -> Contents:
-    """The contents with the pressed patches of interfaces (`runs.patch.faces.Face`), each on nodes of its own; the
-    number behind a name is that of the interface from 1."""
+    """The contents with the patches of interfaces (`runs.patch.faces.Face`), each on nodes of its own, frame by frame;
+    the number behind a name is that of the interface from 1."""
     out, places = {}, {}
     for face in faces:
-        over, pressure = f"x_{face.number + 1}", face.patch.pressure
-        places[over] = (over, face.patch.x, {"units": "m", "long_name": f"position along the sliding direction of "
-                                                                        f"interface {face.name}"})
-        for name, values in (("normal_stress", pressure.sigma_n), ("gap", pressure.gap),
-                             ("weight", face.patch.pieces.interface.weight)):
-            out[f"{name}_{face.number + 1}"] = (over, values, _attributes(name))
+        number, patch = face.number + 1, face.patch
+        one = of_run({}, None, face.fields, patch.x, patch.pieces.interface.weight)
+        frame = "frame" if face.fields["time"].size > 1 else "frame_at_rest"
+        over = {"x": f"x_{number}", "frame": frame}
+        for part, found, ending in ((one.variables, out, f"_{number}"), (one.coordinates, places, "")):
+            for name, (dimensions, *rest) in part.items():
+                dimensions = (dimensions,) if isinstance(dimensions, str) else dimensions
+                name = {"x": over["x"], "frame_time": f"{frame}_time"}.get(name, f"{name}{ending}")
+                found[name] = (tuple(over[one] for one in dimensions), *rest)
     return data.also(out, places)
 
 

@@ -12,12 +12,13 @@ from .drawing import charts
 from .pages import player
 from .pages.document import Section, document, table, warned
 from .pages.words import SHARP, G, headline, in_order, linked, of_records, others, pair, texts, units
+from .results import MOST
 
 SETTLED = ("steady", "stuck", "done")
 DASH = "&ndash;"
-MOST = 6  # charts of a picture that has one for each interface
 ROOM = 700_000  # characters that the numbers of all charts may take: with library and player below 3 MB
 FILES = (("fields.vtkhdf", "fields of both pieces and their interface, frame by frame (ParaView 5.13 or newer)"),
+         ("interfaces", "such fields of every interface that has a patch of its own"),
          ("summary.json", "measures, outcome, warnings, effects and numerics"),
          ("result.nc", "histories and fields along the interface (xarray, MATLAB, ncdump)"),
          ("scene.resolved.toml", "the scene in SI with every default"))
@@ -170,10 +171,12 @@ def _interface(data: dict) -> Picture | None:
 
 
 def _faces(data: dict) -> Picture | None:
-    found = [one for one in data.get("faces", ()) if np.any(one[2] > 0)]
-    part = any(charts.part_in_contact(x, sigma) for _, x, sigma in found)
-    return Picture(charts.faces, (found[:MOST],), "Normal stress of the patch of each interface, pressed, before any "
-                   f"slide.{' Only the part in contact is drawn.' * part}{_first(found)}") if found else None
+    found = [one for one in data.get("faces", ()) if np.any(one[1]["normal_stress"][0] > 0)]
+    part = any(charts.part_in_contact(x, fields["normal_stress"][0]) for x, fields, _ in found)
+    shear = any(np.any(fields.get("shear_stress", 0.0)) for _, fields, _ in found)
+    return Picture(charts.faces, (found[:MOST],), "Normal stress of the pressed patch of each interface"
+                   f"{'; shear stress in frames of the last cycle, the largest resultant in colour' * shear}."
+                   f"{' Only the part in contact is drawn.' * part}{_first(found)}") if found else None
 
 
 def _first(found: list) -> str:
@@ -392,7 +395,8 @@ def _cost(data: dict) -> Section:
 def _origin(data: dict) -> Section:
     """The scene as written and as understood, the files beside the page, the versions."""
     versions = ", ".join(f"{k} {v}" for k, v in data["versions"].items())
-    there = FILES[1:] if data["x"] is None else FILES
+    lacks = ["fields.vtkhdf"] * (data["x"] is None) + ["interfaces"] * ("faces" not in data)
+    there = [one for one in FILES if one[0] not in lacks]
     files = "".join(f"<li><a href={name}>{name}</a>: {what}</li>" for name, what in there)
     again = "" if "command" not in data else \
         f"<p>To repeat the run, in the folder of its scene:</p><pre>{escape(data['command'])}</pre>"

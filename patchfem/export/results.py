@@ -14,8 +14,9 @@ from ..disk.exchange import aside, put, restore, undisturbed
 from ..disk.whole import KEPT, unfinished, unmade
 
 PAGE = "report.html"
+INTERFACES, MOST = "interfaces", 6  # fields of interfaces that have a patch of their own; so many of them
 FILES = ("summary.json", "result.nc", "fields.vtkhdf", PAGE, "scene.resolved.toml", "fields.pvd",
-         "fields_frames", "fit.json", "fit.csv", "fit.svg", "scene.fitted.toml", "wear.npz",
+         "fields_frames", INTERFACES, "fit.json", "fit.csv", "fit.svg", "scene.fitted.toml", "wear.npz",
          "scene.iwan.toml", "scene.bouc-wen.toml", "scene.elastic-plastic.toml",
          "starts.json", "compare.json", "surface_before.csv", "surface_after.csv", "difference.x3p", "difference.csv",
          "profile.json", "profile.csv", "surfaces", "pairs.csv", "pairs.json",

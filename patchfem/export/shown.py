@@ -35,10 +35,7 @@ def report_data(result: Result) -> dict:
             "means": {name: one.text for name, one in result.measures.items()}}
     data |= {name: result.extra[name] for name in ("curve", "decay", "spectra") if name in result.extra}
     if "faces" in result.extra:
-        alike: dict = {}
-        for one in result.extra["faces"]:
-            alike.setdefault(one.patch, []).append(one.name)
-        data["faces"] = [(", ".join(names), one.x, one.pressure.sigma_n) for one, names in alike.items()]
+        data["faces"] = [(one.patch.x, one.fields, f"interface {one.name}") for one in result.extra["faces"]]
     if "wear" in result.extra:
         count, period = result.extra["wear_shown"]["states"], result.extra["wear_shown"]["period"]
         data["wear"] = {"history": result.extra["wear"], "period": period,

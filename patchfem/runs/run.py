@@ -110,7 +110,7 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
             result = replace(result, measures=patch_result.measured(model, patch, coarse) | found)
         if model.faced:
             own = faces.measured(model)
-            result = replace(result, extra=result.extra | {"faces": tuple(faces.faces_of(model))},
+            result = replace(result, extra=result.extra | {"faces": faces.seen(model, result.extra.get("shots", ()))},
                              measures=own | {name: m for name, m in result.measures.items() if name not in own})
         if model.wear is not None:
             result = measures.worn(replace(result, plan=what), evolved, estimate)

@@ -68,6 +68,11 @@ def test_exact_one_interface_with_a_patch_is_the_rig_of_that_patch(law, method):
         size = max(abs(one.value), one.error or 0.0, one.floor)
         assert ours.value == pytest.approx(one.value, abs=1e-9 * size), name
         assert (ours.error or 0.0) == pytest.approx(one.error or 0.0, rel=1e-6, abs=1e-9 * size), name
+    if method != "march":  # which shows the pressed state alone
+        fields = mine.extra["faces"][0].fields
+        for name in ("time", "normal_stress", "shear_stress", "slip", "status"):
+            size = np.abs(want.fields[name]).max()
+            np.testing.assert_allclose(fields[name], want.fields[name], atol=1e-9 * size, err_msg=name)
     slipped = mine.measures["slip_amplitude"]
     assert slipped.value > 100 * slipped.error > 0
 
@@ -245,8 +250,12 @@ def test_files_of_a_run_have_the_pressure_of_every_interface(tmp_path, monkeypat
     assert chain.plot.pressure().get_title() == "Pressure on interface 1-0"
     with xr.open_dataset("out/result.nc") as data:
         for number, load in ((1, 100.0), (2, 60.0)):
-            total = float((data[f"normal_stress_{number}"] * data[f"weight_{number}"]).sum())
-            assert total == pytest.approx(load, rel=1e-9)
+            weight = data[f"weight_{number}"]
+            total = (data[f"normal_stress_{number}"] * weight).sum(f"x_{number}").values
+            assert total.size == 17 and total == pytest.approx(load, rel=1e-9)
+            force = (data[f"shear_stress_{number}"] * weight).sum(f"x_{number}").values
+            seen = np.interp(data["frame_time"], data["time"], data["friction_force"][number - 1])
+            np.testing.assert_allclose(force[1:], seen[1:], atol=1e-4 * np.abs(seen).max())
     probed = json.loads(cli("plan", "chain.toml", "--probe", "--json").out)
     for ours, name in (("pieces_shear", "tangential_stiffness"), ("pieces_shear_2", "tangential_stiffness_2")):
         want = chain.measures[name]
@@ -254,6 +263,10 @@ def test_files_of_a_run_have_the_pressure_of_every_interface(tmp_path, monkeypat
     page = (tmp_path / "out/report.html").read_text()
     assert "Friction loop of interface 2-1" in page
     assert "Pressure on interface 1-0" in page and "Pressure on interface 2-1" in page
+    assert f"patchfem view {'out/interfaces/1-0'}" in answer.out
+    assert cli("export", "out/interfaces/2-1", "-o", "fields.csv").code == 0
+    lost = cli("view", "out", "-o", "v.png")
+    assert lost.code == 4 and "give one of its interfaces, such as out/interfaces/1-0" in lost.err
     told = json.loads((tmp_path / "out/summary.json").read_text())
     assert told["numerics"]["interface_nodes_2"] == data.sizes["x_2"]
     assert told["measures"]["contact_half_width_2"]["value"] == chain.measures["contact_half_width_2"].value

@@ -367,7 +367,9 @@ class _Run:
     def _snapshot(self) -> dict:
         return {"time": self.now, "slide": float(self.memory.place[0]), "force": float(self.memory.force[0]),
                 "rate": float(self.plant.faces[0] @ self.motion[1]), "slip": float(self.memory.slip[0]),
-                "stretch": stretches(self.groups[0], self.memory, 0)}
+                "stretch": stretches(self.groups[0], self.memory, 0),
+                "faces": [(float(self.memory.place[k]), stretches(group, self.memory, k))
+                          for k, group in enumerate(self.groups)]}
 
     def _found(self, rows) -> PieceRun:
         """What the run shows without histories, off the rows of its window."""

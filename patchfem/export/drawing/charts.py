@@ -7,7 +7,6 @@ its numbers, in the units of the axes.
 """
 
 from itertools import pairwise
-from textwrap import shorten
 
 import numpy as np
 
@@ -94,41 +93,32 @@ def part_in_contact(x, sigma) -> tuple | None:
     return max(x[0], x[used[0]] - pad), min(x[-1], x[used[-1]] + pad)
 
 
-def interface(x, fields: dict) -> list:
-    """Pressure, and shear stress in every frame with that of the largest resultant in colour."""
+def interface(x, fields: dict, name: str = "") -> list:
+    """Pressure, and shear stress in every frame with that of the largest resultant in colour; name: of one of several
+    interfaces."""
     sigma, tau = fields["normal_stress"][0], fields.get("shear_stress")
-    place, size = _along(x, sigma)
-    out = [_pressure("Pressure on the interface", x, sigma)]
+    part = part_in_contact(x, sigma) or (x[0], x[-1])
+    along, size = axis_unit(part, "m")
+    place = axis("x", along) | {"range": [part[0] * size, part[1] * size]}
+    unit, scale = axis_unit(sigma, "Pa")
+    out = [chart(f"Pressure on {name or 'the interface'}", place, axis("normal stress", unit),
+                 [mark("band", "accent", x=x * size, low=0 * x, high=sigma * scale),
+                  line(x * size, sigma * scale, "accent")])]
     if tau is not None and np.any(tau):
         unit, scale = axis_unit(tau, "Pa")
         frame = int(np.argmax(np.abs(tau @ np.gradient(x))))
         shown = np.unique(np.linspace(1, len(tau) - 1, min(FRAMES, len(tau) - 1)).round().astype(int))
         frames = [line(x * size, tau[k] * scale, "soft", most=FAINT, width=0.6, alpha=0.6) for k in shown]
-        title = f"Shear stress at {len(shown)} instants; the one with the largest stress is in colour"
+        title = f"Shear stress{f' on {name}' * bool(name)} at {len(shown)} instants; the one with the largest stress " \
+            "is in colour"
         out.append(chart(title, place, axis("shear stress", unit),
                          [*frames, line(x * size, tau[frame] * scale, "warm")]))
     return out
 
 
-def _along(x, sigma) -> tuple:
-    """(axis of the places, its scale) of the part of an interface that is worth showing."""
-    part = part_in_contact(x, sigma) or (x[0], x[-1])
-    along, size = axis_unit(part, "m")
-    return axis("x", along) | {"range": [part[0] * size, part[1] * size]}, size
-
-
-def _pressure(title: str, x, sigma) -> dict:
-    """The chart of a pressure (m,) [Pa] at x (m,) [m]."""
-    (place, size), (unit, scale) = _along(x, sigma), axis_unit(sigma, "Pa")
-    return chart(title, place, axis("normal stress", unit),
-                 [mark("band", "accent", x=x * size, low=0 * x, high=sigma * scale),
-                  line(x * size, sigma * scale, "accent")])
-
-
 def faces(found: list) -> list:
-    """Pressure on every interface that has a patch of its own, (name, x (m,) [m], pressure (m,) [Pa]) each."""
-    return [_pressure(f"Pressure on interface{'s' * (',' in name)} {shorten(name, 40, placeholder=' ...')}", x, sigma)
-            for name, x, sigma in found]
+    """`interface` of every interface that has a patch of its own, its three arguments each."""
+    return [one for each in found for one in interface(*each)]
 
 
 def closer(x, depth, sigma, ratio: float) -> tuple:

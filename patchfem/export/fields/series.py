@@ -66,7 +66,9 @@ class Series:
         if not path.is_file():
             if not Path(folder).is_dir():
                 raise Missing(f"{folder}: no such results folder")
-            raise Missing(f"{folder}: it has no {NAME}; only a run with [contact] writes one")
+            inside = sorted(Path(folder).glob(f"interfaces/*/{NAME}"))
+            raise Missing(f"{folder}: it has no {NAME}; " + (f"give one of its interfaces, such as {inside[0].parent}"
+                                                             if inside else "only a run with [contact] writes one"))
         self.path = path
         try:
             self.file = h5py.File(path, "r")

@@ -12,6 +12,8 @@ from ...core import PatchfemError
 from ...friction import record
 from ...model.source import placed
 from ...response.rows import of_number
+from ...slip.fields import element_fields
+from ..results.result import at_rest, frames_of
 from . import kept, result
 from .condensed import Keyed
 from .press import Patch
@@ -24,18 +26,25 @@ class Face(NamedTuple):
     """A patch of an interface of a rig.
 
     number: of the interface, from 0; name: as the scene's places, "1-0"; model: of the rig, with this patch and law as
-    its own; patches: the pressed Patch and those on coarser meshes, None where one is lacking.
+    its own; patches: the pressed Patch and those on coarser meshes, None where one is lacking; fields: frames of the
+    interface by name, as a Result has them, None before its run.
     """
 
     number: int
     name: str
     model: object
     patches: tuple
+    fields: dict | None = None
 
     @property
     def patch(self) -> Patch:
         """The pressed Patch."""
         return self.patches[0]
+
+    @property
+    def folder(self) -> str:
+        """Its name as that of a folder."""
+        return self.name.replace(" (", "_").removesuffix(")")
 
     @property
     def soft(self) -> str:
@@ -108,6 +117,23 @@ def meshed(model) -> list:
         if face.soft and face.patches[1] is not None:
             out.setdefault(face.patches, []).append(face.number)
     return [tuple(numbers) for numbers in out.values()]
+
+
+def seen(model, shots) -> tuple:
+    """The patches of the interfaces with their frames, of one whose elements no shot of the motion shows the pressed
+    state alone; shots: of the event engine, of (slide [m], stretch (t,) [m]) for every interface."""
+    out = []
+    for face in faces_of(model):
+        one, fields = model.rig.interfaces[face.number], at_rest(face.patch)
+        found = elements_of(one, model.accuracy.tolerance)[2] if face.soft else None
+        if found is not None and shots:
+            states = [shot["faces"][face.number] for shot in shots]
+            length = record.law_from(one.numbers, one.load).element(one.load).length
+            tau, local = element_fields(face.patch, found, states, length)
+            fields = frames_of(face.patch, np.array([shot["time"] for shot in shots]), tau, local,
+                               np.array([slide for slide, _ in states]))
+        out.append(face._replace(fields=fields))
+    return tuple(out)
 
 
 def known(model) -> bool:

@@ -138,6 +138,8 @@ def _extra(run: Coupled, notes: list) -> dict:
         out.pop(name, None)
     if raw.levels:
         out["levels"] = levels.in_scene_units(rig, raw.levels)
+    if rig.soft and raw.snapshots and "faces" in raw.snapshots[0]:
+        out["shots"] = raw.snapshots
     if run.rubs:
         out["events"] = events_of(raw.window, run.drive, raw.log, raw.held)
     reduced = getattr(raw.contact, "reduction", None)
@@ -158,7 +160,8 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
 
     Steps a cycle that the scene does not pin are doubled until the error of the displacement is met.
     """
-    engine, frames, made = ENGINES[numerics.engine], 0 if patch is None or model.patch.gathers else FRAMES, {}
+    engine, made = ENGINES[numerics.engine], {}
+    frames = 0 if (patch is None or model.patch.gathers) and not model.rig.soft else FRAMES
     passes = Passes(progress, _foreseen(engine, model, numerics, patch, coarse, estimated))
     size = model.rig.displacement
 

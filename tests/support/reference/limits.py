@@ -63,10 +63,10 @@ scene. Heat from friction does not change that temperature.
 
 **Partial slip.** At constant load and tilt the elements are exact for pieces of equal elasticity. Under a changing load
 the shear compliance is represented by modes, whose number follows from the tolerance. For pieces of unlike sections the
-effect of shear on the pressure is neglected. A patch of `[[structure.interface]]` keeps its load and pressure, does not
-wear and writes no fields. If friction falls as a point slides on (bonds that weaken, equation 2.17 as printed), several
-states can be in equilibrium. The run then continues in the direction of its last steps, with the state of lower energy
-there. The energy difference counts as dissipated.
+effect of shear on the pressure is neglected. A patch of `[[structure.interface]]` keeps its load and pressure and does
+not wear. If friction falls as a point slides on (bonds that weaken, equation 2.17 as printed), several states can be in
+equilibrium. The run then continues in the direction of its last steps, with the state of lower energy there. The energy
+difference counts as dissipated.
 
 **Modes.** The rig is linear except for its joints, `[structure.stiffening]` and an interlocking bonded spring. Damping
 is viscous; hysteretic damping in a file is treated as viscous. A complex mode is replaced by its real part.
