@@ -283,6 +283,19 @@ def test_a_backbone_is_that_of_the_rig_of_one_patch():
     assert one["quasi_static_damping"].size > 10
 
 
+def test_a_slide_beyond_a_piece_and_pieces_without_a_load_end_the_run():
+    assert str(pf.run(CHAIN, **{"drive.acceleration": "3000 g", "drive.cycles": 5.0}).outcome) == "leaves_contact"
+    bare = pf.run(CHAIN, **{f"structure.interface.{k}.contact.load": "0 N" for k in (0, 1)})
+    assert str(bare.outcome) == "no_contact" and set(bare.measures) == {"normal_load"}
+
+
+def test_a_mesh_of_few_elements_leaves_the_errors_of_the_motion_open():
+    few = pf.run(CHAIN, **{"structure.interface.0.contact.element_size": "5 mm"})
+    assert few.measures["loop_area_2"].error is None and few.measures["pressure_peak_2"].error > 0
+    assert any("interface 1-0: no error is estimated" in one and "leave out structure.interface.contact.element_size"
+               in one for one in few.warnings)
+
+
 @pytest.mark.parametrize("old, new, says", [
     ("[drive]", '[structure.interface.contact.approach]\ndistance = "1 um"\n[drive]', "contact.approach"),
     ("[drive]", '[structure.interface.contact.grooves]\nwavelength = "80 um"\namplitude = "2 um"\n[drive]',
@@ -295,6 +308,7 @@ def test_a_backbone_is_that_of_the_rig_of_one_patch():
      "[structure.interface.contact]\nlength", "or use law 'coulomb' or 'elastic-plastic'"),
     (LAW, LAW + "kinetic = 0.2\n", "structure.interface[1].kinetic: 0.2 below static = 0.3 with "
      "[structure.interface.contact.shear] is not supported yet; leave kinetic out"),
+    (LAW, LAW.replace("0.3", "0.0"), "leave out [structure.interface.contact.shear]"),
     ("[drive]", '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n[drive]', "wear: not supported yet"),
     ("cycles = 40\n", 'cycles = 40\n[accuracy]\nmethod = "newmark"\n', "use 'march'"),
     ("[drive]", '[structure.interface.contact.profile]\nfile = "none.csv"\n[drive]',

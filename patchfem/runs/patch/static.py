@@ -216,7 +216,7 @@ def pressed_together(asked: Asked, tolerance: float, pieces: list | None = None)
     least = least_of(hidden, mine)
     floors = np.array([[TABLE[name].floor] for name in names])
     wanted = allowed(first.mesh_tolerance or tolerance, known[-1], floors) if first.chosen else np.inf
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", divide="ignore"):
         best, error = settled(known, np.array([np.broadcast_to(least.get(name, 0.0), cell.shape) for name in names]),
                               wanted, nested, edged=np.isin(names, one_by_one.EDGED))
         error = np.maximum(error, max(one_by_one.ALIKE, pair.rounding) * np.abs(known[-1]))

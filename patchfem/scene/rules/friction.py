@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...effects import either, has, takes, using
 from ..keys.contact import Contact
-from ..keys.tables import Friction
+from ..keys.tables import Friction, Interface
 from .draft import LAWS, Draft, _needs
 from .methods import changing_load, climbed
 
@@ -74,9 +74,10 @@ def _friction(draft: Draft, at: str, law: Friction, contact: Contact | None) -> 
     if law.static == 0 and law.stiffness is not None and takes(law.law, "stiffness"):
         draft.say(f"{at}.static", f"0 with law '{law.law}', whose springs need a slip force; static > 0 is "
                                   "needed")  # fmt: skip
-    if law.static == 0 and contact and contact.gives_way:
-        draft.say(f"{at}.static", f"0 with {contact.gives_way}: no point carries friction; static > 0 is needed, or "
-                                  f"leave out {contact.gives_way}")  # fmt: skip
+    soft = law.gives_way if isinstance(law, Interface) else contact.gives_way if contact is not None else ""
+    if law.static == 0 and soft:
+        draft.say(f"{at}.static", f"0 with {soft}: no point carries friction; static > 0 is needed, or leave out "
+                                  f"{soft}")  # fmt: skip
 
 
 def _stretches(draft: Draft, at: str, contact: Contact | None) -> None:
