@@ -15,6 +15,7 @@ from ..response import rows
 from . import memory
 from .bench import engine as of_bench
 from .patch import grids as patch_grids
+from .patch import kept
 from .patch import plan as patch_plan
 from .rig import engines
 from .rig import numerics as rig_numerics
@@ -119,15 +120,18 @@ def _planned(model: Model, per_point: bool) -> Plan:
         seconds, pressed = patch_plan.effort(model.patch, grids, tolerance)
         groups |= patch_plan.groups(model)
         said[1] = patch_plan.verdict(groups, model.patch)
+    alike: set = set()
     for number, one in enumerate(model.rig.interfaces if model.rig is not None else ()):
         if one.patch is not None:
             grids = patch_grids.expected_grids(one.patch, model.accuracy.tolerance)
+            alone = kept.by_content(one.patch) not in alike  # equal patches are pressed once
+            alike.add(kept.by_content(one.patch))
             for name, size in patch_plan.sizes(grids).items():
-                unknowns[name] = unknowns.get(name, 0) + size
+                unknowns[name] = unknowns.get(name, 0) + size * alone
             chain |= {rows.of_number(name, number): link for name, link in patch_plan.chain(one.patch).items()
                       if link != "rigid"}
             more, size = patch_plan.effort(one.patch, grids, model.accuracy.tolerance)
-            seconds, pressed = seconds + more, pressed + size
+            seconds, pressed = seconds + more * alone, pressed + size * alone
             said[1] = [*said[1], *patch_plan.face_words(model.rig.names[number], one)]
     if model.rig is not None:
         engine, steps, more = of_rig.cost(model, per_point, unknowns)

@@ -224,6 +224,9 @@ def test_a_plan_counts_the_patches_and_names_their_links(chain):
     assert one.unknowns == two.unknowns and one.seconds == pytest.approx(two.seconds, rel=0.2)
     assert one.modes(one.chain)[0]["stuck_frequency"] == pytest.approx(two.modes(two.chain)[0]["stuck_frequency"])
     assert found.unknowns["interface_points"] > one.unknowns["interface_points"]
+    twice = plan(pf.load(masses(2) + held(1, 0) + held(2, 0) + face("[1, 0]", 100, 0.5) + face("[2, 0]", 100, 0.5)
+                         + DRIVE))
+    assert twice.unknowns["interface_points"] == one.unknowns["interface_points"]  # equal ones are pressed once
     assert found.chain["pieces_shear_2"] == found.chain["pieces_shear"]  # the same pieces, whatever presses them
     assert sum("has a patch of its own" in one for one in found.verdict) == 2
     rigid = plan(pf.load(CHAIN.replace("[structure.interface.contact.shear]\n", "")))
