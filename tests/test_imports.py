@@ -109,6 +109,7 @@ def test_exact_a_linear_structure_needs_no_patch_no_friction_and_no_march():
                          ids=["linear", "coulomb", "plastic"])
 def test_exact_a_short_history_compiles_nothing(scene, tmp_path, monkeypatch, text):
     """On a machine where nothing is compiled yet: neither numba nor what loads machine code is imported."""
+    monkeypatch.delenv("PATCHFEM_CACHE", raising=False)  # it would win over XDG_CACHE_HOME
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     modules = loaded(FROM_PYTHON, scene(text))
     absent(modules, "compiled.inner", "compiled.kept", "dynamics.events.march_kernels")
