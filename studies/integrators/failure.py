@@ -1,7 +1,8 @@
-"""Why did mass 2 of Figs 17 to 20 move before its friction was overcome, and what cures it?
+"""Why did mass 2 of Figs 17 to 20 move before its friction was overcome, and what prevents this?
 
-Steps were accepted that miss the law by up to 5.4 with a limit of 3; a law that can hold cures it, as a static branch
-or as elastic-plastic friction with reversal.
+The method accepted steps that violate the friction law: the force was wrong by up to 5.4, where the friction limit is
+3. A friction law that can stick prevents this: a law with a static branch, or elastic-plastic friction that unloads on
+reversal.
 
 The report solves each step of (3.10) by iteration and accepts it when the displacement, later the speed, stops
 changing. In a step of h the end force moves the mass by F h^2/6 and its speed by F h/2 only, so with h = .05 a
@@ -37,7 +38,8 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
-REPRODUCED = "in part: the failures and their cure, not the curves, as the report's step and tolerance are not known"
+REPRODUCED = ("in part: the failures and their cure. The curves are not reproduced, because the report "
+              "gives neither its step nor its tolerance")
 DRAWN = {"Fig 17, 18: displacement 1e-2": "displacement", "Fig 19, 20: velocity 1e-4": "velocity",
          "static branch, force 1e-6": "force, static branch", "Fig 21, 22: elastic 0.01, velocity 1e-6": "elastic"}
 

@@ -1,8 +1,8 @@
-"""Do the ten conclusions of the report hold, in numbers that can be computed or read off its own Table 1?
+"""Do computed numbers and Table 1 of the report support its ten conclusions?
 
-Six hold (1, 3, 5, 7, 8, 10), four in part: 2, as damping of 0.003 limits the motion too, at 218 mil; 4, as only a block
-that runs away moves as a sine; 6, as slip begins 47 degrees before the input's maximum; 9, as the exact velocity stops
-without a jump, only the acceleration has one.
+Six hold fully (1, 3, 5, 7, 8, 10) and four partly. Conclusion 2: a damping ratio of 0.003 limits the motion too, at 218
+mil. Conclusion 4: only a block that runs away moves as a sine. Conclusion 6: slip begins 47 degrees before the input's
+maximum. Conclusion 9: the exact velocity reaches zero without a jump; only the acceleration jumps.
 
 `conclusions.md` has every claim in short, what is found and the number, written by this study. The block is that of
 Figs 2 and 3: one mode at 143 Hz, an onset of 4.14 g, a damping ratio of 0.003.
@@ -65,11 +65,12 @@ def first() -> Conclusion:
     line = linregress(f, onset)
     half = t.ppf(0.975, f.size - 2) * line.stderr
     held = [f for f in ONSETS if block(0.999 * ONSET, f)[0].outcome == "stuck" != block(1.001 * ONSET, f)[0].outcome]
-    return Conclusion(1, "slip begins at one level, whatever the frequency", HOLDS,
-                      f"the six onsets of Table 1 are {np.exp(onset.mean()):.2f} g with a spread of "
-                      f"{100 * onset.std(ddof=1):.1f} %; they go with the frequency to the power {line.slope:.1f} ± "
-                      f"{half:.1f} (95 %), and two series at 135 Hz differ as much as all frequencies. A Coulomb "
-                      f"block begins at mu N/m at {', '.join(map(str, held))} Hz alike")
+    return Conclusion(1, "slip begins at the same level at all frequencies", HOLDS,
+                      f"The six onsets of slip in Table 1 have the mean {np.exp(onset.mean()):.2f} g and a standard "
+                      f"deviation of {100 * onset.std(ddof=1):.1f} %. A fitted power law of the frequency has the "
+                      f"exponent {line.slope:.1f} ± {half:.1f} (95 %). The two series at 135 Hz differ as much as all "
+                      "frequencies do. A Coulomb block begins to slip at the same level, mu N/m, at "
+                      f"{', '.join(map(str, held))} Hz.")
 
 
 def second() -> Conclusion:
@@ -77,11 +78,11 @@ def second() -> Conclusion:
     push = np.sqrt(8**2 - (4 * ONSET / np.pi)**2) * G * 0.8546
     cubic = 4 / 3 * push / (10 * MIL)**3
     share = 0.75 * cubic * (10 * MIL)**2 / (0.8546 * (2 * np.pi * 143)**2)
-    return Conclusion(2, "above a level the motion diverges, limited by the stiffening of the flexures alone", PART,
-                      f"it does for a rigid block from {knee():.2f} g on, and for one that climbs 80 um grooves at 8.0 "
-                      "g; but a damping ratio of 0.003 limits the block too, at 8 g at "
-                      f"{value['relative_displacement_amplitude'] / MIL:.0f} mil. Flexures that are {100 * share:.0f} "
-                      "% stiffer over a cycle of 10 mil limit it there")
+    return Conclusion(2, "above a certain level the motion diverges; only the stiffening of the flexures limits it",
+                      PART, f"A rigid block diverges from {knee():.2f} g on, and a block that climbs 80 um grooves "
+                      "at 8.0 g. But a damping ratio of 0.003 limits the rigid block too: at 8 g it reaches "
+                      f"{value['relative_displacement_amplitude'] / MIL:.0f} mil. To limit the block to 10 mil, the "
+                      f"flexures would have to be {100 * share:.0f} % stiffer in a cycle of this amplitude.")
 
 
 @lru_cache
@@ -103,36 +104,36 @@ def jump() -> float:
 def third() -> Conclusion:
     scene = figure_27.scene("second path").replace("cycles = 800", "cycles = 300")
     value = pf.run(scene, **{"drive.acceleration": 5 * G}).measures
-    return Conclusion(3, "sticking and slipping strike the mass, which rings at higher frequencies", HOLDS,
-                      f"the acceleration of the block jumps by {5 * jump():.1f} g when it stops at 5 g; where the "
-                      "contact gives by 0.243 um before it slips, as in the best model of Table 1, the block rings at "
-                      f"{value['ring_frequency'].value / 1e3:.1f} kHz with a damping ratio of "
-                      f"{value['ring_damping'].value:.2f}")
+    return Conclusion(3, "the impacts of sticking and slipping make the mass ring at higher frequencies", HOLDS,
+                      f"At a level of 5 g the acceleration of the block jumps by {5 * jump():.1f} g when the block "
+                      "stops. If the contact deforms by 0.243 um before it slips, as in the best model of Table 1, the "
+                      f"block rings at {value['ring_frequency'].value / 1e3:.1f} kHz with a damping ratio of "
+                      f"{value['ring_damping'].value:.2f}.")
 
 
 def fourth() -> Conclusion:
     share = {level: block(level)[1]["acceleration_distortion"] for level in (5.25, 5.5, 6.0)}
     moved = block(6.0)[1]["relative_displacement_amplitude"] / MIL
     return Conclusion(4, "responses can be nearly sinusoidal above certain levels", PART,
-                      "the third harmonic of the block's acceleration is " + ", ".join(
-                          f"{one:.2f} of the first at {level:g} g" for level, one in share.items())
-                      + f", but there it moves {moved:.0f} mil. One that climbs grooves and stays below 1 mil, as the "
-                      "rig did, gets less sinusoidal: 0.23 at 5 g, 0.35 at 8 g")
+                      "The third harmonic of the block's acceleration, divided by the first, is " + ", ".join(
+                          f"{one:.2f} at {level:g} g" for level, one in share.items())
+                      + f". But at 6 g the block moves by {moved:.0f} mil. If a block climbs grooves and moves by less "
+                      "than 1 mil, as the rig did, this ratio increases: 0.23 at 5 g, 0.35 at 8 g.")
 
 
 def fifth() -> Conclusion:
     text = (HERE.parent / "rig" / "rig.toml").read_text("utf-8")
     found = pf.run(text[:text.index("[contact.shear]")], **{"contact.tilt.angle": "29 urad"}).measures
-    return Conclusion(5, "only a portion of the area rubbed, for want of alignment", HOLDS,
-                      f"{100 * found['contact_fraction'].value:.0f} % of the patch touch where one piece is tilted by "
-                      f"29 urad, {0.029 * 12.7:.2f} um over 12.7 mm, in a rigid fixture")
+    return Conclusion(5, "only a portion of the area rubbed, because the pieces were not well aligned", HOLDS,
+                      f"With a rigid fixture, {100 * found['contact_fraction'].value:.0f} % of the patch is in contact "
+                      f"if one piece is tilted by 29 urad ({0.029 * 12.7:.2f} um over 12.7 mm).")
 
 
 def sixth() -> Conclusion:
     release, stop = phases(5.0)
     return Conclusion(6, "slip begins near the input's maximum and is largest somewhat later", PART,
-                      f"at 5 g it begins {90 - release:.0f} degrees before the maximum of the input displacement; it "
-                      f"is largest {stop - 90:.0f} degrees after it")
+                      f"At 5 g slip begins {90 - release:.0f} degrees before the maximum of the input displacement. "
+                      f"The slip is largest {stop - 90:.0f} degrees after this maximum.")
 
 
 def seventh() -> Conclusion:
@@ -140,9 +141,9 @@ def seventh() -> Conclusion:
     levels = [level for level in np.arange(4.2, 5.3, 0.1) if phases(float(level))[1] < 180 < 180 + phases(
         float(level))[0]]
     return Conclusion(7, "the masses are stuck while the input displacement returns through zero", HOLDS,
-                      f"at 5 g from {stop:.0f} to {180 + release:.0f} degrees; so at every level of 0.1 g from "
-                      f"{levels[0]:.1f} to {levels[-1]:.1f} g, and no more from {knee():.2f} g on, where no stop is "
-                      "left")
+                      f"At 5 g the block is stuck from {stop:.0f} to {180 + release:.0f} degrees; the input is zero at "
+                      f"180 degrees. The block is stuck at this zero at every level from {levels[0]:.1f} to "
+                      f"{levels[-1]:.1f} g (in steps of 0.1 g). From {knee():.2f} g on the block never stops.")
 
 
 def eighth() -> Conclusion:
@@ -152,25 +153,27 @@ def eighth() -> Conclusion:
                     for one in (window.acceleration, window.base_acceleration))
     lag = -np.degrees(np.angle(block_of / base))
     return Conclusion(8, "the masses slip again and follow the input, lagging", HOLDS,
-                      f"at 5 g the block slips again at {180 + phases(5.0)[0]:.0f} degrees, and the first harmonic of "
-                      f"its motion lags by {lag:.0f} degrees")
+                      f"At 5 g the block slips again at {180 + phases(5.0)[0]:.0f} degrees. The first harmonic of its "
+                      f"motion lags by {lag:.0f} degrees.")
 
 
 def ninth() -> Conclusion:
     exact, stopped = exact_cycle(ONSET), newmark_run(STICK_SPEED)
     drops = [float(np.abs(np.diff(one.velocity)).max()) for one in (exact, stopped)]
-    return Conclusion(9, "at sticking the velocity drops from a finite value, which makes the acceleration jump", PART,
-                      f"the acceleration jumps by {jump():.2f} of the input's; the velocity does not: from one of 400 "
-                      f"samples to the next it changes by {drops[0]:.3f} of the input's at most, as everywhere. By "
-                      f"Newmark's method with a stick speed it drops by {drops[1]:.2f}: an artefact")
+    return Conclusion(9, "when the mass sticks, its velocity drops from a finite value, so the acceleration jumps",
+                      PART, f"The acceleration jumps by {jump():.2f} times the amplitude of the input acceleration. "
+                      "The velocity does not jump: between two neighbouring samples (400 per cycle) the velocity never "
+                      f"changes by more than {drops[0]:.3f} times the amplitude of the input velocity. With Newmark's "
+                      f"method and a stick speed the velocity drops by {drops[1]:.2f} times this amplitude, which is "
+                      "an artefact of the method.")
 
 
 def tenth() -> Conclusion:
     turns = figure_5.turns(figure_5.motion()).size
-    return Conclusion(10, "the analysis shows no ringing, as its model has one degree of freedom", HOLDS,
-                      "a stuck block has nothing left that moves, and a sliding one swings at the frequency that "
-                      f"drives it; driven at a tenth of that the same model does ring, with {turns} turns a cycle "
-                      "(Fig. 5)")
+    return Conclusion(10, "the analysis shows no ringing, because its model has one degree of freedom", HOLDS,
+                      "A stuck block has no part left that could move, and a sliding block swings at its natural "
+                      "frequency, which is also that of the drive. Driven at a tenth of its natural frequency, the "
+                      f"same model does ring: the block reverses {turns} times a cycle (Fig. 5).")
 
 
 ALL = (first, second, third, fourth, fifth, sixth, seventh, eighth, ninth, tenth)
@@ -179,8 +182,9 @@ ALL = (first, second, third, fourth, fifth, sixth, seventh, eighth, ninth, tenth
 def table(found: list) -> str:
     """The conclusions as a table in Markdown."""
     rows = "\n".join(f"| {one.number} | {one.claim} | {one.verdict} | {one.found} |" for one in found)
-    return ("# The ten conclusions of the report\nWritten by `conclusions.py`.\n\n| | claim, in short | holds? | found "
-            f"|\n|---|---|---|---|\n{rows}\n")
+    return ("# The ten conclusions of the report\nThis page is generated by `conclusions.py`. The levels are those of "
+            "the base acceleration; the angles are phases of the input displacement.\n\n| | claim of the report, "
+            f"in short | does it hold? | what this program finds |\n|---|---|---|---|\n{rows}\n")
 
 
 def main(path: Path | None = HERE / "conclusions.md") -> list:

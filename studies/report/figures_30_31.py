@@ -1,9 +1,10 @@
-"""Do Figs 30 and 31 show what the report reads from them: waves of 80 um, isotropic before the tests, much lower after
-them and lowest along x?
+"""Do Figs 30 and 31 show what the report reads from them: waves of 80 um that are isotropic before the tests, much
+lower after the tests, and then lowest along x?
 
-In part: of 20 sets of four such traces, cut from a surface whose waves wear to 0.55 along x and 0.67 along y, `compare`
-calls the waves reduced along x in 7, along y in 5, and lower along x than along y in 3; one trace each way is too short
-to tell.
+Partly. The study cuts sets of four traces from a synthetic surface, on which wear multiplies the height of the waves by
+0.55 along x and 0.67 along y. In 7 of 20 such sets `compare` finds that the waves along x became lower, and in 5 sets
+that the waves along y became lower. In 3 sets `compare` finds the waves along x to be lower than those along y. A
+single trace in each direction is too short to decide.
 
 The surface is made, so that its larger swings are the report's 13 to 18 um, and worn as in studies/wear/bands.py: 6 um
 off each piece at a stroke of 6.4 um, both assumed. Its traces are 1 mm long, as those of the print, before and after at
@@ -49,8 +50,8 @@ from patchfem.surface.roughness.report import interval_of
 
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
-REPRODUCED = ("in part: on made surfaces, beside four heights in the heads of the print, whose curves could not be "
-              "read; four traces cannot show all of it")
+REPRODUCED = ("in part: on synthetic surfaces, compared with four heights that are printed above the curves. The "
+              "curves themselves could not be read, and four traces cannot prove everything that the report says")
 PRINTED = ((30.5626e-6, 21.5831e-6), (17.8602e-6, 14.8619e-6))  # heads of Figs 30 and 31 [m]: first and second scan
 STROKES, SETS, APART = (2, 4), 20, 160  # steps of 3.2 um; sets of four traces; lines between before and after
 UM, BITE = 1e-6, 0.03e-6

@@ -1,7 +1,8 @@
-"""Does wear, carried on from column to column of Table 1, move its repeats as they were read?
+"""Does wear between the columns of Table 1 explain the differences between its repeated readings?
 
-No: wear moves an acceleration by 0.7 % (root mean square) and in other directions than the readings, which differ by
-12 %. Friction that also follows the onset of slip in the table moves it by 2.7 % and leaves 10 %.
+No. Wear changes an acceleration by 0.7 % (root mean square), often in the wrong direction; the repeated readings differ
+by 12 %. If friction also changes with the onset of slip that the table gives, the acceleration changes by 2.7 %, and a
+difference of 10 % remains unexplained.
 
 The model that comes nearest to Table 1 is run through the test series in the order of the print, 135, 143, 150 and
 155 Hz and then 135 and 143 Hz again, each run on the pieces as the one before wore them (`wear.start`). Assumed: 10

@@ -1,8 +1,9 @@
-"""Would a sweep from 130 to 160 Hz below 5 g have shown one critical level at all frequencies, as the report says?
+"""Would a sweep from 130 to 160 Hz below 5 g have shown the same critical level at all frequencies, as the report says?
 
-Yes: sweep by sweep the acceleration becomes distorted between 4.39 and 4.40 g at every frequency for a rigid block
-whose friction gives way at 4.14 g, between 4.19 and 4.38 g from 136 Hz on for a block in grooves (4.20 g) and between
-4.24 and 4.37 g beside the second path (3.95 g); the report found 4 g critical at all frequencies.
+Yes. In each of three models the acceleration becomes distorted at nearly the same level at all frequencies, as in the
+report, which found 4 g. This level is 4.39 to 4.40 g for a rigid block that begins to slip at 4.14 g. From 136 Hz on it
+is 4.19 to 4.38 g for a block in grooves (slip from 4.20 g), and 4.24 to 4.37 g with a second load path (slip from 3.95
+g).
 
 The level of slip is that of the friction over the mass, whatever the frequency, because the friction rides with the
 base; what changes with frequency is how much the block moves then. Sweeps of 15 Hz/s (assumed), in stretches of ten

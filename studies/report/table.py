@@ -1,6 +1,6 @@
 """What do all studies ask and answer, what do they cost, and which figures of the report do they reproduce?
 
-See README.md in this folder, which this script writes from the studies themselves.
+The answers are in README.md of this folder. This script writes that page from the docstrings of the studies.
 
 A study that has QUESTION, ANSWER and REPRODUCED is asked for them, without running it; of the others question and
 answer stand in the gallery of studies/README.md. Seconds are CPU seconds of `python STUDY`, start and compiled code
@@ -87,13 +87,14 @@ def table(found: list, seconds: dict) -> str:
     yes = sum(one.reproduced == "yes" for one in figures)
     known = [seconds[one.path] for one in found if seconds.get(one.path) is not None]
     return "\n".join([
-        "# All studies in one table", "Written by `table.py` from the studies; seconds are CPU seconds of one core. "
-        f"{len(known)} of {len(found)} studies are measured, {sum(known):.0f} s together; a dash stands where none is "
-        "measured yet, or where a study wants a file or another program. "
-        f"A study of more than {LONG} s is marked long.", "",
-        f"Of {len(figures)} studies of figures of the report {yes} reproduce theirs, the others in part or not. "
-        "[The ten conclusions of the report](conclusions.md) have a table of their own.", "",
-        "| study | question | answer | seconds | figure reproduced |", "|---|---|---|---|---|", *rows, ""])
+        "# All studies in one table", "`table.py` generates this page from the studies. Computing times are CPU "
+        f"seconds of one core. {len(known)} of {len(found)} studies were measured and take {sum(known):.0f} s together."
+        " A dash means that the study was not measured yet, or that it needs a file or another program. "
+        f"Studies of more than {LONG} s are marked \"long\".", "",
+        f"{len(figures)} of the studies compute figures of the report: {yes} reproduce their figure, the others only a "
+        "part of it. [The ten conclusions of the report](conclusions.md) have their own table.", "",
+        "| study | question | answer | computing time [s] | is the figure of the report reproduced? |",
+        "|---|---|---|---|---|", *rows, ""])
 
 
 def shown(seconds: float | None) -> str:

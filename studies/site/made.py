@@ -147,7 +147,7 @@ def answer(name: str, folder: Path) -> list:
     if name == "sweep":
         found = pf.sweep(scene)
         save(pf.plot.sweep(found, "contact_fraction"), picture)
-        return [str(found.attrs["answer"]), f"![Share in contact over the tilt]({picture.name})"]
+        return [str(found.attrs["answer"]), f"![Contact fraction against tilt]({picture.name})"]
     result = pf.run(scene, say=lambda text: None)
     kind = "levels" if "levels" in name else KINDS[result.plan.kind]
     save(getattr(result.plot, kind)(), picture)
@@ -181,7 +181,7 @@ def changes(name: str, result, folder: Path) -> str:
             continue
         rows.append((f"`{measure}`", told(one.value, one.error, one.floor, one.unit),
                      *([told(other.value, other.error, other.floor, one.unit)] if plain is not None else [])))
-    heads = ("measure", "with it", "without it") if plain is not None else ("measure", "value")
+    heads = ("measure", "with the effect", "without the effect") if plain is not None else ("measure", "value")
     return keys_page.grid(heads, rows[:WITHOUT]) if rows else ""
 
 
@@ -222,7 +222,7 @@ def limits(name: str) -> list:
                 said.setdefault(sentence, []).append(f"`{other}`")
     rows = [(", ".join(dict.fromkeys(words)), sentence) for sentence, words in said.items()]
     more = "[Limits](../../../../patchfem/scene/LIMITS.md) has the bounds of all numbers and what the models neglect."
-    return [*([keys_page.grid(("not with", "message"), rows)] if rows else
+    return [*([keys_page.grid(("cannot be combined with", "message"), rows)] if rows else
               ["This effect can be combined with every other effect that the scene can have."]), more]
 
 

@@ -7,19 +7,20 @@ TERMS = {
                 "curves.",
     "bench": "A run whose slide is prescribed: `[friction]` with `[slide]` and a load. A bench gives the friction "
              "loop.",
-    "bond": "In the nonlocal law, a link between the two surfaces. A bond forms as a point slides, stretches, and "
-            "breaks within a few bond lengths.",
+    "bond": "In the nonlocal law, a link between the two surfaces. A bond forms when a point slides. It stretches "
+            "and breaks within a few bond lengths.",
     "bond length": "The slide over which a bond forms and breaks: the key `bond_length`, ε₀ in equations.",
     "bonded stiffness": "The stiffness of a spring in parallel with the contact: the table `[structure.bonded]`.",
-    "breakaway": "The share of a bond's length over which it stretches without damage.",
+    "breakaway": "The fraction of the bond length over which a bond stretches without damage: the key `breakaway`.",
     "condensed": "Reduced to the nodes of the interface by static condensation. The interior of a piece is eliminated "
                  "without loss of accuracy.",
     "crown": "A rounding of a face. The gap grows with the square of the distance from the middle of the crown.",
     "drive": "What causes the motion of the rig: an accelerated base, a force, or a release.",
     "dwell": "A rest between two parts of a prescribed slide. Bonds age during the rest.",
-    "effect": "A part of the model that a scene turns on by naming its table or value.",
-    "error bar": "The estimated numerical error of a measure, given as a half-width. It should be larger than the "
-                 "true numerical error in 19 of 20 scenes. An error bar does not include what the model neglects.",
+    "effect": "A part of the model that is used if the scene contains its table or value.",
+    "error bar": "The estimated numerical error of a measure, given as a half-width. The error bar should be "
+                 "larger than the true numerical error in 19 of 20 scenes. An error bar does not include what the "
+                 "model neglects.",
     "flutter": "Vibration that grows without a drive because a mode has a negative damping ratio.",
     "free and held rotation": "The rotation of a piece is held if the scene prescribes it. The rotation is free if "
                               "the piece turns until the moment of the pressure balances that of the load.",
@@ -33,8 +34,8 @@ TERMS = {
     "holder": "The rigid body to which the far face of a piece is bonded. `[contact.holder]` adds springs between the "
               "far face and the holder.",
     "interface": "The surface at which two pieces touch and rub, or the joint between two masses.",
-    "jump of wear": "Many cycles of wear taken in one step: `wear.jumps`. One cycle is computed and its wear counted "
-                    "for all cycles of the jump.",
+    "jump of wear": "Many cycles of wear taken in one step: `wear.jumps`. One cycle is computed; its wear is "
+                    "counted for all cycles of the jump.",
     "ladder": "The order of the folders of the package: each folder imports only the folders before it.",
     "load line": "The line along which the load acts. A load line away from the middle of the patch rotates a piece "
                  "whose rotation is free.",
@@ -51,13 +52,13 @@ TERMS = {
     "reading of the law": "One of two interpretations of equation 2.17: `stretch`, which never creates energy, or "
                           "`report`, the equation as printed in the report.",
     "rig": "Contact, modes and drive together. The friction acts on the modes, and the modes move the contact.",
-    "rms log error": "Root mean square of ln(computed/measured). 0.1 is a typical deviation of 10 %.",
+    "rms log error": "Root mean square of ln(computed/measured). A value of 0.1 means a typical deviation of 10 %.",
     "scene": "The input file. Its TOML tables say what is computed.",
     "shear modes": "Shapes in which the pieces deform in shear. The number of shear modes follows from the tolerance.",
     "skin": "The compliant rough layer of `[contact.asperities]`.",
     "stick": "The state of a contact, or of a part of it, without slip.",
     "stiffness chain": "The springs in series from the holder to the interface, as `patchfem plan` prints them.",
-    "strip": "One of several slices of the patch side by side over its width: `[contact.strips]`.",
+    "strip": "One of several slices of the patch that lie side by side across its width: `[contact.strips]`.",
     "stuck and free frequency": "Frequency of a mode with the contact sticking, and without contact. The measured "
                                 "frequencies of the joint lie between them.",
     "sweep": "One scene run for many values of its keys. A *swept sine*, by contrast, is a drive whose frequency "

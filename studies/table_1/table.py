@@ -123,8 +123,9 @@ def tables(rows: dict) -> list:
 
 
 def _rungs(rows: dict) -> list:
-    out = ["| model | reading | numbers | starts in the best valley | at 143 Hz | 135, 150, 155 Hz | left out | "
-           "all rows | seconds |", "|---|---|---|---|---|---|---|---|---|"]
+    out = ["| model | accelerometer shows | fitted numbers | starts that end in the best minimum | score at 143 Hz | "
+           "score at 135, 150, 155 Hz | score with each frequency left out | score if fitted to all rows | computing "
+           "time [s] |", "|---|---|---|---|---|---|---|---|---|"]
     for name, factor, fitted, held, left, whole in nulls():
         said = {"constant": "constant x input", "power_input": "power of input",
                 "power_input_frequency": f"input^{factor['input']:.2f} frequency^{factor['frequency']:.2f}"}[name]
@@ -159,11 +160,13 @@ def _left(rows: dict) -> list:
     """Each frequency left out: scores with their bootstrap, and how often the rows drawn anew prefer the model."""
     cells = cells_of(TABLE)
     every = np.ones(cells.row.size, bool)
-    out = ["| each frequency left out | reading | all | acceleration | displacement | better than the constant: all, "
-           "acceleration, displacement | better than the strong null in acceleration | folds whose best valley was "
-           "found twice | ends touched |", "|---|---|---|---|---|---|---|---|---|"]
+    out = ["| model | accelerometer shows | score of all readings | score of accelerations | score of displacements | "
+           "samples better than the constant: all, accelerations, displacements | samples better than the power of "
+           "input and frequency: accelerations | fits whose best minimum was found twice | parameters at an end of "
+           "their range |", "|---|---|---|---|---|---|---|---|---|"]
     null = {name: null_left(one) for name, one in RIVALS.items()}
-    listed = [(f"none: {name}", "", None, logs) for name, logs in null.items()] + shared(rows)
+    told = {"constant": "constant x input", "strong": "power of input and frequency"}
+    listed = [(f"none: {told[name]}", "", None, logs) for name, logs in null.items()] + shared(rows)
     for rung, reading, folds, logs in listed:
         own, drawn = scores(cells, logs, every), intervals(cells, logs, every)
         cellular = [f"{short(own[kind])} ({short(drawn[kind][0])} to {short(drawn[kind][1])})" for kind in KIND]
@@ -185,7 +188,8 @@ def _ends(folds) -> str:
 
 def _before(rows: dict) -> list:
     """The ladder before and after, for what stood in both."""
-    out = ["| model | reading | | at 143 Hz | 135, 150, 155 Hz | left out | starts |", "|---|---|---|---|---|---|---|"]
+    out = ["| model | accelerometer shows | version | score at 143 Hz | score at 135, 150, 155 Hz | score with each "
+           "frequency left out | starts |", "|---|---|---|---|---|---|---|"]
     for rung, reading, *before, starts in BEFORE:
         row = rows.get((rung, reading, "143", ""))
         if row is None:
@@ -197,7 +201,8 @@ def _before(rows: dict) -> list:
 
 
 def _placebos(rows: dict) -> list:
-    out = ["| placebo | in the place of | fitted | predicted |", "|---|---|---|---|"]
+    out = ["| model: wrong value | scores with the true value: fitted, predicted | score with the wrong value: fitted "
+           "| score with the wrong value: predicted |", "|---|---|---|---|"]
     for rung, reading, protocol, placebo in variants():
         row, real = rows.get((rung, reading, protocol, placebo)), rows.get((rung, reading, protocol, ""))
         if not placebo or row is None:
@@ -214,33 +219,38 @@ def head(rows: dict) -> list:
     left = {name: three(left_out(rows, *SAID[name])) for name in ("spring", "path", "damped", "seen")}
     none = {name: (three(held), three(out)) for name, _, _, held, out, _ in nulls()}
     draws = [100 * one[name]["bootstrap"]["better"]["constant"]["acceleration"] for name in ("path", "root")]
-    friction = f"{three(one['patch']['fitted'])}, and {three(one['patch']['others'])} elsewhere"
     said = [
-        "All scores here are those of all readings / accelerations / displacements. Smaller is better; repeated "
-        "accelerations agree to .086.",
-        f"**What the data exclude**: a block that friction alone holds, rigid ({three(one['rigid']['fitted'])} at "
-        f"143 Hz) or a patch with yaw ({friction}). A weight that hangs on its cable is no spring to them: the fit "
-        f"sets it to 0 and stays at {three(one['weight']['fitted'])}.",
-        f"**Fitted to 143 Hz alone, scored at 135, 150 and 155 Hz**: a constant times the input, "
-        f"{none['constant'][0]}; a power of input and frequency, {none['power_input_frequency'][0]}; spring and yaw, "
-        f"√2 x fundamental, three numbers, {three(one['spring']['others'])}; path of Fig. 27, peak x stuck, three "
-        f"numbers beside the gain and none of them of the path, {three(one['path']['others'])}, and under √2 x "
-        f"fundamental {three(one['root']['others'])}. Spring and yaw win the displacements and lose the accelerations "
-        f"to the constant. The path of Fig. 27 wins both, the accelerations by little: in {draws[0]:.0f} and "
-        f"{draws[1]:.0f} % of the draws of rows. It predicts the displacements worse than the spring, and at 143 Hz "
-        f"itself it is worse in everything: {three(one['path']['fitted'])} beside {three(one['spring']['fitted'])}."]
+        "Three scores separated by slashes are those of all readings / accelerations / displacements. Smaller scores "
+        "are better. Repeated readings of an acceleration differ by a score of .086.",
+        "**Models that the data exclude.** Friction alone does not explain the data. A rigid block scores "
+        f"{three(one['rigid']['fitted'])} at 143 Hz. A patch with yaw scores {three(one['patch']['fitted'])} at 143 Hz "
+        f"and {three(one['patch']['others'])} at the other frequencies. A weight on a cable acts as a second spring, "
+        f"but the fit sets its stiffness to 0; this model scores {three(one['weight']['fitted'])} at 143 Hz.",
+        "**Models fitted to 143 Hz alone.** The scores at 135, 150 and 155 Hz are: a constant times the input, "
+        f"{none['constant'][0]}; a power of input and frequency, {none['power_input_frequency'][0]}; \"spring and "
+        f"yaw\" with √2 x fundamental (three fitted numbers), {three(one['spring']['others'])}; \"path of Fig. 27\" "
+        f"with peak x stuck (three fitted numbers, none of them of the path itself), {three(one['path']['others'])}; "
+        f"\"path of Fig. 27\" with √2 x fundamental, {three(one['root']['others'])}.",
+        "Compared with the constant, \"spring and yaw\" predicts the displacements better and the accelerations "
+        "worse. \"Path of Fig. 27\" predicts both better than the constant. Its advantage in the accelerations is "
+        f"small: it appears in {draws[0]:.0f} % (peak x stuck) and {draws[1]:.0f} % (√2 x fundamental) of the samples "
+        "if the rows are resampled. \"Path of Fig. 27\" predicts the displacements worse than \"spring and yaw\". At "
+        f"143 Hz all its scores are worse: {three(one['path']['fitted'])} instead of "
+        f"{three(one['spring']['fitted'])}."]
     if "-" not in left.values():
         said.append(
-            f"**Each frequency left out in turn**: constant {none['constant'][1]}; power of input and frequency "
-            f"{none['power_input_frequency'][1]}; spring and yaw, √2 x fundamental, {left['spring']}; path of Fig. 27, "
-            f"peak x stuck, {left['path']}. In displacements both win over every null. A spring and a damper, peak x "
-            f"stuck, are no better than the constant, {left['damped']}, for without 143 Hz the fit has no yaw; where "
-            f"the accelerometer sees the yaw mode they score {left['seen']}. No rung of which this was made beats the "
-            "power of input and frequency in acceleration, which explains nothing.")
+            f"**Each frequency left out in turn.** The scores are: a constant times the input, {none['constant'][1]}; "
+            f"a power of input and frequency, {none['power_input_frequency'][1]}; \"spring and yaw\" with √2 x "
+            f"fundamental, {left['spring']}; \"path of Fig. 27\" with peak x stuck, {left['path']}. Both models "
+            "predict the displacements better than the constant and the power do. \"Second path\" (a spring and a "
+            f"damper) with peak x stuck scores {left['damped']}, no better than the constant, because the fit without "
+            f"143 Hz has no yaw. If the accelerometer also measures the yaw mode, this model scores {left['seen']}. "
+            "For the accelerations no model is better than the power of input and frequency, although this power explains "
+            "nothing.")
     said.append(
-        "**What they cannot tell**: whether the second path is a spring or the flank of a groove "
-        f"({three(one['lift']['others'])} elsewhere), with a damper or without, and whether the accelerometer showed "
-        "peaks, 1.24 times them, or √2 times the fundamental.")
+        "**What the data leave open.** The second path may be a spring or the flank of a groove "
+        f"({three(one['lift']['others'])} at the other frequencies), with or without a damper. The accelerometer may "
+        "have shown the peaks, 1.24 times the peaks, or √2 times the fundamental.")
     return "\n\n".join(fill(text, 120, break_long_words=False, break_on_hyphens=False) for text in said).split("\n")
 
 

@@ -21,7 +21,7 @@ def test_figure_8_the_piece_swings_as_its_closed_form():
         one = figure.loop(frequency)
         assert one.peak == pytest.approx(figure.ring(frequency), rel=2e-3)
         assert np.abs(one.friction).max() == pytest.approx(figure.LIMIT, rel=1e-12)
-        inside(figure.ANSWER, *[f"{one.peak:.2f} times the friction at 10 Hz"] * (frequency == 10))
+        inside(figure.ANSWER, *[f"{one.peak:.2f} times the friction force at 10 Hz"] * (frequency == 10))
 
 
 def test_figure_8_work_in_the_load_cell_is_the_work_of_the_friction():
@@ -37,7 +37,7 @@ def test_figure_8_work_in_the_load_cell_is_the_work_of_the_friction():
 def test_figure_8_the_sentence(tmp_path, capsys):
     figure = study("report/figure_8.py")
     loops = {one.frequency: one for one in figure.main(tmp_path / "x.svg")}
-    inside(figure.ANSWER, f"{loops[10].peak:.2f} times the", f"{loops[20].peak:.2f} at 20 Hz")
+    inside(figure.ANSWER, f"{loops[10].peak:.2f} times the", f"{loops[20].peak:.2f} times at 20 Hz")
     read = {f: figure.read_as_rigid(loops[f]) for f in (2.0, 10.0)}
     assert all(f"{static:.3f}" == "0.300" and abs(length * 1e6 - 3.5) < 0.06 for static, length in read.values())
     assert figure.LIMIT / figure.STIFFNESS == pytest.approx(3.5e-6, rel=0.01)
@@ -61,9 +61,10 @@ def test_exact_a_swept_block_that_friction_holds_moves_with_the_base():
 def test_sweeps_the_sentence(tmp_path, capsys):
     sweeps = study("report/sweeps.py")
     found = sweeps.main(tmp_path / "x.svg")
-    told = {"rigid block": ("at every", 0), "grooves": ("from 136", 136), "second path": ("beside", 136)}
+    told = {"rigid block": ("for a rigid block", 0), "grooves": ("for a block in grooves", 136),
+            "second path": ("with a second load path", 136)}
     for model, (words, least) in told.items():
-        words = "between {:.2f} and {:.2f} g " + words
+        words = "{:.2f} to {:.2f} g " + words
         mine = [one for one in found if one.model == model]
         level = sweeps.critical(mine)[mine[0].frequency > least]
         inside(sweeps.ANSWER, words.format(level.min(), level.max()))
@@ -97,7 +98,8 @@ def test_steps_the_sentence(tmp_path, capsys):
     inside(steps.ANSWER, f"are {np.exp(np.mean(stable)):.2f} times")
     gain, (low, high) = fits[True].fit.values[3], fits[True].fit.intervals[3]
     inside(steps.ANSWER, f"{gain:.2f} ({low:.2f} to {high:.2f})")
-    for part, words in (("fitted", "{:.3f} for {:.3f}, and"), ("held_out", "worse, {:.3f} for {:.3f}")):
+    for part, words in (("fitted", "143 Hz ({:.3f} instead of {:.3f})"),
+                        ("held_out", "other frequencies ({:.3f} instead of {:.3f})")):
         scores = [fits[free].scored(fits[free].logs, fits[free].left)[part]["all"] for free in (True, False)]
         inside(steps.ANSWER, words.format(*scores))
     for row in found.values():
@@ -127,7 +129,7 @@ def test_runaways_the_sentence(tmp_path, capsys):
     rows = {one.name: one for one in ways.main(tmp_path / "x.svg")}
     near, far = rows["grooves, yaw 0.25"], rows["grooves, yaw 0.30"]
     inside(ways.ANSWER, f"{near.levels[0]:.1f} to {far.levels[0]:.1f} g at 135",
-           f"{far.levels[1]} to {near.levels[1]} g at 143", f"moves {near.before[1]:.1f} to {far.before[1]:.1f} mil")
+           f"{far.levels[1]} to {near.levels[1]} g at 143", f"moves by {near.before[1]:.1f} to {far.before[1]:.1f} mil")
     assert near.levels[2:] == far.levels[2:] == (8.0, 8.0)
     inside(ways.__doc__, "Grooves leave at " + ", ".join(f"{level}" for level in rows["grooves"].levels))
     late = {name: one.levels[0] - one.levels[1] for name, one in rows.items()}
@@ -171,7 +173,7 @@ def test_engaged_the_sentence(tmp_path, capsys):
     peak = {(one.mode, one.touch, one.level): one.peak for one in turns}
     left = {key: value / peak[key[0], "one point on the axis", key[2]] for key, value in peak.items()}
     one, two = left["yaw", "a patch of 12.7 mm", 5.0], left["yaw", "two patches 20 mm apart", 5.0]
-    inside(engaged.ANSWER, f"leaves {one:.2f} of its peak, two patches 20 mm apart {two:.2f}")
+    inside(engaged.ANSWER, f"{one:.2f} of this height with a patch", f"{two:.2f} with two patches 20 mm apart")
     inside(engaged.__doc__, f"leaves {left['yaw', 'one point off it', 5.0]:.2f} of yaw",
            f"to {left['rocking', 'a patch of 12.7 mm', 5.0]:.5f} of its peak",
            f"leaves {left['rocking', 'one point off it', 5.0]:.2f} of it")
@@ -181,7 +183,7 @@ def test_engaged_the_sentence(tmp_path, capsys):
     inside(engaged.__doc__, *[f"{min(found):.2f} to {max(found):.2f}" for found in
                               ([one, *more[0]], [two, *more[1]])])
     coherent = {model: seen.coherence.mean() for model, (_, _, seen) in tests.items()}
-    inside(engaged.ANSWER, f"is {coherent['grooves']:.2f} to {coherent['rigid block']:.2f} in the mean")
+    inside(engaged.ANSWER, f"mean is {coherent['grooves']:.2f} to {coherent['rigid block']:.2f} if friction")
     assert f"{coherent['second path']:.2f}" == "0.99" and coherent["a damper as in Fig. 27"] > 0.99
     springs = [tests[engaged.SPRING], *(engaged.damped(engaged.SPRING, engaged.CRITICAL[engaged.SPRING], seed=seed)
                                         for seed in (2, 3, 4))]
