@@ -56,9 +56,9 @@ def _wave(equations: str, keys: tuple, traits: str = "", module: str = "patchfem
 EFFECTS = {
     "contact": Effect("patchfem.contact.unilateral", "w = g + theta x - delta + C f >= 0, f >= 0, f.w = 0, sum f = N",
                       (), ("pressure",)),
-    "contact.coating": Effect("", "Lame constants of the layer in the rows of elements of the coating"),
-    "contact.upper": Effect("", "C = C_upper + C_lower, each with its own size, ends, materials and coating"),
-    "contact.lower": Effect("", "C = C_upper + C_lower, each with its own size, ends, materials and coating"),
+    "contact.coating": Effect("", "Lame constants of the coating in the elements of the coating"),
+    "contact.upper": Effect("", "C = C_upper + C_lower; each piece has its own size, ends, materials and coating"),
+    "contact.lower": Effect("", "C = C_upper + C_lower; each piece has its own size, ends, materials and coating"),
     "contact.approach": Effect("", "delta given, N = sum f"),
     "contact.holder": Effect("", "sum f x = N offset + K theta, slide_i = q - F/K_t"),
     "contact.step": Effect(GAPS, "g += height H(x - at)"),
@@ -70,8 +70,10 @@ EFFECTS = {
     "contact.tilt": Effect(GAPS, "g += angle x"),
     "contact.load_line": Effect("", "sum f x = N offset, rotation free"),
     "contact.crown": Effect(GAPS, "g += x^2/(2 radius)"),
-    "contact.profile": Effect("patchfem.surface.nodes", "g += z(x), levelled, averaged over each node's cells"),
-    "contact.strips": Effect("patchfem.contact.strips", "C f_j >= R_j q - g - roll y_j per strip, one holder q"),
+    "contact.profile": Effect("patchfem.surface.nodes", "g += z(x); z is levelled and averaged over the elements at "
+                              "each node"),
+    "contact.strips": Effect("patchfem.contact.strips", "C f_j >= R_j q - g - roll y_j for each strip j; q is the "
+                             "motion of the common holder"),
     "contact.shear": Effect("patchfem.slip.shear_modes", "slide_i = q - sum_j C_ij f_j", ("pressure", "traction"), ()),
     "contact.grooves": Effect("patchfem.friction.grooves", CLIMB, ("pressure",), ("traction",)),
     "normal": Effect("", "sigma_n A = N at one point", (), ("pressure",)),
@@ -81,8 +83,8 @@ EFFECTS = {
                                  "set-valued timeless memoryless"),
     "friction.law=tanh": _law("laws.tanh", "F = mu N tanh(v/v_0) (2.4)", ("reference_speed", ""),
                               "joints varying-load harmonic comparison grooves", "memoryless creeps"),
-    "friction.law=elastic-plastic": _law("laws.elastic_plastic", "F' = k v, |F| <= mu N (3.12 with its reversal), k "
-                                         "the stiffness or mu N/bond_length", ("bond_length|stiffness", ""),
+    "friction.law=elastic-plastic": _law("laws.elastic_plastic", "F' = k v, |F| <= mu N (3.12, corrected for "
+                                         "reversals), k = stiffness or mu N/bond_length", ("bond_length|stiffness", ""),
                                          "shear joints varying-load harmonic comparison pieces grooves", "timeless"),
     "friction.law=nonlocal": _law("bonds.quadrature", "tau = -mu_s int phi(R/eps) sigma_n u/|u| dL1/eps_0 (2.17)",
                                   ("bond_length", "kinetic reading order rest_growth slip_growth rest_speed "
@@ -111,21 +113,22 @@ EFFECTS = {
     "slide.kind=constant": Effect("", "q = speed t", (), ("motion",)),
     "slide.kind=sine": Effect("", "q = amplitude sin(2 pi f t)", (), ("motion",)),
     "slide.kind=triangle": Effect("", "q moves between -amplitude and +amplitude at constant speed", (), ("motion",)),
-    "slide.kind=dwell": Effect("", "q = speed t, then rest for `hold` (2.10 with v = 0), then slide on at the same "
-                                   "speed", (),
+    "slide.kind=dwell": Effect("", "q = speed t, then q is constant for the time `hold` (2.10 with v = 0), then "
+                                   "the slide goes on at the same speed", (),
                                ("motion",)),
     "slide.kind=file": Effect("patchfem.inputs.paths", "q is linear between the rows of a table", (), ("motion",)),
     "structure": Effect("patchfem.structure.modes", "z_i'' + 2 zeta_i w_i z_i' + w_i^2 z_i = G_i + g_i (3.4)", (),
                         ("modes",)),
-    "structure.reduced": Effect("patchfem.structure.reduced", "x = V y, V of constraint and fixed-interface modes, or "
-                                "of free and residual attachment modes", (), ("modes",)),
+    "structure.reduced": Effect("patchfem.structure.reduced", "x = V y; V contains constraint modes and "
+                                "fixed-interface modes, or free modes and residual attachment modes", (), ("modes",)),
     "structure.bonded": Effect("patchfem.structure.bonded", "K += k s s^T, D += c s s^T / m", ("modes",)),
     "structure.start": Effect("patchfem.structure.starts", "z(0) = Phi^-1 x(0) (3.2)", ("modes",)),
     "drive.kind=base": Effect("patchfem.dynamics.propagator", "G_i = -base_i a(t)", ("modes",), ("motion",)),
     "drive.kind=force": Effect("patchfem.dynamics.propagator", "G_i = phi_i F(t)", ("modes",), ("motion",)),
     "drive.kind=free": Effect("patchfem.dynamics.propagator", "z(0), z'(0) given, G = 0", ("modes",), ("motion",)),
     "drive.waveform=sine": _wave("a(t) = a sin(2 pi f t)", ("frequency", _SIZE), "steady endless", module=""),
-    "drive.waveform=step": _wave("a(t) = a, or the base jumps by X: z(0) = -base X", ("", _SIZE), "endless"),
+    "drive.waveform=step": _wave("a(t) = a; or the base is displaced by X at t = 0: z(0) = -base X", ("", _SIZE),
+                                 "endless"),
     "drive.waveform=sweep": _wave("a(t) = a sin(2 pi int f dt), f' or f'/f constant",
                                   ("from to", f"rate log_rate {_SIZE}"), "steady"),
     "drive.waveform=levels": _wave("a(t) = a_k sin(2 pi f t), level after level",
@@ -140,27 +143,28 @@ EFFECTS = {
     "structure.stiffening": Effect("patchfem.dynamics.march.joints", "F = k_3 x^3 at the output"),
     "accuracy.method=exact": Effect("patchfem.dynamics.events.histories", "closed form or series between events"),
     "accuracy.method=march": Effect("patchfem.dynamics.march.loop_kernels",
-                                    "exact propagator of the modes, mean force along the path, Newton's method for the "
-                                    "force"),
+                                    "exact propagator of the modes, force averaged over the path of the step, Newton's "
+                                    "method for this force"),
     "accuracy.method=duhamel": Effect("patchfem.dynamics.comparison.duhamel",
                                       "Duhamel's integral with forces that are linear within a step, fixed-point "
                                       "iteration (3.10)"),
     "accuracy.method=newmark": Effect("patchfem.dynamics.comparison.newmark",
-                                      "Newmark's average acceleration; the interface sticks below a given speed"),
+                                      "Newmark's average acceleration; below a given sliding speed the interface "
+                                      "sticks"),
     "accuracy.method=euler": Effect("patchfem.dynamics.comparison.euler", "explicit Euler"),
     "accuracy.method=harmonic": Effect("patchfem.dynamics.harmonic.harmonic",
-                                       "x = Re sum X_k exp(i k w t); Coulomb: the map of "
-                                       "events over a period"),
+                                       "x = Re sum X_k exp(i k w t); with law `coulomb`: the "
+                                       "map of the motion from event to event over one period"),
     "wear": Effect("patchfem.wear.depth", "g += h, dh = coefficient p ds at each point; with form 'energy' dh = "
                                           "coefficient tau ds",
                    ("pressure", "traction")),
     "wear.friction": Effect("", "mu = mu_0 c(h), eps = eps_0 l(h), h = worn volume/area", ("traction",)),
-    "measured": Effect("", "overlay of measured rows"),
+    "measured": Effect("", "measurements plotted over the results"),
     "measured.reading=fundamental": Effect("patchfem.response.spectrum", "|a_1| of a(t) = Re sum a_n exp(i n w t)"),
     "measured.reading=rms": Effect("patchfem.response.spectrum", "sqrt(1/T int a^2 dt)"),
     "measured.reading=lowpass": Effect("patchfem.response.spectrum", "max |Re sum a_n H(n f) exp(i n w t)|, H = "
                                        "1/(1 + sqrt2 s + s^2), s = i n f/cutoff"),
-    "sweep": Effect("patchfem.campaigns.sweeps.cases", "one case per combination of the values of its keys"),
+    "sweep": Effect("patchfem.campaigns.sweeps.cases", "one case for each combination of the values of the swept keys"),
 }
 
 # an interface between two masses carries the keys of [friction] itself
@@ -252,16 +256,16 @@ def refusal(word: str, least: str = "", odd=None) -> str:
 
 MEANWHILE = {  # what serves where two effects cannot stand together yet
     "order": "use order = 1",
-    "recursion": 'use reading = "stretch" with order = 1 and no breakaway',
+    "recursion": 'use reading = "stretch" with order = 1 and without breakaway',
     "elastic range": "set breakaway = 0",
-    "kinetic": "leave kinetic out",
+    "kinetic": "leave out the key kinetic",
     "shapes": "put the shapes on the upper piece",
-    "either": "leave one of them out",
-    "out": "leave it out",
+    "either": "leave one of the two out",
+    "out": "leave out this entry",
     "linear": "use 'linear'",
     "march": "use 'march'",
     "march or stiff": "use 'march', or law 'elastic-plastic' with a short bond_length",
-    "stiff": "use law 'elastic-plastic' with a short bond_length, which acts as Coulomb friction behind stiff springs",
+    "stiff": "use law 'elastic-plastic' with a short bond_length, which approximates Coulomb friction",
 }
 
 

@@ -178,112 +178,117 @@ def _shaken(name: str, unit: str, floor: float, words: str) -> tuple:
     """Rows of a measure of a random drive, and of the scatter of records about it."""
     scatter = f"{name}_scatter"
     return (Row(name, unit, floor, words, lambda s: s.shaken.get(name)),
-            Row(scatter, unit, floor, f"half-width of the 95 % interval of {name}, by the scatter between "
-                "records of this length with other random seeds", lambda s: s.shaken.get(scatter),
+            Row(scatter, unit, floor, f"half-width of the 95 % interval of {name}: the scatter between "
+                "random drives of the same length with different seeds", lambda s: s.shaken.get(scatter),
                 term=(name, lambda values: np.abs(values.get(name, 0.0)))))
 
 
 FOURTH = 0.2, 0.0  # of the change by half the samples: what is read off cubics between them is of fourth order
 ROWS = (
-    Row("relative_displacement_amplitude", "m", 1e-10, "half peak-to-peak displacement at the output, relative to the "
-                                                       "base",
+    Row("relative_displacement_amplitude", "m", 1e-10, "half the peak-to-peak displacement at the output, relative to "
+                                                       "the base",
         lambda s: float(s.extremes[:, 1].max() - s.extremes[:, 0].min()) / 2 if s.own.swing is None else s.own.swing),
     Row("absolute_acceleration_peak", "m s-2", 1e-4, "largest acceleration at the output, base motion included",
         lambda s: acceleration_peak(s.window) if s.own.acceleration is None else s.own.acceleration),
-    Row("friction_force_peak", "N", 1e-6, "largest friction force of the whole interface",
+    Row("friction_force_peak", "N", 1e-6, "largest friction force on the whole interface",
         lambda s: None if s.load is None else s.own.loops[0].force if s.own.loops else
         float(np.abs(s.window.force).max()), group="friction"),
     Row("energy_balance", "1", 1e-8,
-        "error of the energy balance over the run: work minus stored and dissipated energy, relative to the energy "
-        "exchanged plus the largest energy stored",
+        "error of the energy balance over the run: work minus stored energy minus dissipated energy, divided by the "
+        "sum of the exchanged energy and the largest stored energy",
         lambda s: energy_balance(s.book), group="energy", term=("1", lambda _: 1.0)),
     Row("absolute_acceleration_fundamental", "m s-2", FLOOR,
         "first harmonic of the acceleration at the output, base motion included",
         lambda s: s.waves.get("absolute_acceleration_fundamental")),
     Row("acceleration_distortion", "1", 1e-6,
-        "third harmonic of the acceleration at the output, base motion included, divided by the first; null if the "
-        "output does not move",
+        "third harmonic of the acceleration at the output, base motion included, divided by the first harmonic; null "
+        "if the output does not move",
         lambda s: s.waves.get("acceleration_distortion")),
     Row("drift_per_cycle", "m", 1e-11,
-        "mean change per cycle of the time mean of the slide, from the first to the last cycle of the window",
+        "change of the mean slide per cycle: mean slide over the last cycle of the window minus mean slide over the "
+        "first cycle, divided by the number of cycles between the two",
         lambda s: drift(s.window.time, s.window.slide, s.window.slide_rate, s.drive.period) if s.own.drift is None
         else s.own.drift,
-        term=("slip, or motion", _moved), halves=FOURTH),
+        term=("slip amplitude (without slip: amplitude of the motion)", _moved), halves=FOURTH),
     Row("slip_amplitude", "m", 1e-10,
-        "half peak-to-peak of the irreversible part of the slide, as a weighted mean: points of a patch are weighted "
-        "by the pressure, sliders of law 'iwan' by their slip forces",
+        "half the peak-to-peak value of the irreversible part of the slide; for a patch, the mean over its points, "
+        "weighted by the pressure; for law 'iwan', the mean over the sliders, weighted by their slip forces",
         lambda s: s.slip.get("slip_amplitude"), group="friction"),
     Row("stick_fraction", "1", 1e-3,
-        "share of the last cycles in which the interface as a whole sticks: more than half of the motion of the slide, "
-        "weighted as in slip_amplitude, is elastic; part of a patch, or some sliders of law 'iwan', may slip at the "
-        "same time",
+        "share of the time of the last cycles in which the interface as a whole sticks, which means that more than "
+        "half of the change of the slide (weighted as in slip_amplitude) is elastic; part of a patch, or some sliders "
+        "of law 'iwan', may slip during this time",
         lambda s: s.slip.get("stick_fraction"), 0.35, group="friction", term=("1", lambda _: 1.0),
         halves=(2.5, 0.5)),
     Row("slip_start_phase", "rad", 1e-3,
-        "phase of the base displacement at which slip starts after stick, modulo pi; slip is the weighted mean defined "
-        "for slip_amplitude; the phase is printed in degrees",
+        "phase of the base displacement at which slip starts after stick, modulo pi; slip here means the weighted mean "
+        "that slip_amplitude defines; this phase is printed in degrees",
         lambda s: s.slip.get("slip_start_phase"), 1.0, group="friction", term=("pi", lambda _: np.pi),
         halves=(2.5, 1.0)),
-    Row("normal_load", "N", 0.0, "normal load on the interface, all pairs together", lambda s: s.load,
+    Row("normal_load", "N", 0.0, "normal load on the interface, sum over all pairs", lambda s: s.load,
         group="friction"),
     Row("loop_area", "J", 1e-10,
-        "energy dissipated per cycle in this interface alone; null if the drive is not a sine and the loop does not "
-        "close, because the interface then stores or returns more than it dissipates",
+        "energy dissipated per cycle in this interface alone; null if the drive is not a sine and the friction loop "
+        "does not close, because the interface then stores or returns more energy than it dissipates",
         lambda s: s.cycle.get("loop_area"), group="energy"),
     Row("equivalent_stiffness", "N m-1", 1.0,
-        "in-phase part of the first harmonic of the friction force divided by the first harmonic of the slide; "
-        "negative if friction holds the spring deflected during stick",
-        lambda s: s.cycle.get("equivalent_stiffness"), group="friction", term=("whole first harmonic", first_harmonic)),
+        "first harmonic of the friction force (only the part in phase with the slide) divided by the first harmonic of "
+        "the slide; negative if friction holds the spring deflected during stick",
+        lambda s: s.cycle.get("equivalent_stiffness"), group="friction",
+        term=("magnitude of the ratio of both parts (in phase and out of phase)", first_harmonic)),
     Row("secant_stiffness", "N m-1", 1.0,
-        "friction force at the largest slide of a cycle minus the friction force at the smallest, divided by the range "
-        "of the slide; where the force jumps, the mean of both sides counts",
+        "friction force at the largest slide of a cycle minus friction force at the smallest slide, divided by the "
+        "range of the slide; if the force jumps there, the mean of the forces before and after the jump is used",
         lambda s: s.cycle.get("secant_stiffness"), group="friction", halves=FOURTH),
     Row("equivalent_damping", "1", 1e-8,
-        "equivalent damping ratio of friction in the first mode that is not rigid, averaged over the last cycles: loop "
-        "area over 2 pi K A^2, where K = moving_mass omega_1^2 and A is half the range of the slide in a cycle divided "
-        "by the `slide` of this mode; null if other modes carry more than 5 % of the slide",
+        "equivalent damping ratio of friction in the first mode that is not rigid, averaged over the last cycles: "
+        "loop_area/(2 pi K A^2), where K = moving_mass omega_1^2 and A is half the range of the slide in a cycle, "
+        "divided by the key `slide` of this mode; null if other modes contribute more than 5 % of the slide",
         lambda s: s.cycle.get("equivalent_damping"), group="friction", halves=FOURTH),
-    Row("friction_work", "J", 1e-10, "work done on all interfaces together over the run; with method `harmonic`, over "
-                                     "two cycles",
+    Row("friction_work", "J", 1e-10, "work done on all interfaces together over the whole run; with method `harmonic`, "
+                                     "over two cycles",
         lambda s: s.energies.get("friction_work"), group="energy"),
-    Row("energy_stored", "J", 1e-10, "energy stored in all interfaces at the end: elastic energy, and over grooves the "
-                                     "potential energy of the load or, for a load that changes, the work done against "
-                                     "it", group="energy"),
-    Row("energy_dissipated", "J", 1e-10, "energy dissipated by friction in all interfaces over the run",
+    Row("energy_stored", "J", 1e-10, "energy stored in all interfaces at the end of the run: elastic energy and, with "
+                                     "grooves, the potential energy of the load (if the load changes: the work done "
+                                     "against the load)", group="energy"),
+    Row("energy_dissipated", "J", 1e-10, "energy dissipated by friction in all interfaces over the whole run",
         lambda s: s.energies.get("energy_dissipated"), group="energy"),
     Row("energy_created", "J", 1e-10,
-        "energy created over the run by a law that is not passive, such as eq. 2.17 as printed in the report",
+        "energy created over the whole run by a law that is not passive, such as eq. 2.17 as printed in the report",
         lambda s: s.energies.get("energy_created"), group="energy"),
     Row("normal_load_least", "N", 1e-6, "smallest normal load in the last cycles", lambda s: s.of_load(np.min),
         group="friction"),
     Row("normal_load_peak", "N", 1e-6, "largest normal load in the last cycles", lambda s: s.of_load(np.max),
         group="friction"),
-    Row("open_fraction", "1", 1e-3, "share of the last cycles without contact",
+    Row("open_fraction", "1", 1e-3, "share of the time of the last cycles in which the surfaces are not in contact",
         lambda s: s.of_load(lambda load: np.mean(load <= 0)), 4.0, group="friction", term=("1", lambda _: 1.0)),
     Row("relative_displacement_amplitude_steady", "m", 1e-10,
-        "steady amplitude, extrapolated for a motion that has not settled or still changes by 2 % of the tolerance"),
-    Row("peak_frequency", "Hz", 0.0, "drive frequency at which a curve of steady states has its largest amplitude"),
-    Row("friction_ratio_end", "1", 1e-9, "ratio of friction to normal load at the end of the slide", group="friction"),
-    Row("friction_ratio_peak", "1", 1e-9, "largest ratio of friction to normal load over the run", group="friction"),
+        "steady amplitude, extrapolated if the motion has not settled or will still change by 2 % of the tolerance"),
+    Row("peak_frequency", "Hz", 0.0, "drive frequency at which the curve of steady amplitudes has its maximum"),
+    Row("friction_ratio_end", "1", 1e-9, "friction force divided by normal load at the end of the slide",
+        group="friction"),
+    Row("friction_ratio_peak", "1", 1e-9, "largest value of friction force divided by normal load during the run",
+        group="friction"),
     Row("flutter_amplitude", "m", 1e-10,
         "amplitude (half peak-to-peak at the output) of the unstable limit cycle without a drive, in which friction "
         "dissipates exactly what a mode of negative damping supplies; smaller motions decay, larger motions grow"),
     Row("work_check", "1", 1e-2,
-        "relative difference between two values of the friction work: by the trapezoidal rule on the samples of the "
-        "run, and in the energy balance of the run",
+        "relative difference between two values of the friction work of the run: the value from the trapezoidal rule "
+        "on the samples, and the value in the energy balance",
         lambda s: s.work_check, group="energy"),
     *_shaken("relative_displacement_rms", "m", 1e-10, "root mean square displacement at the output about its mean, "
                                                       "under a random drive"),
     *_shaken("absolute_acceleration_rms", "m s-2", 1e-4, "root mean square acceleration at the output, base motion "
                                                          "included, under a random drive"),
-    *_shaken("response_frequency", "Hz", 1e-3, "frequency of the largest peak of H1, the frequency response under a "
-                                               "random drive"),
-    *_shaken("response_damping", "1", 1e-5, "damping ratio of the peak of H1, structure and friction together"),
+    *_shaken("response_frequency", "Hz", 1e-3, "frequency of the largest peak of the frequency response (H1 estimate) "
+                                               "under a random drive"),
+    *_shaken("response_damping", "1", 1e-5, "damping ratio of the largest peak of the frequency response (H1 "
+                                            "estimate), structure and friction together"),
     Row("ring_frequency", "Hz", 1e-3, "frequency of the free vibration (ringing) during stick"),
     Row("ring_damping", "1", 1e-6, "damping ratio of the free vibration (ringing) during stick"),
     Row("onset_level", "m s-2", 0.0,
-        "drive level at the onset that drive.onset defines, found by bisection between two levels; in N for a force "
-        "drive", group="friction"),
+        "drive level at the onset of slip, as drive.onset defines this onset, found by bisection between two levels; "
+        "in N for a force drive", group="friction"),
     Row("jump_level", "m s-2", 0.0,
         "drive level just after the largest jump of the amplitude; a jump is a step between two levels at which the "
         "ratio of the amplitudes is at least 1.5 times the ratio of the levels; in N for a force drive"),

@@ -73,8 +73,8 @@ def _selected(model: type[Table], key: str) -> str:
                          for value, (needs, _) in values.items() if needs)
     wanted, used = ([f"'{value}'" for value, words in values.items() if key in each(words[place])]
                     for place in (0, 1))  # fmt: skip
-    return "; ".join(f"{verb} {selector} {', '.join(found)}" for verb, found in (("needed by", wanted),
-                                                                                ("used by", used)) if found)
+    return "; ".join(f"{verb} {selector} {', '.join(found)}" for verb, found in (("needed with", wanted),
+                                                                                ("used with", used)) if found)
 
 
 def _quantities(found: dict, kind: str) -> None:
@@ -99,7 +99,7 @@ def _spelled(unit: str) -> str:
 
 
 def _material(table: dict) -> dict:
-    return {"description": "a name of the material table, or elastic constants",
+    return {"description": "the name of a listed material, or elastic constants and density",
             "anyOf": [{"type": "string", "enum": list(MATERIALS)}, table]}
 
 
@@ -107,5 +107,5 @@ def _sweep() -> dict:
     values = {"anyOf": [{"type": "string"}, {"type": "array", "minItems": 1}, {"type": "object"}],
               "examples": ["1e-6 rad..1e-2 rad:9"]}
     return {"type": "object", "minProperties": 1, "additionalProperties": values,
-            "description": 'keys of the scene with values or ranges, "table.key" = "low..high:number"; '
-                           "patchfem sweep runs all combinations"}
+            "description": 'keys of the scene with their values or ranges, "table.key" = "low..high:number"; '
+                           "patchfem sweep runs the scene for all combinations"}

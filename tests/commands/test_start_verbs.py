@@ -37,7 +37,7 @@ def test_exact_new_writes_what_it_prints(tmp_path):
 
 def test_exact_new_names_its_kinds():
     assert [line.split()[0] for line in cli("new").out.splitlines()] == list(KINDS)
-    said = f"joitn: unknown kind of scene; did you mean 'joint'? one of {', '.join(KINDS)}\n"
+    said = f"joitn: unknown kind of scene; did you mean 'joint'? use one of {', '.join(KINDS)}\n"
     assert cli("new", "joitn")[::2] == (2, said)
     with pytest.raises(pf.PatchfemError, match="did you mean 'joint'"):
         pf.new("joitn")

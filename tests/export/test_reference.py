@@ -72,12 +72,12 @@ def test_exact_rows_say_kind_limits_default_and_what_needs_the_key():
     assert rows["`length`"][:3] == ["length, > 0", "", "yes"]
     assert rows["`pairs`"][:3] == ["whole number, >= 1, <= 1000000", "1", ""]
     assert rows["`plane`"][:2] == ["`strain`, `stress`", "`strain`"]
-    assert rows["`load`"][2] == "unless [contact.approach]"
+    assert rows["`load`"][2] == "unless [contact.approach] is given"
     rows = {key: rest for key, *rest in section("`[friction]`")}
-    assert rows["`reference_speed`"][:3] == ["velocity, > 0", "", "law `tanh`"]
+    assert rows["`reference_speed`"][:3] == ["velocity, > 0", "", "with law `tanh`"]
     assert rows["`breakaway`"][:2] == ["number, >= 0, <= 1", "0"]
     rows = {key: rest for key, *rest in section("`[drive]`")}
-    assert rows["`levels`"][0] == "list of accelerations, >= 0" and rows["`from`"][2] == "waveform `sweep`"
+    assert rows["`levels`"][0] == "list of accelerations, >= 0" and rows["`from`"][2] == "with waveform `sweep`"
     assert section("`[[structure.spring]]`")[0][:2] == ["`between`", "pair of whole numbers, >= 0, <= 1000000"]
     assert {key for key, *_ in section("`[[structure.interface]]`")} == {"`between`", "`load`"}
 
@@ -105,7 +105,7 @@ def limits_at(title: str) -> dict:
 
 def test_exact_the_page_of_limits_says_what_a_scene_is_answered():
     """Of scenes written here anew: what it calls "no" is refused with its sentence, what it calls "yes" is not."""
-    cells = limits_at("Laws in a rig") | limits_at("Laws in a rig, further") | limits_at("Methods")
+    cells = limits_at("Laws in a rig") | limits_at("Laws in a rig, continued") | limits_at("Methods")
     assert {law.partition(",")[0] for law, _ in cells} == set(LAWS)
     said = limits.FILE.read_text("utf-8")
     lugre, lower = 'stiffness = "1e7 N/m"\nstribeck_speed = "1 mm/s"\n', "shapes on the lower piece"

@@ -124,7 +124,7 @@ def test_exact_onset_of_a_force_drive_is_mu_n(method):
 def test_refuses_levels_in_the_unit_of_the_other_drive():
     text = RIG.format(law='law = "coulomb"', levels='["3 g"]', method="")
     assert "drive.levels" in mistakes(text.replace('kind = "base"', 'kind = "force"'))[0]
-    assert "but this is a force" in mistakes(text.replace('kind = "base"', 'kind = "force"'))[0]
+    assert "but a force is needed" in mistakes(text.replace('kind = "base"', 'kind = "force"'))[0]
     assert "acceleration" in mistakes(text.replace("3 g", "3 N"))[0]
     assert "drive.onset_length" in mistakes(text.replace('"slip"', '"gauge"'))[0]
 

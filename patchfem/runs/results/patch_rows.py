@@ -3,27 +3,28 @@
 from ...core import Row
 
 ROWS = (
-    Row("normal_load", "N", 0.0, "normal load on the interface, all pairs together", group="patch"),
-    Row("contact_fraction", "1", 0.0, "share of the interface that is in contact; edges of contact are found between "
-                                      "the nodes",
+    Row("normal_load", "N", 0.0, "normal load on the interface, sum over all pairs", group="patch"),
+    Row("contact_fraction", "1", 0.0, "share of the length of the interface that is in contact; the edges of contact "
+                                      "may lie between nodes",
         group="patch"),
     Row("pressure_peak", "Pa", 0.0, "largest normal stress on the interface", group="patch"),
-    Row("moment", "N m", 1e-10, "moment of the pressure about the middle of the patch, positive if the pressure centre "
-                                "is at +x",
+    Row("moment", "N m", 1e-10, "moment of the pressure about the middle of the patch; positive if the pressure centre "
+                                "is on the side x > 0",
         group="patch"),
     Row("rotation", "rad", 1e-12, "rotation of the upper piece about the middle of the patch; positive opens the gap "
                                   "at +x",
         group="patch"),
-    Row("approach", "m", 1e-13, "approach of the holders at x = 0 since first touch of the unloaded flat pieces",
+    Row("approach", "m", 1e-13, "distance by which the holders approach each other at x = 0, counted from the first "
+                              "touch of the unloaded flat pieces",
         group="patch"),
-    Row("contact_half_width", "m", 1e-12, "half the length in contact; edges of contact are found between the nodes",
+    Row("contact_half_width", "m", 1e-12, "half the length in contact; the edges of contact may lie between nodes",
         group="patch"),
-    Row("pressure_centre", "m", 1e-12, "position along x of the resultant of the pressure, from the middle of the "
-                                       "patch",
+    Row("pressure_centre", "m", 1e-12, "position along x of the resultant of the pressure, relative to the middle "
+                                       "of the patch",
         group="patch"),
     Row("loaded_fraction", "1", 0.0, "mean pressure over the whole interface divided by the pressure peak",
         group="patch"),
-    Row("normal_stiffness", "N m-1", 0.0, "derivative of the load with respect to the approach at fixed rotation, over "
+    Row("normal_stiffness", "N m-1", 0.0, "derivative of the load with respect to the approach at fixed rotation, for "
                                           "the whole width",
         group="patch"),
     Row("tangential_stiffness", "N m-1", 0.0, "derivative of the friction force with respect to the slide while the "
@@ -32,7 +33,7 @@ ROWS = (
     Row("rotational_stiffness", "N m rad-1", 0.0, "derivative of the moment with respect to the rotation at fixed "
                                                   "approach",
         group="patch"),
-    Row("pressure_centre_lateral", "m", 1e-12, "lateral position of the resultant of the pressure; needs "
+    Row("pressure_centre_lateral", "m", 1e-12, "position across the width of the resultant of the pressure; needs "
                                                "[contact.strips]",
         group="patch"),
     Row("worn_volume", "m3", 0.0, "volume worn off both pieces together", group="wear"),

@@ -19,24 +19,26 @@ Summing = Annotated[Literal["auto", "direct", "truncated", "merged", "recursion"
 
 
 class Accuracy(Table):
-    """The tolerance, from which every numerical choice follows, and parameters that fix single choices."""
+    """The tolerance, which determines the numerical settings, and keys that fix single settings in place of the
+    tolerance."""
 
-    tolerance: key(number(gt=0, lt=1), "largest relative error wanted in any measure; the numerical settings "
-                   "follow from it") = 1e-3
-    method: key(Literal["auto", "exact", "march", "duhamel", "newmark", "euler", "harmonic"],
-                "solver of the motion; default: chosen from the scene") = "auto"
+    tolerance: key(number(gt=0, lt=1), "largest relative error that is allowed in any measure; the numerical settings "
+                   "follow from this tolerance") = 1e-3
+    method: key(Literal["auto", "exact", "march", "duhamel", "newmark", "euler", "harmonic"], "method that computes "
+                "the motion; default: the program chooses a method for the scene") = "auto"
     steps_per_cycle: key(whole(4, 10_000_000) | None, "time steps per cycle; default: set by the tolerance") = None
-    quadrature: key(Summing, "method of the sum over bonds; default: the cheapest within the tolerance") = "auto"
-    tail: key(Share | None, "share of the bonds that quadrature 'truncated' leaves out; default: set by the "
-                            "tolerance") = None
-    merge: key(Share | None, "width, in bond lengths, within which bonds are merged; default: set by the "
-                             "tolerance") = None
+    quadrature: key(Summing, "method that computes the sum over bonds; default: the fastest method that meets the "
+                    "tolerance") = "auto"
+    tail: key(Share | None, "fraction of the bonds that `quadrature` 'truncated' neglects; default: set by the "
+              "tolerance") = None
+    merge: key(Share | None, "width, in bond lengths, within which bonds are merged; default: set by "
+               "the tolerance") = None
     harmonics: key(whole(1, 10_000) | None, "number of harmonics in the harmonic balance; default: set by the "
                                             "tolerance") = None
     shear_modes: key(whole(1, 10_000) | None, "number of shear modes of the pieces; default: set by the "
                                               "tolerance") = None
-    convergence: key(Literal["force", "velocity", "displacement"] | None, "quantity whose change ends the iteration of "
-                     "method 'duhamel'") = None
-    convergence_tolerance: key(Positive | None, "relative change at which the iteration of method 'duhamel' "
-                               "ends") = None
-    stick_speed: key(Speed | None, "speed below which method 'newmark' treats the interface as stuck") = None
+    convergence: key(Literal["force", "velocity", "displacement"] | None, "quantity whose relative change per "
+                     "iteration decides when method 'duhamel' stops iterating") = None
+    convergence_tolerance: key(Positive | None, "relative change of the quantity `convergence` below which method "
+                               "'duhamel' stops iterating") = None
+    stick_speed: key(Speed | None, "sliding speed below which method 'newmark' treats the interface as stuck") = None

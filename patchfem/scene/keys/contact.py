@@ -16,9 +16,9 @@ Piece = Literal["upper", "lower"]
 
 
 class Material(Table):
-    """Elastic constants of a piece or a coating, written inline or looked up by name."""
+    """Elastic constants and density of a piece or a coating, given as values or by the name of a material."""
 
-    name: key(str | None, "name of the material in the material table") = None
+    name: key(str | None, "name of a material that is listed in MATERIALS.md") = None
     young: key(quantity("pressure", gt=0), "Young's modulus")
     poisson: key(number(gt=-1, lt=0.5), "Poisson's ratio")
     density: key(quantity("density", gt=0), "mass per volume")
@@ -40,131 +40,142 @@ Substance = Annotated[Material, BeforeValidator(material)]
 
 
 class Coating(Table):
-    """A hard layer on a piece; its thickness is part of the height of the piece."""
+    """A hard layer on a piece; the thickness of this layer is part of the height of the piece."""
 
-    material: key(Substance, "material of the coating, given in the same way as substrate")
-    thickness: key(Length, "thickness of the coating, included in the height of its piece")
+    material: key(Substance, "material of the coating, given in the same way as `contact.substrate`")
+    thickness: key(Length, "thickness of the coating, which is included in the height of the piece")
 
 
 class OnePiece(Table):
-    """Properties of one piece that differ from those in [contact]; `coating = "none"` removes the coating."""
+    """Properties of one piece that differ from the properties in [contact]; `coating = "none"` removes the coating."""
 
-    height: key(Length | None, "height of this piece; default contact.height") = None
-    length: key(Length | None, "length of this piece, centred at x = 0; default contact.length; the interface has the "
-                               "length of the shorter piece") = None
-    substrate: key(Substance | None, "material of this piece; default contact.substrate") = None
-    coating: key(Coating | Literal["none"] | None, 'coating of this piece, {material = ..., thickness = ...}, or '
-                                                   '"none"; default contact.coating') = None
-    chamfer: key(Length | None, "size of the 45 degree chamfer at both ends; the interface stops where the chamfer "
-                 "starts") = None
-    end_radius: key(Length | None, "radius of the rounded ends; the interface stops where the slope of "
-                    "the rounding exceeds 0.097") = None
+    height: key(Length | None, "height of this piece; default: `contact.height`") = None
+    length: key(Length | None, "length of this piece, centred at x = 0; default: `contact.length`; the interface has "
+                "the length of the shorter piece") = None
+    substrate: key(Substance | None, "material of this piece; default: `contact.substrate`") = None
+    coating: key(Coating | Literal["none"] | None, "coating of this piece, {material = ..., thickness = ...}, or "
+                 '"none"; default: `contact.coating`') = None
+    chamfer: key(Length | None, "length along x of the 45 degree chamfer at both ends; the interface stops where the "
+                 "chamfer starts") = None
+    end_radius: key(Length | None, "radius of the rounded ends; the interface stops where the slope of the rounded "
+                    "end exceeds 0.097") = None
 
 
 class Tilt(Table):
-    """A prescribed angle between the pieces; `on` is the piece that carries the shape."""
+    """A prescribed angle between the pieces; `on` names the piece that is tilted."""
 
-    angle: key(quantity("angle"), "angle between the pieces; > 0 opens the gap at +x")
-    on: key(Piece, "the piece that carries the shape; the pressure moves with this piece as it slides") = "upper"
+    angle: key(quantity("angle"), "angle between the pieces; an angle > 0 opens the gap at +x")
+    on: key(Piece, "piece that is tilted; during the slide the pressure distribution moves with this piece") = "upper"
 
 
 class LoadLine(Table):
     """An off-centre load, given by its offset or its moment; the upper piece is free to rotate."""
 
-    offset: key(Place | None, "distance of the load line from the middle of the patch; > 0 moves the pressure to "
-                "+x", "unless moment") = None
-    moment: key(quantity("moment") | None, "moment about the middle of the patch, in place of the offset") = None
+    offset: key(Place | None, "distance of the load line from the middle of the patch; an offset > 0 moves the "
+                "pressure towards +x", "unless `moment` is given") = None
+    moment: key(quantity("moment") | None, "moment of the load about the middle of the patch, in "
+                "place of `offset`") = None
 
 
 class Approach(Table):
     """A prescribed approach of the holders in place of the load."""
 
-    distance: key(quantity("length", ge=0), "approach of the holders from first touch, in place of a load")
+    distance: key(quantity("length", ge=0), "distance by which the holders approach each other after first touch, in "
+                  "place of a load")
 
 
 class Holder(Table):
     """Springs between the far face of a piece and its holder."""
 
-    rotational_stiffness: key(quantity("rotational stiffness", gt=0) | None, "rotational stiffness between the far "
-                              "face and its holder", "unless tangential_stiffness") = None
-    tangential_stiffness: key(quantity("stiffness", gt=0) | None, "stiffness along x between the far face and its "
-                                                                  "holder; default rigid") = None
+    rotational_stiffness: key(quantity("rotational stiffness", gt=0) | None, "rotational stiffness of the spring "
+                              "between the far face of the piece and its holder",
+                              "unless `tangential_stiffness` is given") = None
+    tangential_stiffness: key(quantity("stiffness", gt=0) | None, "stiffness along x of the spring between the far "
+                              "face of the piece and its holder; default: rigid") = None
 
 
 def convex(value: object) -> object:
     """A radius as it is; ValueError with what to write instead for one below 0, a hollow."""
     if str(value).lstrip().startswith("-"):
-        raise ValueError("a crown is convex, so its radius must be > 0; for a hollow leave out [contact.crown] and "
-                         'give a file with the columns "x [mm],z [um]" of z = x^2/(2 radius) as '
-                         "contact.profile.file")
+        raise ValueError("a crown is convex, so its radius must be > 0; for a hollow surface leave out [contact.crown] "
+                         'and give contact.profile.file, a file with the columns "x [mm],z [um]", where z = '
+                         "x^2/(2 radius)")
     return value
 
 
 class Crown(Table):
-    """A cylindrical crown of the patch."""
+    """A cylindrical crown on one piece."""
 
     radius: key(Annotated[Length, BeforeValidator(convex)], "radius of the crown: the gap grows as x^2/(2 radius)")
-    on: key(Piece, "the piece that carries the shape") = "upper"
+    on: key(Piece, "piece that has the crown; during the slide the pressure distribution moves "
+            "with this piece") = "upper"
 
 
 class Step(Table):
     """A step of the gap at one position along x."""
 
-    height: key(Place, "height of the step, by which the gap is wider where x > `at`")
+    height: key(Place, "height of the step: where x > `at`, the gap is wider by this height")
     at: key(Place, "position x of the step; 0 is the middle of the patch")
-    on: key(Piece, "the piece that carries the shape") = "upper"
+    on: key(Piece, "piece that has the step; during the slide the pressure distribution moves "
+            "with this piece") = "upper"
 
 
 class ProfileFile(Table):
     """Measured heights that are added to the gap."""
 
-    file: key(Text, "file of one height trace along x: text with units in its header, or an instrument's file")
-    heights: key(Literal["gap", "surface"], "'gap': larger heights open the gap; 'surface': a stylus trace, whose "
-                 "peaks are material of the piece that carries the shape") = "gap"
-    on: key(Piece, "the piece that carries the shape") = "upper"
+    file: key(Text, "file of one height trace along x: text with units in its header, or a file of a measuring "
+              "instrument")
+    heights: key(Literal["gap", "surface"], "'gap': a larger height opens the gap; 'surface': the file is a stylus "
+                 "trace, so a larger height is more material on the piece that `on` names") = "gap"
+    on: key(Piece, "piece that has the profile; during the slide the pressure distribution moves "
+            "with this piece") = "upper"
 
 
 class Asperities(Table):
-    """A compliant rough layer; the law decides which of the other keys are used."""
+    """A compliant rough layer between the pieces; `law` decides which of the other keys are used."""
 
-    law: key(Literal["linear", "exponential", "hertz"], "law of the rough layer: pressure linear or exponential in its "
-             "compression, or from spherical peaks of Gaussian heights")
-    normal_stiffness: key(quantity("foundation stiffness", gt=0) | None, "pressure per compression of the layer; for "
-                          "law 'exponential' its value at first touch") = None
+    law: key(Literal["linear", "exponential", "hertz"], "how the pressure of the rough layer follows from its "
+             "compression: 'linear'; 'exponential'; or 'hertz', from spherical peaks whose heights have a Gaussian "
+             "distribution")
+    normal_stiffness: key(quantity("foundation stiffness", gt=0) | None, "pressure of the layer divided by its "
+                          "compression; for law 'exponential', the slope of pressure over compression "
+                          "at first touch") = None
     decay_length: key(Length | None, "compression over which the pressure of law 'exponential' grows by a "
                       "factor e") = None
-    radius: key(Length | None, "tip radius of the peaks", "law `hertz`, unless from or rms_height") = None
-    density: key(quantity("areal density", gt=0) | None, "number of peaks per area", "as radius") = None
-    height_deviation: key(Length | None, "standard deviation of the peak heights", "as radius") = None
-    from_: key(Text | None, "file of a height trace from which the peaks are taken: one rough piece on a smooth one",
-               "law `hertz`, unless radius or rms_height") = Field(None, alias="from")
-    rms_height: key(Length | None, "root mean square height of the rough trace; for two rough pieces the root of "
-                    "the sum of both squares, as for slope and curvature",
-                    "law `hertz`, unless radius or from") = None
-    rms_slope: key(Positive | None, "root mean square slope of that trace", "as rms_height") = None
-    rms_curvature: key(quantity("curvature", gt=0) | None, "root mean square curvature of that trace",
-                       "as rms_height") = None
-    cutoff: key(Length | None, "wavelength that divides a trace (Gaussian filter of ISO 16610-21): longer waves belong "
-                               "to [contact.profile], shorter ones to the asperities; default: length/100 with a "
-                               "profile, all waves of `from` without one") = None
-    tangential_ratio: key(Positive | None, "tangential over normal stiffness of the rough layer; default: rigid along "
-                                           "x") = None
+    radius: key(Length | None, "tip radius of the peaks",
+                "with law `hertz`, unless `from` or `rms_height` is given") = None
+    density: key(quantity("areal density", gt=0) | None, "number of peaks per area", "with `radius`") = None
+    height_deviation: key(Length | None, "standard deviation of the peak heights", "with `radius`") = None
+    from_: key(Text | None, "file of a height trace of a rough piece, from which the peaks are computed; the other "
+               "piece is taken as smooth",
+               "with law `hertz`, unless `radius` or `rms_height` is given") = Field(None, alias="from")
+    rms_height: key(Length | None, "root mean square height of the rough piece; if both pieces are rough, the root of "
+                    "the sum of the two squared values, also for slope and curvature",
+                    "with law `hertz`, unless `radius` or `from` is given") = None
+    rms_slope: key(Positive | None, "root mean square slope of the rough piece", "with `rms_height`") = None
+    rms_curvature: key(quantity("curvature", gt=0) | None, "root mean square curvature of the rough piece",
+                       "with `rms_height`") = None
+    cutoff: key(Length | None, "wavelength that divides a trace (Gaussian filter of ISO 16610-21): longer waves "
+                "belong to [contact.profile], shorter waves to the asperities; default: 1/100 of the interface length "
+                "with [contact.profile]; without [contact.profile] all waves of `from` belong to the asperities") = None
+    tangential_ratio: key(Positive | None, "tangential stiffness of the rough layer divided by its normal stiffness; "
+                          "default: the layer is rigid along x") = None
 
 
 class Shear(Table):
-    """Tangential compliance of the pieces, which allows partial slip; it has no keys."""
+    """Tangential compliance of the pieces, which allows partial slip; this table has no keys."""
 
 
 class Grooves(Table):
     """Matched grooves in both surfaces; the upper piece rides up their flanks against the load."""
 
     wavelength: key(Length, "wavelength of the grooves along x")
-    amplitude: key(quantity("length", ge=0), "half the height of the grooves from valley to peak; with 0 the friction "
-                   "law acts alone")
-    phase: key(quantity("angle"), "phase 2 pi x/wavelength of a groove's bottom, where x counts from the start of the "
-                                  "run") = 0.0
-    lifted_mass: key(quantity("mass", ge=0), "mass that rises as the upper piece rides up the grooves; it adds inertia "
-                                             "only, because the weight is part of the load") = 0.0
+    amplitude: key(quantity("length", ge=0), "half the height of the grooves from valley to peak; with amplitude 0 "
+                   "the surfaces are flat")
+    phase: key(quantity("angle"), "phase of the grooves: a groove has its bottom where 2 pi x/wavelength equals this "
+               "phase; x is the slide since the start of the run") = 0.0
+    lifted_mass: key(quantity("mass", ge=0), "mass that rises as the upper piece rides up the grooves; this mass adds "
+                     "only inertia, because its weight is part of the load") = 0.0
 
 
 def outermost(width: float, count: int) -> float:
@@ -173,30 +184,32 @@ def outermost(width: float, count: int) -> float:
 
 
 class Strips(Table):
-    """The patch divided into equal strips side by side over the width."""
+    """The patch is divided over its width into equal parallel strips."""
 
-    count: key(whole(1, 10_000), "number of equal strips side by side over the width")
-    roll: key(quantity("angle"), "rotation of the holder about x, which shifts the pressure sideways") = 0.0
-    offset: key(Place | None, "lateral position of the load "
-                              "line; if given, the upper piece is free to rotate about x") = None
+    count: key(whole(1, 10_000), "number of equal parallel strips over the width")
+    roll: key(quantity("angle"), "angle by which the holder is rotated about x, which shifts the "
+              "pressure sideways") = 0.0
+    offset: key(Place | None, "lateral position of the load line; if this key is given, the upper piece is free to "
+                "rotate about x") = None
 
 
 class Contact(Table):
-    """Two equal pieces pressed together; sub-tables change one piece or the gap, or add compliance."""
+    """Two pieces pressed together. The keys of this table hold for both pieces; its sub-tables change one piece or the
+    gap, or add compliance."""
 
     length: key(Length, "length of both pieces along the sliding direction x")
     width: key(Length, "width of the patch perpendicular to the plane of the model")
-    height: key(Length, "height of each piece from the interface to its held far face, coating included")
-    load: key(Force | None, "total normal force on the interface, weight included; or give "
-              "[contact.approach]", "unless [contact.approach]") = None
+    height: key(Length, "height of each piece from the interface to the far face, which is fixed to the holder; "
+                "includes the coating")
+    load: key(Force | None, "total normal force on the interface, weight included; [contact.approach] may be given in "
+              "place of this key", "unless [contact.approach] is given") = None
     pairs: key(whole(1, 1_000_000), "number of equal patches that share the load; forces and stiffnesses are reported "
-               "for all of them together") = 1
+               "for all these patches together") = 1
     plane: key(Literal["strain", "stress"], "plane strain or plane stress in the pieces") = "strain"
-    element_size: key(Length | None, "element length of a uniform mesh along the interface; unless given, the mesh is "
-                      "graded to meet the tolerance") = None
-    substrate: key(Substance, "material of the pieces: a name of the material table, or a table of young, "
-                   "poisson, density")
-    mesh: key(Text | None, "a mesh file of both pieces, tagged as GUIDE.md says; unless given, the mesh "
+    element_size: key(Length | None, "length of the elements along the interface in a uniform mesh; default: a graded "
+                      "mesh that meets the tolerance") = None
+    substrate: key(Substance, "material of the pieces: a name from MATERIALS.md, or a table of young, poisson, density")
+    mesh: key(Text | None, "file with a mesh of both pieces, which needs the tags listed in GUIDE.md; default: a mesh "
               "is made from the dimensions") = None
     coating: Coating | None = None
     upper: OnePiece | None = None

@@ -141,15 +141,15 @@ def _malformed(words: str, kind: str) -> str:
     elif "±" in words or "+/-" in words or "+-" in words:
         reason = f"'{shown}' has a tolerance: give only the nominal value"
     elif _COMMA.match(words):
-        reason = f"'{shown}' has a comma: write the decimal separator as a point"
+        reason = f"'{shown}' has a comma: use a point as the decimal separator"
     elif "#" in words:
-        reason = f"'{shown}': '#' is ambiguous, spell the unit out ({_list(kind)})"
+        reason = f"'{shown}': '#' is ambiguous, write the name of the unit ({_list(kind)})"
     elif re.match(r"[+-]?(nan|inf)", words, re.IGNORECASE):
         reason = f"'{shown}' is not a finite number"
     elif (glued := _GLUED.fullmatch(words)) and _plain(glued[2]) in KINDS[kind]:
         reason = f"'{shown}' lacks the space between number and unit: write '{glued[1]} {glued[2]}'"
     else:
-        reason = f"'{shown}' is not one number and one unit ({_list(kind)})"
+        reason = f"'{shown}' does not consist of one number and one unit ({_list(kind)})"
     return f"{reason}; {wanted(kind)}"
 
 
@@ -161,11 +161,11 @@ def _wrong_unit(number: str, unit: str, kind: str) -> str:
     if kind == "force" and plain in ("lb", "lbs", "#"):
         return f"'{unit}' is ambiguous for a force; did you mean 'lbf'? use one of {_list(kind)}, {example}"
     if kind == "temperature" and plain.lstrip("°").removeprefix("deg") in ("C", "F"):
-        return f"'{unit}' is refused: temperatures are absolute here, 20 degC is '293.15 K'; use K, {example}"
+        return f"'{unit}' is refused, because temperatures must be absolute; write 20 degC as '293.15 K'"
     others = [other for other, units in KINDS.items() if plain in units]
     if others:
         belongs = f"'{unit}' is a unit of {' or '.join(others)}"
-        return f"{belongs}, but this is {_article(kind)}; use one of {_list(kind)}, {example}"
+        return f"{belongs}, but {_article(kind)} is needed; use one of {_list(kind)}, {example}"
     if plain.count("/") and " " in plain.split("/", 1)[1] and "(" not in plain:
         return f"'{unit}' is ambiguous: put the denominator in brackets; use one of {_list(kind)}, {example}"
     return f"unknown unit '{unit}' for {_article(kind)}; use one of {_list(kind)}, {example}"

@@ -47,8 +47,8 @@ DIVIDED_BY = {"mass", "frequency", "acceleration", "stiffness", "damping", "cubi
 
 def _within(value: float, least: float) -> float:
     if value and not least <= abs(value) <= LARGEST:
-        raise ValueError(f"{value:g} in SI is outside the computable range; 0 or a magnitude from {least:g} to "
-                         f"{LARGEST:g} is needed")  # fmt: skip
+        raise ValueError(f"{value:g} in SI is outside the computable range; the value must be 0 or have a magnitude "
+                         f"from {least:g} to {LARGEST:g}")  # fmt: skip
     return value
 
 
@@ -149,10 +149,10 @@ class Table(BaseModel):
 
 
 def choices(got: str, known: Iterable[str]) -> str:
-    """``did you mean 'x'? one of x, y`` for a wrong name among known ones."""
+    """``did you mean 'x'? use one of x, y`` for a wrong name among known ones."""
     names = list(known)
     near = get_close_matches(got, names, 1, 0.6) or [n for n in names if n.lower() == got.lower()]
-    return (f"did you mean '{near[0]}'? " if near else "") + f"one of {', '.join(names)}"
+    return (f"did you mean '{near[0]}'? " if near else "") + f"use one of {', '.join(names)}"
 
 
 @cache

@@ -143,7 +143,7 @@ def test_exact_the_plan_names_the_temperature():
 
 @pytest.mark.parametrize("sets, says", [
     (["friction.temperature.surface=0 K"], "must be > 0"), (["friction.temperature.surface=-3 K"], "below 0 K"),
-    (["friction.temperature.reference=20 degC"], "temperatures are absolute here"),
+    (["friction.temperature.reference=20 degC"], "temperatures must be absolute"),
     (["friction.temperature.rest_activation=-1 K"], "below 0 K")])
 def test_refuses_wrong_temperatures_in_a_scene(sets, says):
     with pytest.raises(SceneError, match=says):

@@ -21,9 +21,10 @@ SIGNS = {"gt": ">", "ge": ">=", "lt": "<", "le": "<="}
 HEAD = """\
 # Keys of a scene
 
-`python tests/support/reference` generates this page from the program's own records. A quantity is a text of one number
-and one unit, `"12.7 mm"`; the last section lists the units of each kind. An effect is on if its table is present.
-The column "required" says "yes" or gives the condition under which a key is required.
+`python tests/support/reference` generates this page from the program's own records. A quantity is written as a text
+with one number and one unit, such as `"12.7 mm"`; the last section lists the units of each kind of quantity. An effect
+takes part in the computation if the scene contains the table of this effect. The column "required" says "yes" or gives
+the condition under which the key is required.
 
 See also [the guide](GUIDE.md), [the measures of a run](MEASURES.md), [materials by name](MATERIALS.md) and
 [limits](LIMITS.md).
@@ -86,13 +87,13 @@ def _row(model: type, key: str, at: str) -> tuple:
 
 
 def _needed(model: type, key: str, table: str) -> str:
-    """Condition that makes a key of a table necessary: "law `tanh`", the values of a selector, or words."""
+    """Condition that makes a key of a table necessary: "with law `tanh`", the values of a selector, or words."""
     found = record(model, key)
     said = [found.needed] if found and found.needed else []
     for selector, used in NEEDS.items():
         values = [f"`{value}`" for value, (needs, _) in used.items() if key in each(needs)]
         if values and selector.rpartition(".")[0] == table:
-            said.append(f"{selector.rpartition('.')[2]} {', '.join(values)}")
+            said.append(f"with {selector.rpartition('.')[2]} {', '.join(values)}")
     return "; ".join(said)
 
 
@@ -145,7 +146,7 @@ def _effects() -> str:
         selector, _, value = name.partition("=")
         used = [words.replace(" ", ", ").replace("|", " or ") for words in NEEDS.get(selector, {}).get(value, ("", ""))]
         rows += [(f"`{name}`", *used, effect.equations)] if not name.startswith("structure.interface.") else []
-    return grid(("effect", "needs", "may have", "equations"), rows)
+    return grid(("effect", "required keys", "optional keys", "equations"), rows)
 
 
 def grid(head: tuple, rows: list) -> str:

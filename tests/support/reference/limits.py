@@ -13,75 +13,83 @@ FILE = FOLDER / "LIMITS.md"
 HEAD = """\
 # Limits
 
-`python tests/support/reference` generates this page by checking one scene for each entry of the tables. A scene marked
-"no" is rejected before the run, with the line, the key and an alternative. The numbers refer to the list of messages
-below the tables. The last section lists what the models neglect.
+`python tests/support/reference` generates this page. For each cell of the first four tables, one scene is checked.
+"yes" means that the scene can run. "no" means that the scene is refused before the run, with a message that names the
+line, the key and an alternative. The numbers after "no" are the numbers of these messages in the list below the tables.
+The last section says what the models neglect.
 """
 SIZES = {  # constant -> what it bounds and how it is written
-    "scene.scene.LARGEST": "bytes of a scene", "scene.lines.DEEPEST": "parts of a dotted key",
-    "scene.rules.contact.MOST_ELEMENTS": "elements along an interface with element_size",
-    "scene.keys.tables.MOST_MASSES": "masses in structure.masses",
-    "effects.MOST_COORDINATES": "masses or modes of a rig",
-    "scene.axes.MOST": "values of one range of a sweep", "campaigns.sweeps.ask.MOST": "cases of a sweep",
-    "inputs.cells.LARGEST": "bytes of a table of text", "inputs.records.LARGEST": "bytes of a laboratory file",
+    "scene.scene.LARGEST": "bytes of a scene file", "scene.lines.DEEPEST": "number of parts of a dotted key",
+    "scene.rules.contact.MOST_ELEMENTS": "number of elements along an interface that has element_size",
+    "scene.keys.tables.MOST_MASSES": "number of masses in structure.masses",
+    "effects.MOST_COORDINATES": "number of masses or modes of a rig",
+    "scene.axes.MOST": "number of values in one range of a sweep",
+    "campaigns.sweeps.ask.MOST": "number of cases of a sweep",
+    "inputs.cells.LARGEST": "bytes of a text file with a table", "inputs.records.LARGEST": "bytes of a laboratory file",
     "inputs.matlab.LARGEST_FILE": "bytes of a .mat file",
-    "inputs.matlab5.LARGEST": "numbers of a variable of a .mat file", "mesh.files.LARGEST": "bytes of a mesh",
-    "surface.files.raw.LARGEST": "bytes of a scan, compressed or not",
+    "inputs.matlab5.LARGEST": "number of elements of one variable in a .mat file",
+    "mesh.files.LARGEST": "bytes of a mesh file",
+    "surface.files.raw.LARGEST": "bytes of the file of a scan, also after decompression",
     "surface.samples.LONGEST": "length of a trace [m]",
     "model.slide.MOST": "steps per cycle of a prescribed slide",
-    "runs.rig.costs.MOST_STEPS": "steps per cycle of a time integration, if the tolerance chooses them",
-    "dynamics.march.capacity.MOST_STRIPS": "strips of a list of bonds",
-    "friction.bonds.parameters.LONGEST": "estimated seconds for a list of bonds",
-    "runs.rig.costs.LONGEST": "estimated seconds for a motion from event to event",
-    "dynamics.comparison.comparison.MOST_NUMBERS": "numbers stored by a comparison method",
-    "dynamics.resume.MOST_KEPT": "samples stored before the last cycles; longer records are thinned"}
+    "runs.rig.costs.MOST_STEPS": "steps per cycle of a time integration, if the tolerance determines the steps",
+    "dynamics.march.capacity.MOST_STRIPS": "number of entries in a list of bonds",
+    "friction.bonds.parameters.LONGEST": "estimated computing time of a run with a list of bonds [s]",
+    "runs.rig.costs.LONGEST": "estimated computing time of a motion from event to event [s]",
+    "dynamics.comparison.comparison.MOST_NUMBERS": "number of values that method duhamel, newmark or euler stores",
+    "dynamics.resume.MOST_KEPT": "number of samples stored before the last cycles; longer records are thinned out"}
 LEFT_OUT = f"""\
 **Two dimensions.** The pieces are sections in plane strain, or in plane stress with `contact.plane`. A note of every
-patch gives the difference between the two. Effects at the edges of the width are neglected. `[contact.strips]` are
-sections side by side without elastic coupling.
+patch gives the difference between plane strain and plane stress. Effects at the edges of the width are neglected. The
+strips of `[contact.strips]` are such sections side by side, without elastic coupling between the strips.
 
-**Small strains, linear elasticity.** The pieces are isotropic, without plasticity, creep or heat. The coating is
+**Small strains, linear elasticity.** The pieces are isotropic; plasticity, creep and heat are neglected. The coating is
 bonded, and the far faces are fixed to rigid holders. A note appears if strains exceed {SMALL:g}. The load is assumed
 not to move sideways when a tall piece bends; a note says if this matters.
 
 **No friction in the static patch.** The pressure is computed without shear. If both pieces have the same elastic
-constants, shear does not change the pressure. For different materials the coupling of shear and pressure is neglected
-in runs that move; a note appears if it exceeds {100 * COUPLED:g} % of the compliance.
+constants, shear does not change the pressure. For pieces of different materials, the coupling of shear and pressure is
+neglected in runs with motion; a note appears if this coupling exceeds {100 * COUPLED:g} % of the compliance.
 
-**Quasi-static pieces.** The pieces have no mass, so waves in them are left out. The modes of the rig carry the inertia.
+**Quasi-static pieces.** The pieces have no mass, so waves in the pieces are neglected. Only the modes of the rig have
+inertia.
 
-**Pressure fixed to a piece.** The pressure moves with the piece that carries the shape. When the other piece slides
-beyond the pressed length, its overhang is not modelled. A slide beyond the patch ends the run as `leaves_contact`.
+**Pressure fixed to a piece.** The pressure distribution moves with the piece that has the tilt, crown, step or profile
+(key `on`). If the other piece slides beyond the pressed length, the overhanging part of this piece is not modelled. If
+the slide leaves the patch, the run ends with the outcome `leaves_contact`.
 
-**Grooves.** The surfaces stay in contact on the flanks. If the inertia of a lifted mass takes up the whole load, the
-run ends as `leaves_grooves`. The upper piece rides up matched grooves as a whole, not ridge by ridge.
+**Grooves.** The surfaces are assumed to stay in contact on the flanks. If the inertia force of the lifted mass cancels
+the whole load, the run ends with the outcome `leaves_grooves`. The upper piece rides up matched grooves as a whole, not
+ridge by ridge.
 
 **Friction is local.** The friction of a point depends on the pressure and the slip of that point. Only law
-`convolution` averages over neighbouring points (Oden-Pires). Bonds depend on the path of their point, that is, on the
-length that this point has slid so far. Temperature acts only through eq. 2.13, with a surface temperature given in the
-scene. Heat from friction does not change that temperature.
+`convolution` averages the pressure over neighbouring points (Oden-Pires). Bonds depend on the path of their point, that
+is, on the length that this point has slid so far. Temperature acts only through eq. 2.13, with a surface temperature
+given in the scene. Heat from friction does not change the surface temperature.
 
-**Partial slip.** At constant load and tilt the elements are exact for pieces of equal elasticity. Under a changing load
-the shear compliance is represented by modes, whose number follows from the tolerance. For pieces of unlike sections the
-effect of shear on the pressure is neglected. A patch of `[[structure.interface]]` keeps its load and pressure and does
-not wear. If friction falls as a point slides on (bonds that weaken, equation 2.17 as printed), several states can be in
-equilibrium. The run then continues in the direction of its last steps, with the state of lower energy there. The energy
-difference counts as dissipated.
+**Partial slip.** At constant load and tilt, partial slip is computed with elements that stick or slip. These elements
+are exact if both pieces have the same elastic constants. Under a changing load the shear compliance is represented by
+modes, whose number follows from the tolerance. If the cross-sections of the pieces differ, the effect of shear on the
+pressure is neglected. The load and the pressure of a patch of `[[structure.interface]]` are constant, and this patch
+does not wear. If the friction of a point falls while the point slides (bonds that weaken, equation 2.17 as printed),
+several states can be in equilibrium. Among the equilibrium states in the direction of the last time steps, the run then
+takes the state of lower energy. The energy difference counts as dissipated.
 
-**Modes.** The rig is linear except for its joints, `[structure.stiffening]` and an interlocking bonded spring. Damping
-is viscous; hysteretic damping in a file is treated as viscous. A complex mode is replaced by its real part.
+**Modes.** The rig is linear except for its joints, `[structure.stiffening]` and an interlocking spring of
+`[structure.bonded]`. Damping is viscous; hysteretic damping in a file is treated as viscous. A complex mode is replaced
+by its real part.
 
-**Wear.** Every point wears by Archard's law with its own pressure and slip. Debris and heat are left out. Friction
+**Wear.** Every point wears by Archard's law with its own pressure and slip. Debris and heat are neglected. Friction
 changes only through the table `[wear.friction]`, for the patch as a whole. Between two jumps of the wear, a rig is
-assumed to repeat its last cycle. Strips that yaw slide and wear along x only; a note says how far the ends of the patch
-move across x.
+assumed to repeat its last cycle. If strips yaw, their slide and their wear are computed along x only; a note says how
+far the ends of the patch move across x.
 
 **Errors.** Stated errors are estimates from coarser runs. The true numerical error is smaller than the stated error in
 about 19 of 20 scenes. Stated errors do not include what the model neglects. A step in the gap makes the pressure peak
-infinite, so that any number for it would depend on the mesh.
+infinite; any computed value of this peak would depend on the mesh.
 
 **Harmonic balance, Duhamel, Newmark, Euler.** These methods serve for comparison. Harmonic balance finds only periodic
-motions. The other three support one force per interface and linear modes.
+motions. Methods `duhamel`, `newmark` and `euler` support one friction force per interface and linear modes.
 """
 
 
@@ -89,21 +97,22 @@ def text() -> str:
     """The whole page of patchfem/scene/LIMITS.md: scenes are put together and checked, nothing is run."""
     notes = {}
     body = []
-    for title, columns in (("Laws in a rig", RIGS), ("Laws in a rig, further", MORE), ("Laws on a bench", BENCHES)):
+    for title, columns in (("Laws in a rig", RIGS), ("Laws in a rig, continued", MORE), ("Laws on a bench", BENCHES)):
         body += [f"## {title}", _against(columns, notes)]
-    body += ["A prescribed slide can have two directions with "
+    body += ["A prescribed slide can be two-dimensional under these laws: "
              + _listed(name for name, one in laws().items() if not across(one))
-             + ", but not with " + _listed(name for name, one in laws().items() if across(one)) + ".",
-             "## Methods", "In this table the scene is a single point under a sine drive, with `accuracy.method` set; "
-             "`auto` chooses an available method.",
+             + ". It cannot be two-dimensional under these laws: "
+             + _listed(name for name, one in laws().items() if across(one)) + ".",
+             "## Methods", "In this table each scene is a rig with a single contact point under a sine drive. The "
+             "heading of a column is the value of `accuracy.method`; `auto` chooses a method that supports the law.",
              _methods(notes), "### Messages", _said(notes),
              "## Numbers",
-             f"A number with a unit is at most {LARGEST:g} in SI. A quantity that occurs as a divisor ("
-             + ", ".join(sorted(DIVIDED_BY)) + f") is at least {1 / LARGEST:g}; such a quantity may be 0 only where 0 "
-                                               "has a meaning. Whole numbers and shares have "
-                                               "their own bounds:", _bounds(), "## Sizes", _sizes(),
-             "A run is refused if its memory, as `patchfem plan` estimates it, exceeds the limit of the process. The "
-             "message names the key that causes it.", "## What the models leave out",
+             f"The magnitude of a quantity must be at most {LARGEST:g} in SI. The program divides by some kinds of "
+             "quantity (" + ", ".join(sorted(DIVIDED_BY)) + "); the magnitude of these must also be at least "
+             f"{1 / LARGEST:g}, or exactly 0 if the key accepts 0. The following keys have narrower bounds:",
+             _bounds(), "## Sizes", _sizes(),
+             "A run is refused if the memory that `patchfem plan` estimates for this run exceeds the memory limit of "
+             "the process. The message names the key that causes the need for memory.", "## What the models leave out",
              LEFT_OUT.strip()]
     return "\n\n".join([HEAD.strip(), *body]) + "\n"
 

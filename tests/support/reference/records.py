@@ -19,13 +19,15 @@ class Measures:
 {MADE}
 
 Values in `summary.json` are in SI and have all digits. The error is the estimated half-width of the interval that
-contains the exact value of the model. A warning appears if the error exceeds tolerance × |value| + floor. Printed
-values end at the second digit of their error. A value that is printed without an error is exact to its last digit. A
-value that is 0 within its floor is printed as 0.
+contains the exact value of the model. The floor is an absolute error that is always permitted: a warning appears if the
+error exceeds tolerance × |value| + floor. If the column "floor" has two entries, the larger entry is the floor. Printed
+values are rounded at the second significant digit of their error. A value that is printed without an error is exact to
+its last digit. A value whose magnitude is below the floor is printed as 0.
 
-Measures of a motion refer to the window: the last ten cycles or the last tenth of the run, whichever is shorter. A
-number at the end of a name counts the interfaces, or the strips if they slide separately: `slip_amplitude_2` is the
-slip amplitude of the second. The floor of a displacement is at most 1e-5 of the amplitude of the drive, a/omega^2.
+Measures of a motion are evaluated over a window at the end of the run: the last ten cycles or the last tenth of the
+run, whichever is shorter. A number at the end of a name is the number of an interface, or of a strip if the strips
+slide separately: `slip_amplitude_2` is the slip amplitude of the second interface or strip. The floor of a displacement
+is at most 1e-5 of a/omega^2, the displacement amplitude of a drive with the acceleration amplitude a.
 """
 
     @classmethod
@@ -39,8 +41,10 @@ slip amplitude of the second. The floor of a displacement is at most 1e-5 of the
 
 
 def _floor(row) -> str:
-    """The floor of a row, and the larger term that the tolerance times is one as well."""
-    return f"{row.floor:g}" if row.term is None else f"{row.floor:g}, tolerance × {row.term[0]}"
+    """The floor of a row, and behind it the tolerance times a larger term where that is a floor as well."""
+    if row.term is None:
+        return f"{row.floor:g}"
+    return f"{row.floor:g}; tolerance" + (f" × {row.term[0]}" if row.term[0] != "1" else "")
 
 
 class Materials:
@@ -52,9 +56,10 @@ class Materials:
 
 {MADE}
 
-`contact.substrate` and the `material` of a coating take one of these names, or a table with your own values:
-`{{young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"}}`. Elastic constants of one alloy differ by a few per
-cent between handbooks, and those of a sprayed coating by far more. Measure a constant on which your result depends.
+The value of `contact.substrate`, or of `material` in a coating, is one of these names or a table of your own values:
+`{{young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"}}`. The elastic constants of an alloy
+differ by a few per cent between handbooks; the elastic constants of a sprayed coating differ by far more. If your
+result depends on a constant, measure this constant.
 """
 
     @classmethod
@@ -68,8 +73,9 @@ cent between handbooks, and those of a sprayed coating by far more. Measure a co
                  ("name", "conductivity [W/(m K)]", "heat capacity [J/(kg K)]", "source"),
                  ("name", "yield strength [MPa]", "source"))
         return "\n\n".join([cls.HEAD.strip(), grid(heads[0], rows), "## Heat",
-                            "With `[friction.temperature]` a note uses these values to estimate how much friction "
-                            "heats the faces.", grid(heads[1], warm), "## Strength",
-                            "Pieces are elastic throughout a run. A note appears if their stress exceeds the yield "
-                            "strength; the fifth of a piece next to its fixed far face does not count.",
+                            "With `[friction.temperature]` a note estimates from these values how much friction heats "
+                            "the faces.", grid(heads[1], warm), "## Strength",
+                            "The pieces are computed as elastic. A note appears if the stress in a piece exceeds the "
+                            "yield strength; the fifth of the piece next to its fixed far face is excluded from this "
+                            "check.",
                             grid(heads[2], firm)]) + "\n"

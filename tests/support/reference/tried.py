@@ -54,7 +54,7 @@ STRIPS = "[contact.strips]\ncount = 4\n"
 VALUES = {"reference_speed": '"1 mm/s"', "stiffness": '"1e7 N/m"', "chi": "-0.5", "beta": "0.5", "exponent": "1.0",
           "stribeck_speed": '"1 mm/s"', "bond_length": '"1 um"'}
 FORMS = {"nonlocal": {"nonlocal": "", "nonlocal, order 2": "order = 2\n",
-                      "nonlocal, as printed": 'reading = "report"\n', "nonlocal, breakaway": "breakaway = 0.2\n"}}
+                      "nonlocal, reading 'report'": 'reading = "report"\n', "nonlocal, breakaway": "breakaway = 0.2\n"}}
 METHODS = ("auto", "exact", "march", "harmonic", "duhamel", "newmark", "euler")
 
 
@@ -72,27 +72,28 @@ RIGS = (Beside("one point", POINT + RIG), Beside("a patch", PATCH + RIG),
         Beside("strips and shear", PATCH + STRIPS + "[contact.shear]\n" + RIG),
         Beside("strips that yaw", PATCH + STRIPS + RIG, ("structure.mode.axial.yaw=2 rad/m",)),
         Beside("shapes on the lower piece", PATCH + RIG, ("contact.crown.on=lower",)),
-        Beside("a load that changes", POINT + RIG, ("normal.amplitude=20 N", "normal.frequency=50 Hz")),
-        Beside("heave or pitch", PATCH + RIG, ("structure.mode.axial.pitch=1 rad/m",)),
-        Beside("pitch and shear", PATCH + "[contact.shear]\n" + RIG, ("structure.mode.axial.pitch=1 rad/m",)))
-MORE = (Beside("grooves of a point", POINT + GROOVES.format("normal") + RIG),
-        Beside("their load changes", POINT + GROOVES.format("normal") + RIG, ("normal.amplitude=20 N",
-                                                                              "normal.frequency=50 Hz")),
-        Beside("grooves and shear", PATCH + GROOVES.format("contact") + "[contact.shear]\n" + RIG),
+        Beside("changing load", POINT + RIG, ("normal.amplitude=20 N", "normal.frequency=50 Hz")),
+        Beside("a mode with heave or pitch", PATCH + RIG, ("structure.mode.axial.pitch=1 rad/m",)),
+        Beside("a mode with pitch, and shear", PATCH + "[contact.shear]\n" + RIG,
+               ("structure.mode.axial.pitch=1 rad/m",)))
+MORE = (Beside("`[normal.grooves]`", POINT + GROOVES.format("normal") + RIG),
+        Beside("`[normal.grooves]`, changing load", POINT + GROOVES.format("normal") + RIG,
+               ("normal.amplitude=20 N", "normal.frequency=50 Hz")),
+        Beside("`[contact.grooves]` and shear", PATCH + GROOVES.format("contact") + "[contact.shear]\n" + RIG),
         Beside("a cubic spring", POINT + RIG, ("structure.stiffening.cubic=1e10 N/m^3",)),
         Beside("an interlocking spring", POINT + RIG, ("structure.bonded.stiffness=1e5 N/m",
                                                        "structure.bonded.wavelength=80 um")),
         Beside("several interfaces", MASSES),
-        Beside("their patches", MASSES + "# each presses a patch\n"),
-        Beside("patches and shear", MASSES + "# each presses a patch that gives way\n"),
+        Beside("a patch at each interface", MASSES + "# each presses a patch\n"),
+        Beside("a patch with shear at each interface", MASSES + "# each presses a patch that gives way\n"),
         Beside("`[wear]`", PATCH + RIG + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n'))
 BENCHES = (Beside("one point", POINT + BENCH), Beside("a patch", PATCH + BENCH),
            Beside("`[contact.shear]`", PATCH + "[contact.shear]\n" + BENCH),
            Beside("`[contact.strips]`", PATCH + STRIPS + BENCH),
            Beside("shapes on the lower piece", PATCH + BENCH, ("contact.crown.on=lower",)),
-           Beside("a load that changes", POINT + BENCH, ("normal.amplitude=20 N", "normal.frequency=50 Hz")),
-           Beside("grooves", POINT + GROOVES.format("normal") + BENCH),
-           Beside("grooves and shear", PATCH + GROOVES.format("contact") + "[contact.shear]\n" + BENCH),
+           Beside("changing load", POINT + BENCH, ("normal.amplitude=20 N", "normal.frequency=50 Hz")),
+           Beside("`[normal.grooves]`", POINT + GROOVES.format("normal") + BENCH),
+           Beside("`[contact.grooves]` and shear", PATCH + GROOVES.format("contact") + "[contact.shear]\n" + BENCH),
            Beside("`[wear]`", PATCH + BENCH + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n'))
 
 
