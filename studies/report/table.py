@@ -1,4 +1,4 @@
-"""What do all studies ask and answer, what do they cost, and which figures of the report do they reproduce?
+"""What do all studies ask and answer, how long do they take, and which figures of the report do they reproduce?
 
 The answers are in README.md of this folder. This script writes that page from the docstrings of the studies.
 
@@ -90,7 +90,7 @@ def table(found: list, seconds: dict) -> str:
         "# All studies in one table", "`table.py` generates this page from the studies. Computing times are CPU "
         f"seconds of one core. {len(known)} of {len(found)} studies were measured and take {sum(known):.0f} s together."
         " A dash means that the study was not measured yet, or that it needs a file or another program. "
-        f"Studies of more than {LONG} s are marked \"long\".", "",
+        f"Studies that take more than {LONG} s are marked \"long\".", "",
         f"{len(figures)} of the studies compute figures of the report: {yes} reproduce their figure, the others only a "
         "part of it. [The ten conclusions of the report](conclusions.md) have their own table.", "",
         "| study | question | answer | computing time [s] | is the figure of the report reproduced? |",

@@ -245,8 +245,8 @@ def head(rows: dict) -> list:
             "predict the displacements better than the constant and the power do. \"Second path\" (a spring and a "
             f"damper) with peak x stuck scores {left['damped']}, no better than the constant, because the fit without "
             f"143 Hz has no yaw. If the accelerometer also measures the yaw mode, this model scores {left['seen']}. "
-            "For the accelerations no model is better than the power of input and frequency, although this power explains "
-            "nothing.")
+            "For the accelerations no model is better than the power of input and frequency, although this power "
+            "explains nothing.")
     said.append(
         "**What the data leave open.** The second path may be a spring or the flank of a groove "
         f"({three(one['lift']['others'])} at the other frequencies), with or without a damper. The accelerometer may "
