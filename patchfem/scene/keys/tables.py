@@ -75,9 +75,10 @@ class Friction(Table):
     bond_length: key(Length | None, "bond length eps_0 at rest: the length of slide over which a bond forms and "
                      "breaks; with law 'elastic-plastic' the key `stiffness` may be given in place of this key") = None
     stiffness: key(quantity("stiffness", gt=0) | None, "initial slope of the friction force over the slide, for the "
-                   "whole contact; in a patch this stiffness is distributed in proportion to the normal force") = None
+                   "whole contact; in a patch, this stiffness is distributed over the points in proportion to their "
+                   "normal force") = None
     chi: key(number(gt=-1, le=0) | None, "exponent of the distribution of the sliders of law 'iwan': in micro-slip "
-             "the energy dissipated per cycle grows as the force amplitude to the power chi + 3") = None
+             "the energy dissipated per cycle grows with the force amplitude to the power chi + 3") = None
     beta: key(NotNegative | None, "stiffness of the slider of law 'iwan' that slips last, divided by the stiffness of "
               "all other sliders together") = None
     exponent: key(Positive, "exponent n of law 'bouc-wen': the larger n is, the sharper is the transition from stick "
@@ -86,8 +87,8 @@ class Friction(Table):
                "follows the elastic line; with s >= 1/2 the law creates no energy") = 0.5
     stribeck_speed: key(Speed | None, "sliding speed v_s over which the friction coefficient falls from `static` to "
                         "`kinetic`") = None
-    micro_damping: key(quantity("damping", ge=0), "damping force divided by the rate at which the bristles deflect, "
-                       "for the whole contact") = 0.0
+    micro_damping: key(quantity("damping", ge=0), "damping force on the bristles divided by the rate of their "
+                       "deflection, for the whole contact") = 0.0
     viscous: key(quantity("damping", ge=0), "viscous force divided by the sliding speed, for the whole contact") = 0.0
     reading: key(Literal["stretch", "report"], "how eq. 2.17 is read: 'stretch' separates the stretch of a bond from "
                  "its damage, so that no energy is created; 'report' uses eq. 2.17 as printed "
@@ -100,7 +101,7 @@ class Friction(Table):
                      "(eq. 2.10)", "with `rest_growth`") = None
     rest_speed: key(Speed | None, "lower limit v_h of the sliding speed |v| in the term a_s/|v| (eq. 2.10); default: "
                     "1e-3 of the largest sliding speed") = None
-    initial_bonds: key(Share, "fraction m_0 of the bonds that exist when the run begins") = 1.0
+    initial_bonds: key(Share, "fraction m_0 of all bonds that already exist when the run begins") = 1.0
     breakaway: key(number(ge=0, le=1), "fraction of the bond length over which a bond stretches without damage") = 0.0
     spread: key(Length | None, "width rho of a bond perpendicular to the path (eq. 2.15); default: this width is "
                 "ignored") = None
@@ -110,14 +111,16 @@ class Friction(Table):
 class Slide(Table):
     """A prescribed slide; `kind` decides which of the other keys are needed."""
 
-    kind: key(Literal["constant", "sine", "triangle", "dwell", "file"], "prescribed motion: 'constant', constant "
-              "speed; 'sine'; 'triangle'; 'dwell', a slide interrupted by a rest; 'file', a table of positions")
+    kind: key(Literal["constant", "sine", "triangle", "dwell", "file"], "prescribed motion: 'constant', motion at "
+              "constant speed; 'sine'; 'triangle'; 'dwell', a slide interrupted by a rest; 'file', a table of "
+              "positions")
     amplitude: key(Length | None, "half the peak-to-peak motion; the motion starts in the middle, in the positive "
                    "direction") = None
     frequency: key(Frequency | None, "frequency of kind 'sine'") = None
     speed: key(Speed | None, "sliding speed") = None
-    distance: key(quantity("length", ge=0) | None, "sliding distance; for kind 'dwell', the distance before the rest; "
-                  "for kind 'triangle', the distance of a first slide before the cycles (default: 0)") = None
+    distance: key(quantity("length", ge=0) | None, "for kind 'constant', the sliding distance; for kind 'dwell', the "
+                  "distance before the rest; for kind 'triangle', the distance of a first slide before the cycles "
+                  "(default: 0)") = None
     hold: key(quantity("time", ge=0) | None, "duration of the rest") = None
     distance_after: key(quantity("length", ge=0) | None, "sliding distance after the rest; default: 0") = None
     cycles: key(Positive | None, "number of cycles, not necessarily a whole number; default: 1") = None
@@ -157,7 +160,7 @@ class Stiffening(Table):
 
 
 class Bonded(Table):
-    """A spring in parallel with the contact, which carries a part of the force."""
+    """A spring in parallel with the contact; this spring carries a part of the force."""
 
     stiffness: key(quantity("stiffness", ge=0), "stiffness of the spring in parallel with the contact")
     damping: key(quantity("damping", ge=0), "damping coefficient of a damper in parallel with this spring") = 0.0
@@ -185,7 +188,7 @@ class Damper(Table):
 
 class Interface(Friction):
     """A friction interface between two masses, or between a mass and the base. An interface has its own law, and its
-    own load or patch. The patch is the table [structure.interface.contact] below the interface, which takes the keys
+    own load or patch. The patch is the table [structure.interface.contact] below the interface; it takes the keys
     and tables of [contact] except approach and grooves."""
 
     between: key(Between, "numbers of the two masses that rub, counted from 1; 0 is the base; the slide is the motion "
@@ -259,13 +262,14 @@ class Structure(Table):
                   "subtracted") = "free"
     stiffening: Stiffening | None = None
     bonded: Bonded | None = None
-    masses: key(tuple[Mass, ...] | None, "masses of the rig, which springs connect; in place of modes") = None
+    masses: key(tuple[Mass, ...] | None, "masses that are connected by springs; they replace the modes") = None
     output_mass: key(whole(1, MOST_MASSES) | None, "number of the mass that carries the "
                      "accelerometer; default: 1") = None
     spring: tuple[Spring, ...] = ()
     damper: tuple[Damper, ...] = ()
     interface: tuple[Interface, ...] = ()
-    file: key(Text | None, "file of matrices, modes or measured responses (.npz, .mat, .uff); in place of modes") = None
+    file: key(Text | None, "file of matrices, modes or measured responses (.npz, .mat, .uff); replaces the tables of "
+              "modes") = None
     reduced: Reduced | None = None
     slide_at: key(Text | None, "node and direction in the file, such as 12:+x, whose motion is the motion of the "
                   "patch along x") = None
@@ -281,7 +285,7 @@ class Drive(Table):
     """What sets the rig in motion; `kind` and `waveform` decide which of the other keys are needed."""
 
     kind: key(Literal["base", "force", "free"], "what drives the motion: 'base', an accelerated base; 'force', a "
-              "force; 'free', nothing: the rig is released from a given state")
+              "force; 'free', no drive: the rig is released from a given state")
     waveform: key(WaveName, "waveform of the drive over time") = "sine"
     frequency: key(Frequency | None, "frequency of waveform 'sine' or 'levels'") = None
     from_: key(Frequency | None, "start frequency of a sweep, or lowest frequency of a random "
@@ -290,7 +294,7 @@ class Drive(Table):
     spectrum: key(quantity("acceleration spectrum", gt=0) | None, "one-sided spectral density of a random base "
                   "acceleration, constant between `from` and `to`",
                   "with waveform `random`, unless `file` is given") = None
-    seed: key(whole(0, 2**32 - 1) | None, "seed of the random record; default 0") = None
+    seed: key(whole(0, 2**32 - 1) | None, "seed of the random record; default: 0") = None
     rate: key(quantity("sweep rate", gt=0) | None, "rate at which the frequency of a linear sweep changes",
               "with waveform `sweep`, unless `log_rate` is given") = None
     log_rate: key(quantity("logarithmic sweep rate", gt=0) | None, "rate of a logarithmic sweep, in octaves per unit "
@@ -308,7 +312,7 @@ class Drive(Table):
     accelerations: key(Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=2)] | None,
                        "amplitude of the base acceleration of each sine, zero to peak") = None
     phases: key(Annotated[tuple[quantity("angle"), ...], Field(min_length=2)] | None, "phase of each sine at the "
-                "start; default: 0") = None
+                "start of the run; default: 0") = None
     onset: key(Literal["slip", "distortion", "gauge"], "what counts as the onset of slip in the measure onset_level: "
                "'slip', the first irreversible motion (for an elastic interface, more than a thousandth of its "
                "elastic range); 'distortion', a third harmonic of the acceleration above 3 % of the first harmonic; "
@@ -322,7 +326,7 @@ class Drive(Table):
     cycles: key(Positive | None, "length of the run, or of each level, in cycles of the drive; with kind 'free', in "
                 "cycles of the first mode that is not rigid",
                 "unless `duration` is given or the waveform is `sweep` or `file`") = None
-    duration: key(Seconds | None, "length of the run, or of each level, as a time; in place of `cycles`") = None
+    duration: key(Seconds | None, "length of the run, or of each level, as a time; replaces `cycles`") = None
     file: key(Text | None, "file with a record of the drive, a table with units or UFF; for waveform 'random', a "
               "table of the spectrum") = None
 
@@ -352,7 +356,7 @@ class Wear(Table):
     """Material removed over many cycles."""
 
     coefficient: key(quantity("wear coefficient", ge=0), "volume worn off both pieces together, divided by the "
-                     "product of load and slip path; with form 'energy', divided by the friction work")
+                     "product of load and slip path; with form 'energy', this volume divided by the friction work")
     upper_share: key(Share, "fraction of the worn depth that is worn off the upper piece") = 0.5
     cycles: key(Positive, "number of cycles over which material is removed; each of these cycles is assumed equal to "
                 "the last cycle of the run, in which the motion has converged")

@@ -65,7 +65,7 @@ def _keys() -> list:
         own = [key for key, name in keys(model).items() if name in model.__annotations__ and not _is_table(model, name)]
         about = " ".join((model.__doc__ or "").split())
         if parent in heads:
-            about += f" This table also takes the keys of {heads[parent][0]}."
+            about += f" `{named[0]}` also takes the keys of {heads[parent][0]}."
         out += ["### " + (", ".join(f"`{header}`" for header in named) if model is not Tables else "At the top"), about]
         if own:
             out.append(grid(("key", "kind", "default", "required", "meaning"),
