@@ -143,8 +143,8 @@ EFFECTS = {
     "structure.stiffening": Effect("patchfem.dynamics.march.joints", "F = k_3 x^3 at the output"),
     "accuracy.method=exact": Effect("patchfem.dynamics.events.histories", "closed form or series between events"),
     "accuracy.method=march": Effect("patchfem.dynamics.march.loop_kernels",
-                                    "exact propagator of the modes, force averaged over the path of the step, Newton's "
-                                    "method for this force"),
+                                    "exact propagator of the modes; the force is averaged over the path of each step "
+                                    "and found by Newton's method"),
     "accuracy.method=duhamel": Effect("patchfem.dynamics.comparison.duhamel",
                                       "Duhamel's integral with forces that are linear within a step, fixed-point "
                                       "iteration (3.10)"),

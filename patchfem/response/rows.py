@@ -205,8 +205,8 @@ ROWS = (
         "if the output does not move",
         lambda s: s.waves.get("acceleration_distortion")),
     Row("drift_per_cycle", "m", 1e-11,
-        "change of the mean slide per cycle: mean slide over the last cycle of the window minus mean slide over the "
-        "first cycle, divided by the number of cycles between the two",
+        "drift of the slide per cycle: (mean slide over the last cycle of the window - mean slide over its first "
+        "cycle)/(number of cycles between these two cycles)",
         lambda s: drift(s.window.time, s.window.slide, s.window.slide_rate, s.drive.period) if s.own.drift is None
         else s.own.drift,
         term=("slip amplitude (without slip: amplitude of the motion)", _moved), halves=FOURTH),

@@ -259,7 +259,7 @@ class Structure(Table):
     mode: tuple[Mode, ...] = ()
     measured: key(Literal["free", "stuck"], "'free': the modes are those of the rig without the joint; 'stuck': "
                   "frequencies and damping were measured with the joint bolted, and the stiffness of the joint is "
-                  "subtracted") = "free"
+                  "subtracted from the stiffness of the modes") = "free"
     stiffening: Stiffening | None = None
     bonded: Bonded | None = None
     masses: key(tuple[Mass, ...] | None, "masses that are connected by springs; they replace the modes") = None

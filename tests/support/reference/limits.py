@@ -45,7 +45,7 @@ strips of `[contact.strips]` are such sections side by side, without elastic cou
 
 **Small strains, linear elasticity.** The pieces are isotropic; plasticity, creep and heat are neglected. The coating is
 bonded, and the far faces are fixed to rigid holders. A note appears if strains exceed {SMALL:g}. The load is assumed
-not to move sideways when a tall piece bends; a note says if this matters.
+not to move sideways when a tall piece bends; a note appears if this motion matters.
 
 **No friction in the static patch.** The pressure is computed without shear. If both pieces have the same elastic
 constants, shear does not change the pressure. For pieces of different materials, the coupling of shear and pressure is
@@ -72,15 +72,15 @@ are exact if both pieces have the same elastic constants. Under a changing load 
 modes, whose number follows from the tolerance. If the cross-sections of the pieces differ, the effect of shear on the
 pressure is neglected. The load and the pressure of a patch of `[[structure.interface]]` are constant, and this patch
 does not wear. If the friction of a point falls while the point slides (bonds that weaken, equation 2.17 as printed),
-several states can be in equilibrium. Among the equilibrium states in the direction of the last time steps, the run then
-takes the state of lower energy. The energy difference counts as dissipated.
+several states can be in equilibrium. The run then considers only the equilibrium states in the direction of its last
+time steps, and takes the state with the lower energy. The energy difference counts as dissipated.
 
 **Modes.** The rig is linear except for its joints, `[structure.stiffening]` and an interlocking spring of
 `[structure.bonded]`. Damping is viscous; hysteretic damping in a file is treated as viscous. A complex mode is replaced
 by its real part.
 
 **Wear.** Every point wears by Archard's law with its own pressure and slip. Debris and heat are neglected. Friction
-changes only through the table `[wear.friction]`, for the patch as a whole. Between two jumps of the wear, a rig is
+changes only through the table `[wear.friction]`, for the patch as a whole. Within each jump of the wear, a rig is
 assumed to repeat its last cycle. If strips yaw, their slide and their wear are computed along x only; a note says how
 far the ends of the patch move across x.
 
