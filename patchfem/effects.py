@@ -56,7 +56,7 @@ def _wave(equations: str, keys: tuple, traits: str = "", module: str = "patchfem
 EFFECTS = {
     "contact": Effect("patchfem.contact.unilateral", "w = g + theta x - delta + C f >= 0, f >= 0, f.w = 0, sum f = N",
                       (), ("pressure",)),
-    "contact.coating": Effect("", "Lame constants of the coating in the elements of the coating"),
+    "contact.coating": Effect("", "the elements of the coating have the Lame constants of the coating"),
     "contact.upper": Effect("", "C = C_upper + C_lower; each piece has its own size, ends, materials and coating"),
     "contact.lower": Effect("", "C = C_upper + C_lower; each piece has its own size, ends, materials and coating"),
     "contact.approach": Effect("", "delta given, N = sum f"),
