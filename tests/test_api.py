@@ -166,8 +166,8 @@ def test_exact_lists_and_modes_by_name():
     ("contakt", 1.0, "contakt: unknown key; did you mean 'contact'?"), ("contact.load", -1.0, "must be >= 0"),
     ("contact.load", float("nan"), "not a finite"), ("contact.load", float("-inf"), "not a finite"),
     ("contact.load", True, "true is not a quantity"), ("contact.load", "5", "bare number"),
-    ("contact.pairs", 2.5, "a whole number is needed"), ("contact.load", None, "None is not a value of a scene"),
-    ("contact.load", {1, 2}, "not a value of a scene"), ("contact.load", [1.0, 2.0], "not"),
+    ("contact.pairs", 2.5, "a whole number is needed"), ("contact.load", None, "None cannot be a value of a scene"),
+    ("contact.load", {1, 2}, "cannot be a value of a scene"), ("contact.load", [1.0, 2.0], "not"),
 ])
 def test_refuses_what_no_scene_can_hold(key, value, said):
     with pytest.raises(pf.SceneError) as caught:

@@ -183,7 +183,7 @@ class _Motion:
             turn = self.rows[1] @ self.lift[:, 1] + ask.spring
             self.stiffness = np.array([total, turn])
         if not (self.stiffness > 0).all():
-            raise np.linalg.LinAlgError("the set does not determine the rigid motion")
+            raise np.linalg.LinAlgError("the nodes in contact do not determine the rigid-body motion")
 
     def forces(self, target, free=None, near: float = 0.0) -> tuple:
         """Forces (n,) and (lift, lean) with C f - closing = -near - C free and the sums in `target`.

@@ -114,7 +114,8 @@ class ContactSets:
         force, _, _ = solve_forces(self.c, self.x, self.opening - d + t * self.x, np.zeros(0))
         touching = self.contact_set(force > 0)
         if self.flaw(touching, d, t) > 1e-12:  # as `unilateral.SOLVED`
-            raise NotConverged("contact: no contact set fits the motion; raise the load or check the mesh")
+            raise NotConverged("contact: no set of touching nodes satisfies the contact conditions during the motion; "
+                               "raise the load or check the mesh")
         return touching
 
     def flaw(self, touching: ContactSet, d: float, t: float) -> float:

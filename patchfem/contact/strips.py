@@ -34,8 +34,8 @@ from .strips_solve import (
 )
 from .unilateral import LIMIT
 
-NEGLECTED = ("the shear between neighbouring strips is neglected; fields and pictures show the mean of the strips "
-             "unless they name strips; result.nc has every strip")
+NEGLECTED = ("the shear between neighbouring strips is neglected; fields and pictures show the mean over the strips, "
+             "except where strips are mentioned; result.nc contains every strip")
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -216,7 +216,7 @@ def _refuse_loose(skin, force, checks, free_rotation: bool, free_roll: bool) -> 
         at, cure = ("asperities", "make the rough layer softer "
                                   "(decay length, height deviation), or leave the layer out") \
             if smooth(skin) else ("strips", "lower contact.strips.roll or raise the load")
-        raise NotConverged(f"contact.{at}: {worst} {checks[worst]:.2e} exceeds {LIMIT:.0e}; {cure}")
+        raise NotConverged(f"contact.{at}: the residual {worst} = {checks[worst]:.2e} exceeds {LIMIT:.0e}; {cure}")
 
 
 def _state(skin, weight, x, offsets, force, opening, motion, count, checks) -> StripsState:

@@ -195,7 +195,7 @@ def press_by(pieces: Compliance, gap: np.ndarray, approach: float, rotation: flo
         return _apart(gap, approach, rotation)
     if approach - gap.min() < LEAST:
         raise PatchfemError(f"contact.approach: an overlap of {say(approach - gap.min(), 3)} is too small to compute "
-                            f"with; take {gap.min():.6g} m for touching without load")
+                            f"with; for pieces that touch without load give {gap.min():.6g} m")
     return _pressed(pieces, Ask(pieces.interface.x, gap - approach), start, approach, rotation)
 
 
@@ -246,7 +246,7 @@ def checked(c, ask: Ask, out: Solved) -> tuple:
     checks = residuals(c, ask.x, gap, out.force, out.closing, out.theta, load, ask.moment, ask.spring)
     if not all(value <= SOLVED for value in checks.values()):  # NaN must not pass
         worst = max(checks, key=lambda name: (checks[name] != checks[name], checks[name]))
-        raise NotConverged(f"contact: {worst} {checks[worst]:.2e} exceeds {SOLVED:.0e}")
+        raise NotConverged(f"contact: the residual {worst} = {checks[worst]:.2e} exceeds {SOLVED:.0e}")
     opening = np.maximum(gap + out.theta * ask.x - out.closing + c @ out.force, 0.0)
     opening[out.force > 0] = 0.0
     return opening, checks

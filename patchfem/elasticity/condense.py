@@ -187,6 +187,6 @@ def _checked(found: Condensed) -> Condensed:
     with one_thread():
         change = np.abs(found._solved(rest, True)).max() / np.abs(u).max()
     if not change <= CORRECTION:
-        raise NotConverged(f"the stiffness of the piece is solved to a relative change of {change:.1e}, but "
+        raise NotConverged(f"the equations of the piece are solved only to a relative accuracy of {change:.1e}, but "
                            f"{CORRECTION:.0e} is needed")
     return Condensed(found.stencil, found.inside, found.kinds, found.mirrored, float(change))

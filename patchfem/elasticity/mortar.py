@@ -67,7 +67,8 @@ def mortar(lower: tuple, x_lower: np.ndarray, upper: tuple, x_upper: np.ndarray,
     _plain(lower, x_lower, "lower")
     _plain(upper, x_upper, "upper")
     if side not in (None, "lower", "upper"):
-        raise PatchfemError(f"contact.mesh: the pressure lies on the lower or the upper piece, not on {side!r}")
+        raise PatchfemError("contact.mesh: the pressure can be defined on the lower or the upper piece, not on "
+                            f"{side!r}")
     pair = (lower, x_lower), (upper, x_upper)
     grids = _grids(pair)
     found = _judged(grids, side or _name(grids), pair)
@@ -79,8 +80,8 @@ def mortar(lower: tuple, x_lower: np.ndarray, upper: tuple, x_upper: np.ndarray,
                             "interface cells of similar size that grow gradually")
     if side in (None, best.side):
         return best
-    return replace(best, reason=f"the pressure was to be defined on the {side} piece, but {found.reason}; so another "
-                                f"choice is used: {best.reason}")
+    return replace(best, reason=f"the pressure was to be defined on the {side} piece, but {found.reason}; therefore "
+                                f"another definition is used: {best.reason}")
 
 
 def _grids(pair) -> dict:
@@ -89,8 +90,8 @@ def _grids(pair) -> dict:
     begin, end = overlap(x_lower, x_upper)
     low, high = clipped(x_lower, begin, end), clipped(x_upper, begin, end)
     if min(low.size, high.size) < 3:
-        raise PatchfemError(f"contact.mesh: the pieces share {end - begin:.6g} m of interface only, less than two "
-                            "cells; shift or refine the pieces")
+        raise PatchfemError(f"contact.mesh: the pieces share {end - begin:.6g} m of the interface, which is less than "
+                            "two cells; shift or refine the pieces")
     both = common_grid(low, high, softness(x_lower, lower[0], low), softness(x_upper, upper[0], high))
     return {"lower": low, "upper": high, "both": both}
 
@@ -254,8 +255,8 @@ def _name(grids) -> str:
 def _reason(grids, name: str, ripple: float, place: float) -> str:
     where = f"the nodes of the {name} piece" if name != "both" else "nodes of both pieces alternately"
     low, high, x = (grids[key].size for key in ("lower", "upper", name))
-    return (f"with the pressure on {where} ({x} points; the lower interface has {low}, the upper interface {high}), a "
-            f"ripple of the pressure by {100 * ripple:.2g} % is expected near x = {say(place, 3)}")
+    return (f"with the pressure defined on {where} ({x} points; the lower interface has {low}, the upper interface "
+            f"{high}), pressure ripples of {100 * ripple:.2g} % are expected near x = {say(place, 3)}")
 
 
 def _plain(c: tuple, x, side: str) -> None:

@@ -78,7 +78,7 @@ def _assembled(mesh, layers: Layers) -> tuple:
     if not change <= CORRECTION:
         ends = mesh.points[np.unique(np.sort(cell_edges(mesh)[0], axis=1), axis=0)]
         least = np.hypot(*(ends[:, 1] - ends[:, 0]).T).min()
-        raise NotConverged(f"the stiffness of the piece is solved to a relative change of {change:.1e}, but "
+        raise NotConverged(f"the equations of the piece are solved only to a relative accuracy of {change:.1e}, but "
                            f"{CORRECTION:.0e} is needed; "
                            + remedy(layers, mesh.is_coating.any(), least, np.ptp(mesh.points, axis=0)))
     return order, found, float(change)

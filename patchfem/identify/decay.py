@@ -43,7 +43,7 @@ def decay(time, value) -> Decay:
     PatchfemError for fewer than 32 rows, and where nothing decays.
     """
     if time.size < 32:
-        raise PatchfemError(f"{time.size} rows of a free decay; at least 32 are needed")
+        raise PatchfemError(f"the free decay has {time.size} samples; at least 32 are needed")
     time, size = time - time[0], np.sqrt(np.mean((value - value.mean())**2))
     poles, last = np.empty(0), size
     rest = value - value.mean()

@@ -42,8 +42,8 @@ def even_step(time) -> float:
     step = (time[-1] - time[0]) / (time.size - 1)
     off = np.abs(time - time[0] - step * np.arange(time.size)).max() / step
     if off > max(UNEVEN, 1e-5 * time.size):
-        raise PatchfemError(f"the times deviate from an even step of {step:.6g} s by up to {off:.2g} steps; an evenly "
-                            "sampled record is needed")
+        raise PatchfemError(f"the times deviate from an even step of {step:.6g} s by up to {off:.2g} of this step; an "
+                            "evenly sampled record is needed")
     return float(step)
 
 
@@ -58,7 +58,8 @@ def h1(step: float, force, response, segment: int | None = None, window: str | N
     segment = (force.size if whole else 2 * (force.size // (2 * AVERAGES))) if segment is None else segment
     window = window or ("none" if whole else "hann")
     if not 64 <= segment <= force.size:
-        raise PatchfemError(f"a segment of {segment} samples; 64 to the {force.size} of the record are needed")
+        raise PatchfemError(f"a segment has {segment} samples; at least 64, and at most the {force.size} samples of "
+                            "the record, are needed")
     asked = {"fs": 1 / step, "window": "boxcar" if window == "none" else window, "nperseg": segment,
              "noverlap": segment // 2, "detrend": "constant" if window == "hann" else False}
     frequency, own = welch(force, **asked)

@@ -68,7 +68,7 @@ def fit(residual: Callable, low, high, log=None, start=None, starts: int = 3, ba
     model, n = Counted(residual, box), box.low.size
     begins = _starts(model, None if start is None else box.unit(start), starts)
     if model.rows < n:
-        raise ValueError(f"{model.rows} rows cannot determine {n} values")
+        raise ValueError(f"{model.rows} rows of data cannot determine {n} values")
     return answered(model, descents(model, begins, every=False), bars)
 
 
@@ -145,7 +145,7 @@ def _starts(model: Counted, own, count: int) -> list:
     if own is not None and model(own) is not None:
         best = [own, *best]
     if not best:
-        raise NotConverged(f"the model failed at every one of {model.evaluations} starts: {model.reason}")
+        raise NotConverged(f"the model failed at all {model.evaluations} starting points of the search: {model.reason}")
     return best[:max(1, count)]
 
 

@@ -40,7 +40,7 @@ def response_of(values: dict) -> str:
     """The one response among records; PatchfemError where there is none or several."""
     found = [name for name in POWER if name in values]
     if len(found) != 1:
-        raise PatchfemError(f"exactly one response is needed, {' or '.join(POWER)}; the record has "
+        raise PatchfemError(f"exactly one response is needed ({' or '.join(POWER)}), but the record has "
                             f"{', '.join(found) or 'none'}: choose one with --map")
     return found[0]
 
@@ -50,8 +50,10 @@ def estimated(values: dict, segment: float | None = None, window: str | None = N
     lacking."""
     response, inputs = response_of(values), [name for name in INPUTS if name in values]
     if len(inputs) != 1 or "time" not in values:
-        raise PatchfemError("a frequency response needs time, a response and one input, force or base_acceleration; "
-                            "there are " + ", ".join(values) + ": choose with --map, or read a free decay with --decay")
+        raise PatchfemError("a frequency response needs time, a response and one input (force or base_acceleration), "
+                            "but the record "
+                            "has " + ", ".join(values) + ": choose channels with --map, or use --decay for a free "
+                                                         "decay")
     step = even_step(values["time"])
     count = None if segment is None else round(segment / step)
     return h1(step, values[inputs[0]], values[response], count, window), step, inputs[0], response
@@ -71,7 +73,8 @@ def of_drive(values: dict, segment: float | None, window: str | None, band: tupl
     found = driven_modes(step, force, motion, response, relative, band)
     rows, mass, notes = _of_force(found) if drive == "force" else _of_base(found)
     if force.size > SAMPLES:
-        notes.append(f"the modes are fitted to the first {SAMPLES} of {force.size} samples, {SAMPLES * step:.4g} s")
+        notes.append(f"the modes are fitted to the first {SAMPLES} of {force.size} samples, a duration of "
+                     f"{SAMPLES * step:.4g} s")
     return Listed(found.frequency, found.damping, rows, mass, _told(found), _noted(found, estimate, step) + notes,
                   estimate)
 
@@ -82,8 +85,8 @@ def _of_force(found: Modes) -> tuple:
                             "not at the same point, or one of the two has the wrong sign, so the modal mass is unknown")
     size = np.sqrt(np.abs(found.residue) / found.residue[0])
     turned = found.residue < 0
-    notes = [f"the mode at {f:.5g} Hz moves against the force, which is impossible if both are at the same point; its "
-             "sign is ignored"
+    notes = [f"the mode at {f:.5g} Hz moves against the force, which is impossible if force and response are at the "
+             "same point; the sign of this mode is ignored"
              for f in found.frequency[turned]]
     return {"slide": size, "output": size}, 1 / float(found.residue[0]), notes
 
@@ -100,7 +103,7 @@ def _of_base(found: Modes) -> tuple:
 def _told(found: Modes) -> list:
     out = []
     for k, (zeta, error) in enumerate(zip(found.damping, found.error)):
-        read = "" if not found.read[k] > 0 else f"; the windowed estimate reads {found.read[k]:.4g}"
+        read = "" if not found.read[k] > 0 else f"; the estimate with a window gives {found.read[k]:.4g}"
         seen = "" if found.coherence is None else f"; coherence {found.coherence[k]:.3g}"
         out.append(f"damping {zeta:.4g} +- {error:.1g} from the record itself{read}{seen}")
     return out
@@ -113,12 +116,12 @@ def _noted(found: Modes, estimate: Estimate, step: float) -> list:
     if wide.any() and estimate.segments > 1:  # one whole record is cut nowhere: what it reads more is noise
         k = int(np.argmax(np.where(wide, found.read / found.damping, 0)))
         notes.append(f"segments of {estimate.segment * step:.3g} s (window {estimate.window}) widen the peak at "
-                     f"{found.frequency[k]:.5g} Hz: the estimate reads a damping of {found.read[k]:.4g}, the record "
-                     f"has {found.damping[k]:.4g}, which is the value written; a free decay (--decay) gives the "
-                     "damping without an input")
+                     f"{found.frequency[k]:.5g} Hz: with segments the damping seems to be {found.read[k]:.4g}, but the "
+                     f"whole record gives {found.damping[k]:.4g}, and this value is written; a free decay (--decay) "
+                     "gives the damping without an input")
     if found.misfit > LOOSE:
-        notes.append(f"the modes leave {100 * found.misfit:.0f} % of the response (root mean square) unexplained: "
-                     "noise, or a rig that is not linear")
+        notes.append(f"the modes leave {100 * found.misfit:.0f} % of the response (root mean square) unexplained: the "
+                     "record is noisy, or the rig is not linear")
     return notes
 
 
@@ -167,8 +170,8 @@ def of_shapes(shapes: Shapes, places: dict) -> Listed:
     if "slide" not in places:
         if len(shapes.motion) != 1:
             first = next(iter(shapes.motion))
-            raise PatchfemError(f"the file has {len(shapes.motion)} nodes and directions; give the one that slides, "
-                                f"such as --map slide={first[0]}:+{structure_places.AXES[first[1]]}")
+            raise PatchfemError(f"the file has {len(shapes.motion)} nodes and directions; give the node and direction "
+                                f"that slide, such as --map slide={first[0]}:+{structure_places.AXES[first[1]]}")
         node, axis = next(iter(shapes.motion))
         places = {"slide": f"{node}:+{structure_places.AXES[axis]}", **places}
     motion = {key: shapes.at(text, key) for key, text in places.items()}
@@ -179,7 +182,7 @@ def of_shapes(shapes: Shapes, places: dict) -> Listed:
     rows = {key: row[order] / np.sqrt(held) for key, row in motion.items()}
     rows.setdefault("output", rows["slide"])
     rows.setdefault("base", rows["slide"])
-    mass = (f"moving_mass is set to the mass that these modes contain there, {1 / held:.5g} kg; with a larger value "
-            "part of the mass belongs to no mode")
+    mass = (f"moving_mass is set to {1 / held:.5g} kg, the mass that these modes contain at the node that slides; with "
+            "a larger value, part of the mass would belong to no mode")
     return Listed(shapes.frequency[order], shapes.zeta[order], rows, 1 / held, [""] * order.size,
                   [*shapes.notes, mass])

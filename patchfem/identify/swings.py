@@ -42,7 +42,7 @@ def half_swings(time, value) -> HalfSwings:
     PatchfemError for a trace in which nothing swings, or with fewer than FEWEST samples of a half swing.
     """
     if time.size < 4 * FEWEST:
-        raise PatchfemError(f"{time.size} rows of a free decay; at least {4 * FEWEST} are needed")
+        raise PatchfemError(f"the free decay has {time.size} samples; at least {4 * FEWEST} are needed")
     tracked = _followed(time, value, _first(time, value))
     tries = [tracked, tracked]
     for _ in range(PASSES if len(tracked) > 2 else 0):
@@ -71,8 +71,8 @@ def _first(time, value) -> tuple:
     for f in line * GRID:
         part = time - time[0] <= 1 / f
         if np.count_nonzero(part) < 2 * FEWEST:
-            raise PatchfemError(f"the record has {np.count_nonzero(part)} samples of a cycle of {f:.4g} Hz; "
-                                f"at least {2 * FEWEST} are needed")
+            raise PatchfemError(f"the record has {np.count_nonzero(part)} samples per cycle of {f:.4g} Hz; at least "
+                                f"{2 * FEWEST} are needed")
         turn = 2 * np.pi * f * (time[part] - time[0])
         columns = np.stack([np.ones(turn.size), np.cos(turn), np.sin(turn)], axis=1)
         x = np.linalg.lstsq(columns, value[part], rcond=None)[0]

@@ -20,17 +20,17 @@ def remarks(found: Fit, names) -> list:
         if np.isfinite(found.intervals[i]).all():
             if found.open_ends[i].any() and not found.at_bound[i]:
                 side = "low" if found.open_ends[i, 0] else "high"
-                out.append(f"{name}: the rows do not exclude its {side} bound")
+                out.append(f"{name}: the data do not exclude its {side} bound")
         elif found.sensitivity[i] <= 1e-9 * max(float(np.max(found.sensitivity)), found.rms):
-            out.append(f"{name} has no effect on the rows, so its value is not determined")
+            out.append(f"{name} has no effect on the computed data, so its value is not determined")
         elif i not in told:
-            out.append(f"{name} is not determined: every value in its range fits the rows")
+            out.append(f"{name} is not determined: every value in its range fits the data")
     if found.failures:
         out.append(f"{found.failures} of {found.evaluations} evaluations failed and were skipped; the first failed "
                    f"because: {found.reason}")
     if found.outcome is Outcome.NOT_CONVERGED:
-        out.append(f"not converged: the best search did not settle within {MOST} evaluations, and no other start ended "
-                   "within 1 % of its score")
+        out.append(f"not converged: the best search did not settle within {MOST} evaluations, and no search from "
+                   "another start ended within 1 % of the best score")
     return out
 
 
@@ -40,4 +40,5 @@ def _combination(row, names) -> str:
     known = ""
     if used.size == 2 and abs(abs(row[used[0]]) - abs(row[used[1]])) < 2e-3:
         known = f": only their {'product' if row[used[0]] * row[used[1]] < 0 else 'ratio'} is known"
-    return f"{' and '.join(names[i] for i in used)} cannot be determined separately ({changes} changes nothing){known}"
+    return (f"{' and '.join(names[i] for i in used)} cannot be determined separately (changing {changes} together has "
+            f"no effect){known}")

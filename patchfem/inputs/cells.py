@@ -35,7 +35,7 @@ def lines_of(path: Path, what: str, remedy: str = ""):
             while data := file.read(BLOCK):
                 seen += len(data)
                 if seen > LARGEST:
-                    raise PatchfemError(f"{path}: more than {LARGEST >> 20} MiB of text; thin out the rows of {what}")
+                    raise PatchfemError(f"{path}: more than {LARGEST >> 20} MiB of text; leave out some rows of {what}")
                 *whole, last = decoder.decode(data).split("\n")
                 if whole:
                     begun.append(whole[0])
@@ -81,7 +81,7 @@ def cells_of(path, number: int, line: str, names) -> dict:
     try:
         cells = [cell.strip() for cell in (next(csv.reader([line])) if '"' in line else line.split(","))]
     except csv.Error as error:
-        raise PatchfemError(f"{path}:{number}: its quotes cannot be read ({error})") from None
+        raise PatchfemError(f"{path}:{number}: the quotation marks in this row cannot be read ({error})") from None
     if len(cells) != len(names):
         count = _WORDS[len(names)] if len(names) < len(_WORDS) else str(len(names))
         listed = " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))

@@ -46,7 +46,7 @@ def read_columns(path, units: Mapping, wanted: tuple, header: str, what: str, re
         texts += more
     table = np.concatenate(tables)
     if len(table) < 2:
-        raise PatchfemError(f"{path}:{number - 1}: {what} needs at least two rows below its header, not {len(table)}")
+        raise PatchfemError(f"{path}:{number - 1}: {what} needs at least two rows below the header, not {len(table)}")
     free = [name for name in names if name not in factors]
     return Columns({name: frozen_array(column) for name, column in zip(factors, table.T)},
                    {name: tuple(row[k] for row in texts) for k, name in enumerate(free)}, len(table))

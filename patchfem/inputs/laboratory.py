@@ -104,10 +104,10 @@ def _variables(path: Path, asked: list) -> Records:
         raise PatchfemError(f"{path}: more than {LARGEST >> 20} MiB; save fewer variables or a part of the record")
     arrays = {name: one for name, one in matlab.variables(path, matlab.content(path)).items() if one.kind == "number"}
     held = ", ".join(f"{name} {'x'.join(map(str, one.shape))}" for name, one in list(arrays.items())[:20]) or \
-        "no array of numbers (objects and structures of several elements are not read)"
+        "no array of numbers (objects, and structures with several elements, cannot be read)"
     if not asked:
-        raise PatchfemError(f'{path}: assign its variables, such as --map "time=t [s]" --map "force=F [N]"; it '
-                            f"contains {held}")
+        raise PatchfemError(f'{path}: assign the variables of the file, such as --map "time=t [s]" --map '
+                            f'"force=F [N]"; the file contains {held}')
     return checked(path, {one.quantity: _values(path, arrays, one, held) for one in
                           sorted(asked, key=lambda one: one.quantity != "time")}, [])
 
@@ -116,7 +116,7 @@ def _values(path, arrays: dict, one: Wanted, held: str):
     found = _COLUMN.fullmatch(one.source)
     name, column = (found[1], int(found[2]) - 1) if found else (one.source, None)
     if name not in arrays:
-        raise PatchfemError(f"{path}: no variable '{name[:40]}'; it contains {held}")
+        raise PatchfemError(f"{path}: no variable '{name[:40]}'; the file contains {held}")
     if not one.unit:
         raise PatchfemError(f"--map {one.quantity}={one.source}: a .mat file has no units; write the unit, such as "
                             f'"{one.quantity}={one.source} [unit]"')
@@ -127,7 +127,7 @@ def _values(path, arrays: dict, one: Wanted, held: str):
                                 f"{name}(:,1)")
         values = values.ravel()
     elif values.ndim != 2 or column >= values.shape[1]:
-        raise PatchfemError(f"{path}: {name} is {'x'.join(map(str, values.shape))}; it has no column {column + 1}")
+        raise PatchfemError(f"{path}: {name} is {'x'.join(map(str, values.shape))}, so it has no column {column + 1}")
     else:
         values = values[:, column]
     return values * factor_of(one.quantity, one.unit)

@@ -40,9 +40,9 @@ class Loop:
             raise PatchfemError(f"--hold {hold}: column=value,value is needed, such as cycle=1,2")
         if name not in self.labels:
             known = ", ".join(self.labels) or "none"
-            raise PatchfemError(f"--hold {name}: {self.path} has no column of labels with this name (it "
-                                f"has: {known}); add one, such as `run`, because time, displacement and force cannot "
-                                "mark rows")
+            raise PatchfemError(f"--hold {name}: {self.path} has no column of labels with this name (it has: {known}); "
+                                "add a column of labels, such as `run`, because rows cannot be chosen by time, "
+                                "displacement or force")
         there = [_plain(cell) for cell in self.labels[name]]
         absent = [one for one in wanted if _plain(one) not in there]
         if absent:
@@ -68,7 +68,8 @@ def read_loop(path, units: Mapping = UNITS) -> Loop:
     values = {own_name(name, found.values): column for name, column in found.values.items()}
     read = [name for name in BESIDE if name in values]
     if len(read) != 1:
-        raise PatchfemError(f"{path}:1: " + ("force and friction_ratio are both given: keep one" if read else
+        raise PatchfemError(f"{path}:1: " + ("there are columns force and friction_ratio: keep only one of the "
+                                             "two" if read else
                             f"no column force; write a header like `{HEADER}` (or friction_ratio for the force)"))
     place, time = values["displacement"], values.get("time")
     if time is not None:

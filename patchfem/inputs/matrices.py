@@ -89,7 +89,7 @@ def _symmetric(path, values, wanted: str):
     if np.iscomplexobj(values.data):
         if np.abs(values.data.imag).max(initial=0.0) > 0:
             raise PatchfemError(f"{path}: the {wanted} is complex; motion in time needs real matrices: give hysteretic "
-                                "damping as a ratio, half the loss factor")
+                                "damping as a damping ratio, which is half the loss factor")
         values = values.real
     if values.shape[0] != values.shape[1] or not values.shape[0]:
         raise PatchfemError(f"{path}: the {wanted} must be square, not of shape {values.shape}")
@@ -99,7 +99,8 @@ def _symmetric(path, values, wanted: str):
     skew, most = abs(values - values.T).max(), abs(values).max()
     if skew > SKEW * most:
         raise PatchfemError(f"{path}: the {wanted} is not symmetric: entries differ from the transpose by {skew:.3g}, "
-                            f"{skew / most:.2g} of the largest; gyroscopic and follower terms are not supported")
+                            f"which is {skew / most:.2g} of the largest entry; gyroscopic and follower terms are not "
+                            "supported")
     return ((values + values.T) / 2).tocsr()
 
 
@@ -113,8 +114,8 @@ def _named(path, names, wanted: str) -> str:
     other = [kind for kind, known in NAMES.items() if len(names) == 1 and
              names[0].rpartition(".")[2].lower() in known]
     if other:
-        raise PatchfemError(f"{path}: its one array, {names[0]}, has the name of a {other[0]}, but the {wanted} is "
-                            f"needed; give the file of the {wanted}")
+        raise PatchfemError(f"{path}: the only array of the file, {names[0]}, has the name of a {other[0]}, but the "
+                            f"{wanted} is needed; give the file of the {wanted}")
     if len(names) == 1:
         return names[0]
     held = ", ".join(names[:12]) or "none"
@@ -134,7 +135,7 @@ def _market(path: Path, wanted: str) -> Matrix:
     size = [int(word) for word in next(line for line in lines if line.strip() and line[0] != "%").split()]
     count = size[2] if len(size) > 2 else size[0] * size[1]
     if max(size[:2]) > nastran.SIDE or count > min(nastran.MOST, path.stat().st_size):
-        raise PatchfemError(f"{path}: its header announces {count} numbers in {size[0]} x {size[1]}, more than the "
+        raise PatchfemError(f"{path}: the header announces {count} numbers in {size[0]} x {size[1]}, more than the "
                             "file can hold")
     return Matrix(sparse.coo_array(mmread(path)))
 
@@ -146,8 +147,8 @@ def _abaqus(path: Path) -> Matrix:
         first = next(lines, "")
         rows = np.loadtxt(chain([first], lines), delimiter="," if "," in first else None, ndmin=2)
     if rows.shape[1] not in (3, 5) or not rows.size:
-        raise PatchfemError(f"{path}: is not a matrix: write Matrix Market, or lines of row, column, number, or of "
-                            "node, direction, node, direction, number")
+        raise PatchfemError(f"{path}: is not a matrix: write a Matrix Market file, or lines of row, column, number, or "
+                            "lines of node, direction, node, direction, number")
     ends = rows[:, :-1].astype(int)
     if (ends != rows[:, :-1]).any():
         raise PatchfemError(f"{path}: rows, nodes and directions must be whole numbers")

@@ -11,7 +11,7 @@ UNITS = {"frequency": {"Hz": 1.0, "kHz": 1e3},
          "input": {"g": 9.80665, "m/s^2": 1.0, "m s-2": 1.0},
          "acceleration": {"g": 9.80665, "m/s^2": 1.0, "m s-2": 1.0},
          "displacement": {"mil": 25.4e-6, "in": 0.0254, "m": 1.0, "mm": 1e-3, "um": 1e-6}}
-FLAGS = {"U": "unstable", "*": "no reading of the gauge", "R": "repeat run"}
+FLAGS = {"U": "unstable", "*": "the gauge gave no reading", "R": "repeat run"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,8 @@ def read_table(path: Path) -> list:
     names, factors = header_of(path, lines[0], UNITS, ("frequency", "input"), "frequency [Hz],input [g],flag", False)
     unknown = [name for name in names if name not in (*UNITS, "flag")]
     if unknown:
-        raise PatchfemError(f"{path}:1: column '{unknown[0][:40]}' is not known; known are flag and {', '.join(UNITS)}")
+        raise PatchfemError(f"{path}:1: column '{unknown[0][:40]}' is unknown; possible columns are flag and "
+                            f"{', '.join(UNITS)}")
     return [_row(path, number, cells_of(path, number, line, names), factors)
             for number, line in enumerate(lines[1:], 2) if line.strip(", \t")]
 
@@ -47,7 +48,7 @@ def read_table(path: Path) -> list:
 def _row(path, number: int, cells: dict, factors: dict) -> Row:
     flag = cells.get("flag", "")
     if set(flag) - set(FLAGS):
-        raise PatchfemError(f"{path}:{number}: flag '{flag[:40]}'; known letters are {', '.join(FLAGS)}")
+        raise PatchfemError(f"{path}:{number}: flag '{flag[:40]}' is unknown; possible letters are {', '.join(FLAGS)}")
     values = {name: number_of(path, number, name, cells[name], factor) if cells.get(name) else None
               for name, factor in (dict.fromkeys(UNITS) | factors).items()}
     below = next((name for name, value in values.items() if value is not None and value < 0), None)

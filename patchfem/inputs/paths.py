@@ -57,5 +57,5 @@ def rising(path, time) -> None:
     back = np.flatnonzero(np.diff(time) <= 0)
     if back.size:
         k = back[0]
-        raise PatchfemError(f"{path}:{k + 3}: time {time[k + 1]:g} s does not follow {time[k]:g} s; strictly rising "
-                            "time is needed")
+        raise PatchfemError(f"{path}:{k + 3}: time {time[k + 1]:g} s is not later than the time in the row above, "
+                            f"{time[k]:g} s; times must strictly rise")

@@ -78,7 +78,7 @@ def wanted(texts, names=UNITS) -> list:
         if unit and name in UNITS:
             factor_of(name, unit, "--map ")
         if name in [one.quantity for one in found]:
-            raise PatchfemError(f"--map {name}: asked for twice")
+            raise PatchfemError(f"--map {name}: given twice")
         found.append(Wanted(name, source, unit))
     return found
 
@@ -113,7 +113,7 @@ def chosen(path: Path, channels: list, asked: list, notes: list) -> Records:
     names = [name for name, _, _ in picked]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
-        raise PatchfemError(f"{path}: {names.count(twice[0])} channels are {twice[0]}; choose with --map "
+        raise PatchfemError(f"{path}: {names.count(twice[0])} channels contain {twice[0]}; choose one with --map "
                             f"{twice[0]}=CHANNEL among {listed(channels)}")
     if not set(names) - {"time"}:
         raise PatchfemError(f"{path}: no channel label names a quantity; choose channels with --map force=CHANNEL [N], "
@@ -131,11 +131,11 @@ def found(path, channels: list, source: str) -> Channel:
         if len(same) == 1:
             return same[0]
         if same:
-            raise PatchfemError(f"{path}: {len(same)} channels are '{source}'; choose one by its number, among "
-                                f"{listed(channels)}")
+            raise PatchfemError(f"{path}: {len(same)} channels have the name '{source}'; choose one by its number, "
+                                f"among {listed(channels)}")
     if source.isdecimal() and 1 <= int(source) <= len(channels):
         return channels[int(source) - 1]
-    raise PatchfemError(f"{path}: no channel '{source[:60]}'; it has {listed(channels)}")
+    raise PatchfemError(f"{path}: no channel '{source[:60]}'; the file has {listed(channels)}")
 
 
 def listed(channels: list) -> str:
@@ -150,7 +150,8 @@ def checked(path, values: dict, notes: list) -> Records:
     time that does not rise."""
     sizes = {name: len(column) for name, column in values.items()}
     if len(set(sizes.values())) > 1:
-        raise PatchfemError(f"{path}: channels of different length: {', '.join(f'{n} {k}' for n, k in sizes.items())}")
+        raise PatchfemError(f"{path}: the channels have different lengths: "
+                            f"{', '.join(f'{n} {k}' for n, k in sizes.items())}")
     if min(sizes.values()) < 2:
         raise PatchfemError(f"{path}: at least two samples are needed")
     for name, column in values.items():
@@ -160,8 +161,8 @@ def checked(path, values: dict, notes: list) -> Records:
     back = np.flatnonzero(np.diff(values["time"]) <= 0) if "time" in values else np.zeros(0)
     if back.size:
         k = back[0]
-        raise PatchfemError(f"{path}: time {values['time'][k + 1]:.9g} s of sample {k + 2} does not follow "
-                            f"{values['time'][k]:.9g} s; strictly rising time is needed")
+        raise PatchfemError(f"{path}: time {values['time'][k + 1]:.9g} s of sample {k + 2} is not later than "
+                            f"{values['time'][k]:.9g} s of the sample before; times must strictly rise")
     return Records(Path(path), {name: frozen_array(column) for name, column in values.items()}, notes)
 
 
@@ -180,8 +181,9 @@ def _shared_time(path, picked: list, channels: list, asked: bool) -> dict:
     if times:
         for one in picked:
             if one.time is None or one.time.size != times[0].size or not np.array_equal(one.time, times[0]):
-                raise PatchfemError(f"{path}: '{one.name[:40]}' has other times than '{picked[0].name[:40]}'; choose "
-                                    f"channels with the same times by --map, among {listed(channels)}")
+                raise PatchfemError(f"{path}: '{one.name[:40]}' is sampled at other times than "
+                                    f"'{picked[0].name[:40]}'; choose channels with the same times by --map, among "
+                                    f"{listed(channels)}")
         return {"time": times[0]}
     columns = [one for one in channels if one.quantity == "time"] if asked else []
     return {"time": _in_si(path, "time", columns[0], "")} if len(columns) == 1 else {}

@@ -57,7 +57,7 @@ def _universal(path: Path, name: str) -> tuple:
     there = [one for one in sets if one["type"] != 58 or int(one["ordinate_spec_data_type"]) in kinds]
     found = channels(path, [one | {"ordinate_spec_data_type": KINDS[name]} for one in there], notes)
     if len(found) != 1:
-        raise PatchfemError(f"{path}: one time response (dataset 58, function type 1) of {name} is needed; "
+        raise PatchfemError(f"{path}: exactly one time response (dataset 58, function type 1) of {name} is needed; "
                             f"{len(found)} of the {len(sets)} datasets match")
     values = chosen(path, found, [], notes).values
     return values["time"], values[name]

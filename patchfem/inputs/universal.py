@@ -66,9 +66,9 @@ def _channel(path, number: int, one: dict, scale, notes: list) -> Channel:
     what = f"{path}: record {number}"
     values, time = np.asarray(one["data"]), np.asarray(one["x"], float)
     if np.iscomplexobj(values):
-        raise PatchfemError(f"{what}: its values are complex; a record over time is real")
+        raise PatchfemError(f"{what}: the values are complex, but a record over time must be real")
     if values.size != int(one["num_pts"]) or time.size != values.size:
-        raise PatchfemError(f"{what}: {values.size} values where {one['num_pts']} are announced; the file is damaged")
+        raise PatchfemError(f"{what}: {values.size} values, but {one['num_pts']} are announced; the file is damaged")
     quantity = KINDS.get(int(one["ordinate_spec_data_type"]), "")
     label = plain_unit(_text(one["ordinate_axis_units_lab"]))
     factor = None
@@ -81,7 +81,7 @@ def _channel(path, number: int, one: dict, scale, notes: list) -> Channel:
                                               "--map"))
     direction = int(one["rsp_dir"])
     if direction < 0:
-        notes.append(f"record {number} points along -{_axis(direction)}; its sign is reversed")
+        notes.append(f"record {number} points along -{_axis(direction)}, so its sign is reversed here")
         values = -values
     name = _text(one["id1"]) or f"record {number}"
     return Channel(name, f"{int(one['rsp_node'])}:+{_axis(direction)}" if direction else "", quantity, label,

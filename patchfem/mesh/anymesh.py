@@ -138,13 +138,13 @@ def pieces(raw: Tagged, where) -> PairMesh:
                                                        raw.quads[mine[count:]].ravel()])))
     shared = np.intersect1d(owned["lower"][1], owned["upper"][1]).size
     if shared:
-        raise PatchfemError(f"{where}: the two pieces share {shared} nodes; each needs its own interface nodes")
+        raise PatchfemError(f"{where}: the two pieces share {shared} nodes; each piece needs its own interface nodes")
     lower, upper = _piece(raw, "lower", *owned["lower"], where), _piece(raw, "upper", *owned["upper"], where)
     apart = np.abs(lower.x[[0, -1]] - upper.x[[0, -1]]).max()
     if apart > CLOSE * lower.length:
         fault = f"lengths {lower.length:.9g} and {upper.length:.9g} m, with ends up to {apart:.6g} m apart"
-        raise PatchfemError(f"{where}: lower_interface and upper_interface do not match ({fault}); "
-                            "give both the same ends (the nodes between may differ)")
+        raise PatchfemError(f"{where}: lower_interface and upper_interface do not match ({fault}); let both interfaces "
+                            "begin and end at the same x (the nodes between may differ)")
     return PairMesh(_centred(lower, lower.x), _centred(upper, lower.x))
 
 
@@ -152,11 +152,11 @@ def _tags(raw: Tagged, where) -> None:
     there = set(np.unique(raw.names).tolist())
     missing = {"upper_substrate", "lower_substrate"} - there | {e for e in EDGES if not len(raw.nodes.get(e, ()))}
     if missing:
-        raise PatchfemError(f"{where}: nothing is tagged {', '.join(sorted(missing))} ({raw.how})")
+        raise PatchfemError(f"{where}: no cells or nodes are tagged {', '.join(sorted(missing))} ({raw.how})")
     unknown = there - set(CELLS)
     if unknown:
         shown = ", ".join(sorted(name or "no tag" for name in unknown)[:4])
-        raise PatchfemError(f"{where}: cells with the unknown {shown}; known are {', '.join(CELLS)}")
+        raise PatchfemError(f"{where}: some cells have an unknown tag ({shown}); possible tags are {', '.join(CELLS)}")
 
 
 def _numbers(raw: Tagged, where) -> None:
@@ -164,13 +164,14 @@ def _numbers(raw: Tagged, where) -> None:
     for group in (raw.triangles, raw.quads, *(raw.nodes[e] for e in EDGES)):
         if group.size and (group.min() < 0 or group.max() >= count):
             wrong = group.min() if group.min() < 0 else group.max()
-            raise PatchfemError(f"{where}: a cell names node {int(wrong)}, the file has {count}")
+            raise PatchfemError(f"{where}: a cell names node {int(wrong)}, but the file has {count} nodes")
     if not np.isfinite(raw.points).all():
         raise PatchfemError(f"{where}: a node has a coordinate that is not finite")
     used = np.unique(np.concatenate([raw.triangles.ravel(), raw.quads.ravel()]))
     span = np.ptp(raw.points[used], axis=0)
     if span.size > 2 and span[2] > CLOSE * span[:2].max():
-        raise PatchfemError(f"{where}: the mesh is not plane: z runs over {span[2]:.6g} m; draw the mesh in x and y")
+        raise PatchfemError(f"{where}: the mesh is not plane: its z values span {span[2]:.6g} m; draw the mesh in x "
+                            "and y")
     if not np.abs(raw.points[used, :2]).max() < 1e150:
         raise PatchfemError(f"{where}: a node lies beyond 1e150 m")
 
@@ -241,11 +242,11 @@ def _interface(points, nodes, side: str, where) -> np.ndarray:
     if wrong.any() or not flat.any():
         off = int(np.argmax(np.abs(y))) if not flat.any() else int(np.argmax(wrong))
         if not flat.any() and not wrong.any():
-            raise PatchfemError(f"{where}: no node of {name} lies on y = 0, where rounded faces touch; the nearest is "
-                                f"{abs(y).min():.6g} m off it")
+            raise PatchfemError(f"{where}: no node of {name} lies on y = 0, where rounded faces touch; the nearest "
+                                f"node is {abs(y).min():.6g} m away")
         raise PatchfemError(f"{where}: {name} is not the straight line y = 0 (rounded edges may reach a slope of "
-                            f"{STEEP:g}): the node at x = {x[off]:.6g} m lies {abs(y[off]):.6g} m off it; shapes "
-                            "belong in the gap ([contact.crown], [contact.tilt])")
+                            f"{STEEP:g}): the node at x = {x[off]:.6g} m lies {abs(y[off]):.6g} m away "
+                            "from this line; give the shape of a surface by [contact.crown] or [contact.tilt]")
     if points[:, 1].min() < -close:
         raise PatchfemError(f"{where}: the {side} piece reaches {-points[:, 1].min():.6g} m across y = 0; the lower "
                             "piece lies at y <= 0, the upper piece at y >= 0")
@@ -281,8 +282,8 @@ def _joined(mesh: PieceMesh, side: str, where) -> None:
     _hanging(mesh, border, side, where)
     within = np.setdiff1d(mesh.far, border)
     if within.size:
-        raise PatchfemError(f"{where}: {side}_far contains {within.size} nodes inside the {side} piece; tag only its "
-                            "border")
+        raise PatchfemError(f"{where}: {side}_far contains {within.size} nodes inside the {side} piece; tag only nodes "
+                            "on the border")
     wanted = np.sort(np.stack([mesh.interface[:-1], mesh.interface[1:]], axis=1), axis=1)
     gone = ~np.isin(wanted[:, 0] * count + wanted[:, 1], key[~inner])
     if gone.any():

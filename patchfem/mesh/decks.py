@@ -28,7 +28,7 @@ def read_inp(text: str) -> Tagged:
     nodes, elements, sets = {}, {}, {"NSET": {}, "ELSET": {}}
     for keyword, given, lines in _inp_blocks(text):
         if keyword in ("INCLUDE", "SYSTEM", "NGEN", "NFILL", "ELGEN", "NCOPY", "ELCOPY"):
-            raise PatchfemError(f"*{keyword} is not supported yet; write a flat deck")
+            raise PatchfemError(f"*{keyword} is not supported yet; write a flat deck (without parts and instances)")
         if keyword == "NODE":
             new = {int(line[0]): [float(v) for v in line[1:] if v] for line in lines}
             if new.keys() & nodes.keys():
@@ -80,7 +80,7 @@ def _inp_members(given: dict, lines, known: dict, nodes: dict, elements: dict) -
         for line in lines:
             first, last, step = ([int(word) for word in line if word] + [1])[:3]
             if step < 1 or (last - first) // step >= len(there):
-                raise PatchfemError(f"GENERATE from {first} to {last} by {step}: more than the deck has")
+                raise PatchfemError(f"GENERATE from {first} to {last} by {step}: this range is longer than the deck")
             out += range(first, last + 1, step)
         return out
     out = []
@@ -133,7 +133,7 @@ def _unv_datasets(text: str):
                 break
             held.append(inner)
         else:
-            raise PatchfemError(f"dataset {number[:20]} does not end")
+            raise PatchfemError(f"dataset {number[:20]} has no end mark")
         if number.isdigit():
             yield int(number), held
 
@@ -186,7 +186,7 @@ def _tagged(nodes: dict, elements: dict, node_sets: dict, element_sets: dict, ho
 
     sizes = {len(where) for where in nodes.values()}
     if sizes - {2} and sizes - {3}:
-        raise PatchfemError("all nodes need two coordinates, or all three")
+        raise PatchfemError("either all nodes need two coordinates, or all nodes need three")
     name = {}
     for tag in CELLS:
         for number in element_sets.get(tag, ()):

@@ -38,7 +38,7 @@ def write_mesh(lower, path: Path, upper=None) -> None:
 
     path = Path(path)
     if path.suffix not in (".msh", ".vtu"):
-        raise PatchfemError(f"{path}: a mesh is written as .msh or .vtu")
+        raise PatchfemError(f"{path}: a mesh can be written only as .msh or .vtu")
     points, found = blocks(lower, lower if upper is None else upper)
     tags = [_codes(names) for _, _, names in found]
     mesh = meshio.Mesh(np.column_stack([points, np.zeros(len(points))]), [(kind, cells) for kind, cells, _ in found])
@@ -86,7 +86,7 @@ def read_pieces(path: Path) -> PairMesh:
     elif path.suffix in (".msh", ".vtu"):
         raw = _tagged(path, _load(path))
     else:
-        raise PatchfemError(f"{path}: a mesh is read from .msh, .vtu, .inp or .unv")
+        raise PatchfemError(f"{path}: a mesh can be read only from .msh, .vtu, .inp or .unv")
     return pieces(raw, path)
 
 
@@ -129,7 +129,7 @@ def _load(path: Path):
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
             return meshio.read(path)
     except SystemExit:
-        raise PatchfemError(f"{path}: not a readable {path.suffix} file (its reader gave up)") from None
+        raise PatchfemError(f"{path}: not a readable {path.suffix} file (the reader of this format failed)") from None
     except Exception as error:
         raise PatchfemError(f"{path}: not a readable {path.suffix} file ({type(error).__name__}: {error})") from None
 

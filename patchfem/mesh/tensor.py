@@ -89,7 +89,8 @@ def graded_depth(height: float, first: float, coating: float = 0.0, growth: floa
     At least `least` rows lie in the coating. PatchfemError when the coating fills the height.
     """
     if coating >= height:
-        raise PatchfemError(f"contact.coating.thickness: {coating:.6g} m leaves no substrate in {height:.6g} m")
+        raise PatchfemError(f"contact.coating.thickness: {coating:.6g} m leaves no substrate in a piece of height "
+                            f"{height:.6g} m")
     rows = np.empty(0)
     if coating > 0:
         rows = graded_rows(min(first, coating / least), coating, growth, least)

@@ -68,8 +68,8 @@ def _mesh(path: Path, tables, whole: bool) -> None:
         return
     with open(path, "rb") as file:
         if not file.read(4096).lstrip().startswith(start):
-            raise PatchfemError(f"{path}: not a readable {path.suffix} file (its content does not start like that of "
-                                "such a file)")
+            raise PatchfemError(f"{path}: not a readable {path.suffix} file (the content does not start as in such a "
+                                "file)")
 
 
 def _profile(path: Path, tables, whole: bool) -> tuple:

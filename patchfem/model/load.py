@@ -39,8 +39,8 @@ class PointLoad:
         """
         period, span = 1 / self.frequency, time[-1] - time[0]
         if span / period * steps + time.size > MOST_SAMPLES:
-            raise Missing(f"the load oscillates {span / period:.3g} times during the slide, more often than "
-                          f"{MOST_SAMPLES} samples resolve; lower normal.frequency, slide.cycles or slide.hold", "")
+            raise Missing(f"the load oscillates {span / period:.3g} times during the slide, which {MOST_SAMPLES} "
+                          "samples cannot resolve; lower normal.frequency, slide.cycles or slide.hold", "")
         lag = self.phase / (2 * np.pi)
         marks = np.arange(np.floor(time[0] / period + lag) - 1, time[-1] / period + lag + 2)
         inner = [marks[:, None] + np.arange(steps) / steps]

@@ -113,8 +113,8 @@ def build(scene: Scene) -> Model:
     """
     if scene.sweep:
         count = prod(len(axis.texts) for axis in scene.sweep)
-        raise PatchfemError(f"{scene.where('sweep')}: one run cannot compute its {count} cases; use `patchfem sweep`, "
-                            "or leave [sweep] out")
+        raise PatchfemError(f"{scene.where('sweep')}: has {count} cases, but a single run computes only one; use "
+                            "`patchfem sweep`, or leave [sweep] out")
     patch = point = slide = rig = grooves = None
     if scene.contact is not None:
         with placed(scene):

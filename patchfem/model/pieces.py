@@ -73,4 +73,5 @@ def _matches(patch: PatchModel, side: str, body) -> None:
     for key, mine, wanted in (("length", body.length, patch.length), ("height", body.height, piece.height),
                               ("coating.thickness", body.coating, piece.thickness)):
         if abs(mine - wanted) > 1e-6 * patch.length:  # printed digits of a mesh file
-            raise PatchfemError(f"{wanted:.9g} m, the {side} piece of the mesh has {mine:.9g} m", f"contact.{key}")
+            raise PatchfemError(f"{wanted:.9g} m in the scene, but {mine:.9g} m in the {side} piece of the "
+                                "mesh", f"contact.{key}")

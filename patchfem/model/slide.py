@@ -66,8 +66,8 @@ class SlidePath:
             return *_cut(*self.corners, steps, self.across), 0, 0.0
         count = max(1, round(self.cycles * steps))
         if count > MOST_SAMPLES:
-            raise Missing(f"slide.cycles = {self.cycles:g} takes {count:.3g} steps, more than {MOST_SAMPLES:.0e}; "
-                          "lower slide.cycles or accuracy.steps_per_cycle", "")
+            raise Missing(f"slide.cycles = {self.cycles:g} needs {count:.3g} steps, but at most "
+                          f"{MOST_SAMPLES:.0e} are possible; lower slide.cycles or accuracy.steps_per_cycle", "")
         number = np.arange(count + 1)
         if self.kind == "sine":
             phase = 2 * np.pi * (number % steps) / steps

@@ -34,8 +34,9 @@ def modes_of(scene, own: ModalBasis | None = None) -> ModalBasis:
     if bonded is None or bonded.wavelength is not None:  # interlocking is no spring: it acts in the march
         return found
     if len(found.interfaces) != 1 and not scene.structure.mode:
-        raise PatchfemError(f"{scene.where('structure.bonded')}: applies to one contact, but the rig has "
-                            f"{len(found.interfaces)} interfaces; write a spring between the same places")
+        raise PatchfemError(f"{scene.where('structure.bonded')}: applies only to a single contact, but the rig has "
+                            f"{len(found.interfaces)} interfaces; instead write a spring between the two places that "
+                            "an interface joins")
     return module_of("structure.bonded").bonded(found, bonded.stiffness, bonded.damping)
 
 
@@ -73,7 +74,7 @@ def own_modes(scene, joint: float | None = None) -> ModalBasis:
         return module_of("structure.bonded").freed(found, held, 0.0 if bonded is None else bonded.damping)
     except PatchfemError as error:
         raise PatchfemError(f"{scene.where('structure.measured')}: {error}; give the frequencies of the bolted rig, "
-                            "give a softer joint, or leave 'measured' out if the frequencies are those without the "
+                            "give a softer joint, or leave `measured` out if the frequencies were measured without the "
                             "joint") from None
 
 
@@ -174,7 +175,7 @@ def start_state(scene, found: ModalBasis) -> Start:
             return starts.released(found, drive.displacement)
         moved = np.zeros(len(found.names))
         if pushed_mass(structure, drive) > moved.size:
-            raise PatchfemError(f"{scene.where('drive.mass')}: the rig has {moved.size} coordinates")
+            raise PatchfemError(f"{scene.where('drive.mass')}: the rig has only {moved.size} coordinates")
         moved[pushed_mass(structure, drive) - 1] = drive.displacement
         return starts.given(found, moved)
     if drive.kind == "base" and drive.waveform == "step" and drive.displacement is not None:
@@ -233,8 +234,8 @@ def start_of(scene, modes: ModalBasis):
     """Start of a scene that does not begin at rest, else None; PatchfemError where it lies beyond structure.travel."""
     start, travel = start_state(scene, modes), scene.structure.travel
     if travel is not None and abs(float(modes.output @ start.z)) > travel:
-        raise PatchfemError(f"{scene.where('structure.travel')}: the start lies beyond this travel; raise travel or "
-                            "start nearer to the middle")
+        raise PatchfemError(f"{scene.where('structure.travel')}: the motion starts beyond this travel; raise "
+                            "structure.travel or start nearer to the middle")
     return start if start.z.any() or start.v.any() else None
 
 

@@ -61,7 +61,7 @@ def _arrays(data, structure, kind, mass, rubs) -> tuple:
     pairs = [one.between for one in structure.interface]
     found = arrays.basis(data, pairs, mass if forced else None, forced, structure.moving_mass)
     if rubs and not len(found.interfaces):
-        raise PatchfemError("structure.file: lacks slide, the motion at the patch; add slide to the file, or write "
+        raise PatchfemError("structure.file: lacks `slide`, the motion at the patch; add `slide` to the file, or write "
                             "[[structure.interface]]")
     return found, []
 

@@ -42,7 +42,8 @@ def _kept(made, basis: ModalBasis, table) -> str:
     kind = "fixed-interface" if table.method == reduced.CRAIG_BAMPTON else "free-interface"
     upto = f" up to {made.omega[count - 1] / (2 * np.pi):.4g} Hz" if count else ""
     moving = np.flatnonzero(basis.omega > 0)
-    first = f"; its first frequency is {basis.omega[moving[0]] / (2 * np.pi):.5g} Hz" if moving.size else ""
+    first = (f"; the first frequency of the reduced structure is {basis.omega[moving[0]] / (2 * np.pi):.5g} "
+             "Hz") if moving.size else ""
     return f"structure.reduced keeps {len(made.boundary)} boundary coordinate{'s' * (len(made.boundary) > 1)} and " \
         f"{count} {kind} modes{upto}{first}"
 
@@ -83,7 +84,7 @@ def _rounded(files: tuple, every: list, stiffness, unit: float, shape) -> list:
             continue
         share = matrices.scatter(one.values, told[1], shape) / unit / scale  # two deviations, of half a square
         if share > TOLD:
-            out.append(f"{path.name} has its {key} in {told[0]}, which leaves the lowest frequency of the structure "
+            out.append(f"{path.name} stores the {key} in {told[0]}, which leaves the lowest frequency of the structure "
                        f"uncertain by {100 * share:.2g} %; write the file in double precision")
     return out
 
@@ -131,7 +132,7 @@ def _rows(text, one: matrices.Matrix, n: int, key: str) -> np.ndarray:
     where = f"structure.reduced.{key}"
     if not isinstance(text, str):
         if text > n:
-            raise PatchfemError(f"there is no coordinate {text}: the matrices have {n}, counted from 1", where)
+            raise PatchfemError(f"there is no coordinate {text}: the matrices have {n}, numbered from 1", where)
         return np.array([text - 1])
     if key == "moved" and (found := _RANGE.fullmatch(text)):
         first, last, count = int(found[1]), int(found[2]), int(found[3] or 0)
@@ -142,7 +143,8 @@ def _rows(text, one: matrices.Matrix, n: int, key: str) -> np.ndarray:
                                 where)
         return np.arange(first - 1, last, max(int(step), 1))
     if one.places is None:
-        raise PatchfemError(f"'{text}' names a node, but the files name none; give rows of the matrices from 1", where)
+        raise PatchfemError(f"'{text}' names a node, but the files name no nodes; give row numbers of the matrices, "
+                            "which start at 1", where)
     if key == "moved" and text in AXES:
         return np.flatnonzero(one.places[:, 1] == AXES.index(text) + 1)
     found = _PLACE.fullmatch(text)

@@ -42,8 +42,8 @@ class WornBefore:
         if self.cycles < asked * (1 - 1e-9):
             cycles += f" of {asked:.6g}"
         return (f"continues from {self.path.parent.name}/{self.path.name}, where up to "
-                f"{say(float(self.depth.max()), 3)} was worn off in {cycles} cycles; the cycles of this run count from "
-                "there, but worn_volume and worn_depth_max count from the unworn pieces")
+                f"{say(float(self.depth.max()), 3)} was worn off in {cycles} cycles; cycles of this run are counted "
+                "from that state, but worn_volume and worn_depth_max are measured from the unworn pieces")
 
     def on(self, x) -> np.ndarray:
         """Worn depth (m,) [m] at x (m,) [m] of an interface; PatchfemError unless it is as long."""
@@ -56,9 +56,9 @@ class WornBefore:
         off = np.interp(x, self.x, self.gap) - gap
         off = float(np.abs(off - np.polyval(np.polyfit(x, off, 1), x)).max())
         if off > SAME * float(np.ptp(gap)) + FLAT:
-            raise PatchfemError(f"{self.path}: its unworn surfaces differ from those of this scene by {say(off, 3)}; "
-                                "choose a run of the same pieces, and elements of the same length if the surfaces are "
-                                "rough", KEY)
+            raise PatchfemError(f"{self.path}: the unworn surfaces of that run differ from those of this scene by "
+                                f"{say(off, 3)}; choose a run of the same pieces, and elements of the same length if "
+                                "the surfaces are rough", KEY)
 
     def missing(self, name: str, value: float) -> float | None:
         """Error of a measure of wear at the end of that run, and how far `value`, found of its depth on another mesh,
@@ -68,8 +68,8 @@ class WornBefore:
 
     def _as_long(self, first: float, last: float) -> None:
         if not np.allclose(self.x[[0, -1]], (first, last), rtol=1e-6, atol=0):
-            raise PatchfemError(f"{self.path}: the interface of that run is {say(float(np.ptp(self.x)))} long, that of "
-                                f"this scene {say(last - first)}; choose a run of the same pieces", KEY)
+            raise PatchfemError(f"{self.path}: the interface of that run is {say(float(np.ptp(self.x)))} long, but "
+                                f"that of this scene {say(last - first)}; choose a run of the same pieces", KEY)
 
 
 def read(path: Path) -> WornBefore:
@@ -89,10 +89,11 @@ def read(path: Path) -> WornBefore:
         raise PatchfemError(f"{path}: not the result.nc "
                             "of a run with [wear] and [contact]; give such a file", KEY) from None
     if strips:
-        raise PatchfemError(f"{path}: worn strip by strip, and such wear cannot be continued yet; choose a run without "
-                            "[contact.strips]", KEY)
+        raise PatchfemError(f"{path}: that run has strips, and wear of strips cannot be continued yet; choose a run "
+                            "without [contact.strips]", KEY)
     if not right:
-        raise PatchfemError(f"{path}: its worn depth is not a row of depths along a patch; run that scene again", KEY)
+        raise PatchfemError(f"{path}: the worn depth in this file is not a list of depths along a patch; run that "
+                            "scene again", KEY)
     return found
 
 
@@ -103,6 +104,6 @@ def of_pieces(path: Path, tables: Tables) -> WornBefore:
                 {"wear.upper_share": each["wear"]["upper_share"]} for each in (found.scene, here))
     unlike = [key if "." in key else f"contact.{key}" for key in {**one, **two} if one.get(key) != two.get(key)]
     if unlike:
-        raise PatchfemError(f"{path}: that run wore other pieces: {', '.join(unlike)} differ; choose a run of the same "
-                            "pieces", KEY)
+        raise PatchfemError(f"{path}: the pieces of that run are not those of this scene ({', '.join(unlike)} differ); "
+                            "choose a run of the same pieces", KEY)
     return found

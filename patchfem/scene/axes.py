@@ -118,7 +118,7 @@ def _axis(key: str, text: str, sampled: bool) -> Axis | Span:
     for piece in pieces:
         try:
             if not piece:
-                raise ValueError("an empty value between two commas")
+                raise ValueError("there is no value between two commas")
             ends = _RANGE.fullmatch(piece) if ".." in piece and _is_number(key) else None
             if ends is None:
                 out.append(piece)
@@ -204,7 +204,8 @@ def _no_table(key: str, texts: tuple) -> None:
         return
     items = ".NAME" if get_origin(model.model_fields[name].annotation) is tuple else ""
     first = sorted(keys(inner), key=lambda one: not inner.model_fields[keys(inner)[one]].is_required())[:4]
-    raise ValueError(f"a table, not a value; choose a key in it: {', '.join(f'{key}{items}.{one}' for one in first)}")
+    raise ValueError("is a table without a value of its own; choose a key of this table: "
+                     f"{', '.join(f'{key}{items}.{one}' for one in first)}")
 
 
 def _types(key: str) -> tuple:
@@ -301,7 +302,8 @@ def _steps(key: str, low: str, high: str, count: str | None, how: str | None) ->
 def _span(key: str, low: str, high: str, count: str | None, how: str | None) -> Span:
     first, last, unit = _ends(key, low, high)
     if float not in _types(key):
-        raise ValueError(f"{low}..{high}: a whole number takes no range; list its values, such as 1,2,3")
+        raise ValueError(f"{low}..{high}: a key that takes whole numbers takes no range; list the values, such as "
+                         "1,2,3")
     if count:
         raise ValueError(f"{low}..{high}:{count}: random values are drawn between the ends; leave out :{count}")
     if first == last:

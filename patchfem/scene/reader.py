@@ -167,8 +167,9 @@ def _item(draft: Draft, items: list[Any], wanted: str, key: str, written: str) -
     dotted = number and f"[{int(wanted) + 1}]" not in written
     there = "such item" if number else f"'{wanted}'"
     draft.refuse_set(f"{f'{table}.{wanted}' if dotted else counted(key)}: no {there} here; "
-                     + (choices(wanted, known) if known else f"{table} has {len(items)}, counted from one as in "
-                        f"{table}[1]") + (f"; {table}.0, with a dot, is {table}[1]" if dotted else ""))
+                     + (choices(wanted, known) if known else f"{table} has {len(items)}, numbered from 1 as in "
+                                                             f"{table}[1]") + (f"; {table}.0, with a dot, means "
+                                                                               f"{table}[1]" if dotted else ""))
     return ""
 
 

@@ -254,10 +254,10 @@ def _refuse_crowds(raw: dict, text: str, path: str | Path) -> None:
         if count > MOST_COORDINATES:
             found = re.search(rf"^[ \t]*{form}", text, re.MULTILINE)
             line = f":{text.count(chr(10), 0, found.start()) + 1}" if found else ""
-            raise SceneError([f"{path}{line}: structure.{key}: {count} are more than {MOST_COORDINATES}; their modes "
-                              f"are solved as one full matrix: {8e-9 * 3 * count**2:.2g} GB and some "
-                              f"{1.5e-9 * count**3:.2g} s; give fewer, or give the modes themselves in "
-                              "structure.file"])
+            raise SceneError([f"{path}{line}: structure.{key}: {count} entries are more than the limit of "
+                              f"{MOST_COORDINATES}; solving their modes as one full matrix would take "
+                              f"{8e-9 * 3 * count**2:.2g} GB of memory and about {1.5e-9 * count**3:.2g} s of "
+                              "computing time; give fewer entries, or give the modes themselves in structure.file"])
 
 
 def _axes(draft: Draft, table: Any) -> list:

@@ -48,9 +48,9 @@ def oversized(given: dict[str, Any], patch: float | None = None, at: str = "") -
         elif isinstance(value, Real) and not isinstance(value, bool) and _kind(key) == "length":
             limit = patch if patch is not None and not key.startswith("contact.") else LONGEST
             if abs(value) > limit and not key.endswith("radius"):
-                wrong.append(f"--set: {key}: {value:g} without a unit means {value:g} m, more than "
-                             f"{'the patch is long' if limit is patch else 'any joint has'} ({limit:g} m); add the "
-                             f"unit, such as '{value:g} mm' or '{value:g} m'")
+                wrong.append(f"--set: {key}: {value:g} without a unit means {value:g} m, which is longer than "
+                             f"{'the patch' if limit is patch else 'any joint'} ({limit:g} m); add the unit, such as "
+                             f"'{value:g} mm' or '{value:g} m'")
     return wrong
 
 
@@ -87,8 +87,8 @@ def _written(key: str, value: Any) -> str:
     if isinstance(value, bool | str):
         return json.dumps(value, ensure_ascii=False)
     if not isinstance(value, Real):
-        raise SceneError([f"--set: {key}: {value!r:.60} is not a value of a scene; a text as in a scene, a number in "
-                          "SI, a boolean or a list of them is needed"])
+        raise SceneError([f"--set: {key}: {value!r:.60} cannot be a value of a scene; give a text as in a scene file, "
+                          "a number in SI units, a boolean, or a list of such values"])
     kind = _kind(key)
     if kind is not None:
         return json.dumps(format_si(value, kind))

@@ -15,11 +15,11 @@ KINDS = {
     "joint": "a bolted lap joint moved to and fro: friction loop, stiffness and damping",
     "bench": "a friction law at one contact point, along a prescribed slide",
     "rig": "a rubbing block on flexures, shaken at one frequency",
-    "beam": "a beam with a bolted lap joint: frequency and damping over its amplitude",
-    "damper": "a sweep: the under-platform damper that lowers a blade's resonance most",
-    "shroud": "a sweep: resonances of blades that rub at their shrouds, by nodal diameter",
-    "linear": "a mass on flexures without friction",
-    "misalignment": "a sweep: how much tilt the rig of the report allows",
+    "beam": "a beam with a bolted lap joint: frequency and damping at each amplitude of vibration",
+    "damper": "a sweep: the under-platform damper that reduces a blade's amplitude at resonance most",
+    "shroud": "a sweep: resonances of blades that rub at their shrouds, for each nodal diameter",
+    "linear": "a mass on flexures, without friction",
+    "misalignment": "a sweep: how far the patch in the rig of the 1985 report may be tilted",
     "wear": "how a tilted patch wears in over many cycles",
 }
 NEXT = {"beam": "backbone", "damper": "sweep", "shroud": "sweep", "misalignment": "sweep"}  # else run

@@ -55,7 +55,7 @@ def _member(file: ZipFile, key: str) -> np.ndarray:
         shape, _, kind = head(part)
     _refuse_large(key, shape)
     if kind.itemsize > (LONGEST if key == "names" else WIDEST):
-        raise PatchfemError(f"{key} contains values of {kind.itemsize} bytes each")
+        raise PatchfemError(f"{key} contains values of {kind.itemsize} bytes each, which is too long")
     if key == "names" and prod(shape) > MOST_COORDINATES:
         raise PatchfemError(f"{key} contains {prod(shape)} names; {MOST_COORDINATES} is the limit")
     with file.open(f"{key}.npy") as part:
@@ -76,7 +76,7 @@ def _refuse_long(path) -> None:
 def _refuse_large(key: str, shape: tuple) -> None:
     if prod(shape) > MOST_COORDINATES**2:
         raise PatchfemError(f"{key} of shape {'x'.join(map(str, shape))} is larger than {MOST_COORDINATES} coordinates "
-                            "squared; give a reduced model, or the modes that the drive reaches")
+                            "squared; give a reduced model, or only the modes in the frequency range of the drive")
 
 
 def _plain(value):
@@ -103,7 +103,7 @@ def basis(data: dict, pairs=(), pushed: int | None = None, forced: bool = False,
 
 def _lacks(data: dict, what: str, where: str):
     held = ", ".join(data) or "none that patchfem knows"
-    raise PatchfemError(f"{where}: lacks {what}; it contains {held}")
+    raise PatchfemError(f"{where}: lacks {what}; the file contains {held}")
 
 
 def _of_matrices(data, pairs, pushed, forced, where) -> ModalBasis:
@@ -115,11 +115,11 @@ def _of_matrices(data, pairs, pushed, forced, where) -> ModalBasis:
     if n == 0:
         raise PatchfemError(f"{where}: M has no coordinate; a square matrix [kg] of at least one coordinate is needed")
     if pairs and "slide" in data:
-        raise PatchfemError(f"{where}: contains slide, but [[structure.interface]] gives interfaces too: keep one of "
-                            "the two")
+        raise PatchfemError(f"{where}: contains `slide`, but [[structure.interface]] defines where sliding occurs too: "
+                            "keep only one of the two")
     over = [k for pair in pairs for k in pair if k > n]
     if over or (pushed or 0) > n:
-        raise PatchfemError(f"{where}: there is no coordinate {(over or [pushed])[0]}: M has {n}, counted from 1")
+        raise PatchfemError(f"{where}: there is no coordinate {(over or [pushed])[0]}: M has {n}, numbered from 1")
     faces = masses.rows(pairs, n) if pairs else data.get("slide")
     if faces is not None:
         faces = matrices.without_phase(faces, "slide")
@@ -146,8 +146,8 @@ def _square(data, key, where):
 
 def _of_modes(data, pairs, pushed, forced, mass, where) -> ModalBasis:
     if pairs or pushed:
-        raise PatchfemError(f"{where}: modal data have no numbered masses for [[structure.interface]] or drive.mass; "
-                            "give slide and force in the file")
+        raise PatchfemError(f"{where}: modal data have no numbered masses, which [[structure.interface]] and "
+                            "drive.mass need; give `slide` and `force` in the file")
     if "omega" not in data and "frequency" not in data:
         _lacks(data, "M and K, or omega [rad/s] or frequency [Hz] of modes", where)
     omega = _numbers(data, "omega", where) if "omega" in data else 2 * np.pi * _numbers(data, "frequency", where)
@@ -174,7 +174,8 @@ def _of_modes(data, pairs, pushed, forced, mass, where) -> ModalBasis:
     base = -(_numbers(data, "force", where, (n,)) if "force" in data else output) if forced \
         else _numbers(data, "base", where, (n,))
     if not forced and np.sum(base**2) > 1 + 1e-9:  # modes of unit mass hold at most the whole of it
-        raise PatchfemError(f"{where}: the sum of base^2 over the modes is {np.sum(base**2):.6g}; <= 1 is needed")
+        raise PatchfemError(f"{where}: the sum of `base`^2 over the modes is {np.sum(base**2):.6g}, but at most 1 is "
+                            "possible")
     moved = {key: frozen_array(_numbers(data, key, where, (n,))) for key in PATCH if key in data and data[key].any()}
     return ModalBasis(_names(data, n, where) or tuple(f"mode {k + 1}" for k in range(n)), frozen_array(omega), zeta,
                       frozen_array(faces[0]), frozen_array(base), frozen_array(output), mass, coupled,

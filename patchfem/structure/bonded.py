@@ -36,13 +36,14 @@ def freed(basis: ModalBasis, stiffness, damping: float = 0.0) -> ModalBasis:
     least = ROUND * float(np.max(basis.omega**2 + np.diag(joint), initial=0.0))
     if square[0] < -least:
         had = float(V[:, 0]**2 @ basis.omega**2)
-        raise PatchfemError(f"the joint has {100 * (1 - square[0] / had) if had else np.inf:.4g} % of the stiffness of "
-                            "the mode that it stiffens most, so without the joint its stiffness would be negative")
+        raise PatchfemError(f"the stiffness of the joint is {100 * (1 - square[0] / had) if had else np.inf:.4g} % of "
+                            "the stiffness of the mode that the joint stiffens most, so without the joint this mode "
+                            "would have a negative stiffness")
     square[square <= least] = 0.0
     damper = -damping / m * np.outer(rows[0], rows[0])
     if damping and np.linalg.eigvalsh(basis.dampers + damper)[0] < -least**0.5 * ROUND:
-        raise PatchfemError("structure.bonded.damping is larger than the damping of the modes, which includes it; "
-                            "lower structure.bonded.damping")
+        raise PatchfemError("structure.bonded.damping is larger than the damping of the modes, of which it should be a "
+                            "part; lower structure.bonded.damping")
     found = _turned(basis, np.sqrt(square), V, damper)
     return replace(found, shapes=None) if square.size == 1 and basis.shapes is None else found
 

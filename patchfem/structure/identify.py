@@ -148,7 +148,7 @@ def poles(omega, data, power) -> tuple:
         theta, cost = better, less
     theta = _pruned(fit, _polished(fit, theta, cost))
     if not theta.size:
-        raise PatchfemError("structure.file: no mode is visible in the frequency responses; responses over a "
+        raise PatchfemError("structure.file: no mode is visible in the frequency responses; responses that include a "
                             "resonance are needed")
     w, zeta = np.exp(np.split(theta, 2))
     order = np.argsort(w)
@@ -225,15 +225,16 @@ def modes_from_responses(frequency, measured: dict, notes: list) -> Shapes:
     ref = _reference(measured)
     places = [place for place, at in measured if at == ref]
     if len(places) < len(measured):
-        notes.append(f"of {len(measured)} frequency responses the {len(places)} over {_named(ref)} are used")
+        notes.append(f"of {len(measured)} frequency responses, only the {len(places)} to a force at {_named(ref)} are "
+                     "used")
     keep = frequency > 0
     omega = 2 * np.pi * frequency[keep]
     if omega.size < 8 or (np.diff(omega) <= 0).any():
-        raise PatchfemError("structure.file: at least 8 rising frequencies are needed")
+        raise PatchfemError("structure.file: at least 8 frequencies in rising order are needed")
     data = np.stack([measured[place, ref][0][keep] for place in places], axis=1)
     alive = np.abs(data).max(axis=0) > 0
     if not alive[places.index(ref)]:
-        raise PatchfemError(f"structure.file: the response at {_named(ref)} itself is zero")
+        raise PatchfemError(f"structure.file: the response at the driven point itself, {_named(ref)}, is zero")
     power = np.array([measured[place, ref][1] for place in places])
     w, zeta, fit, theta = poles(omega, data[:, alive], power[alive])
     A = np.zeros((w.size, len(places)))
@@ -242,10 +243,11 @@ def modes_from_responses(frequency, measured: dict, notes: list) -> Shapes:
     w, zeta, A = w[inside], zeta[inside], A[inside]
     own = A[:, places.index(ref)]
     good = own > 1e-6 * np.abs(A).max(axis=1)  # the shape is A over the root of it
-    notes += [f"the mode at {f / (2 * np.pi):.5g} Hz does not move {_named(ref)} and is left out" for f in w[~good]]
+    notes += [f"the mode at {f / (2 * np.pi):.5g} Hz does not move the driven point {_named(ref)} and is left "
+              "out" for f in w[~good]]
     if not good.any():
-        raise PatchfemError(f"structure.file: no mode moves {_named(ref)} in the direction of the force there; check "
-                            "its sign")
+        raise PatchfemError(f"structure.file: no mode moves the driven point {_named(ref)} in the direction of the "
+                            "force; check the sign of the response")
     notes += _below(fit, theta, data[:, alive], omega)
     misfit = np.linalg.norm(fit.residual(theta)) / fit.norm
     if not np.isfinite(misfit) or misfit > 0.5:
@@ -263,9 +265,9 @@ def _below(fit, theta, data, omega) -> list:
     share = np.linalg.norm(first) / np.linalg.norm(data[0])
     if share < 0.2:
         return []
-    return [f"motion below the band makes up {100 * min(share, 1):.0f} % of the responses at "
-            f"{omega[0] / 2 / np.pi:.4g} Hz and is left out; an unsupported rig needs its rigid-body modes: use masses "
-            "or matrices"]
+    return [f"modes below the measured band make up {100 * min(share, 1):.0f} % of the responses at "
+            f"{omega[0] / 2 / np.pi:.4g} Hz and are left out; for a rig without supports, whose rigid-body modes are "
+            "needed, use masses or matrices"]
 
 
 def _named(place) -> str:
@@ -277,6 +279,6 @@ def _reference(measured):
     driven = [ref for place, ref in measured if place == ref]
     if not driven:
         refs = ", ".join(_named(ref) for ref in sorted({ref for _, ref in measured}))
-        raise PatchfemError(f"structure.file: no response at the driven point itself ({refs}), without which the mode "
-                            "shapes have no scale; measure such a response")
+        raise PatchfemError(f"structure.file: a response at the driven point itself ({refs}) is missing, and without "
+                            "this response the mode shapes have no scale; measure the response at the driven point")
     return max(driven, key=lambda ref: sum(at == ref for _, at in measured))

@@ -92,14 +92,14 @@ def _modes(root, K, stretch) -> tuple:
     least = len(K) * ROUND * np.abs(square).max(initial=0.0)
     if square[0] < -least:
         raise PatchfemError(f"structure: K is not positive semidefinite: one motion has the stiffness {square[0]:.3g} "
-                            f"1/s^2 per unit of mass, {square[0] / square[-1]:.2g} of the largest; make the springs "
-                            "symmetric and >= 0, and write the matrix with all its digits")
+                            f"1/s^2 per unit of mass, which is {square[0] / square[-1]:.2g} of the largest; make the "
+                            "springs symmetric and >= 0, and write the matrix with all its digits")
     return np.sqrt(np.where(square <= least, 0.0, square)), turned
 
 
 def _numbers(unit) -> np.ndarray:
     if not np.isfinite(unit).all():
-        raise PatchfemError("structure: K/M exceeds any number; check that both are in SI units")
+        raise PatchfemError("structure: K/M is too large to compute; check that K and M are in SI units")
     return unit
 
 
@@ -144,8 +144,8 @@ def without_phase(values, name):
     if name == "K":
         remedy = (f"; for a loss factor eta (here about {share:.3g}) give K without the loss factor, and the damping "
                   "matrix C = eta K/omega [N s/m] at the frequency of the drive")
-    raise PatchfemError(f"structure: {name} is complex, imaginary parts up to {share:.2g} of the real ones; motion in "
-                        f"time needs real matrices{remedy}")
+    raise PatchfemError(f"structure: {name} is complex (imaginary parts are up to {share:.2g} times the real parts); "
+                        f"motion in time needs real matrices{remedy}")
 
 
 def _symmetric(matrix, name, shape=None) -> np.ndarray:
@@ -165,7 +165,8 @@ def _symmetric(matrix, name, shape=None) -> np.ndarray:
     skew, most = np.abs(matrix - matrix.T).max(), np.abs(matrix).max()
     if skew > SKEW * most:
         raise PatchfemError(f"structure: {name} is not symmetric: entries differ from the transpose by {skew:.3g}, "
-                            f"{skew / most:.2g} of the largest; gyroscopic and follower terms are not supported")
+                            f"which is {skew / most:.2g} of the largest entry; gyroscopic and follower terms are not "
+                            "supported")
     return (matrix + matrix.T) / 2
 
 

@@ -66,8 +66,9 @@ def cut(frequency, level, low: float | None, high: float | None) -> tuple:
     these lie outside it."""
     low, high = (own if end is None else end for own, end in ((frequency[0], low), (frequency[-1], high)))
     if low < frequency[0] or high > frequency[-1]:
-        raise PatchfemError(f"{low:g} to {high:g} Hz reach beyond the spectrum, which has {frequency[0]:g} to "
-                            f"{frequency[-1]:g} Hz", "drive.from" if low < frequency[0] else "drive.to")
+        raise PatchfemError(f"{low:g} to {high:g} Hz reach beyond the spectrum, which is given only from "
+                            f"{frequency[0]:g} to {frequency[-1]:g} "
+                            "Hz", "drive.from" if low < frequency[0] else "drive.to")
     inner = frequency[(frequency > low) & (frequency < high)]
     places = np.array([low, *inner, high])
     return places, np.exp(np.interp(np.log(places), np.log(frequency), np.log(level)))

@@ -63,8 +63,9 @@ class Reduction(NamedTuple):
         own = self.boundary @ out[:, modes:modes + b]
         scale = np.sqrt(np.abs(np.diag(own)))
         if not scale.all() or np.linalg.cond(own / np.outer(scale, scale)) > 1 / RESIDUAL:
-            raise PatchfemError("the modes already contain all flexibility at the boundary, so nothing is left for "
-                                "attachment modes; lower structure.reduced.modes, or use method = 'craig-bampton'",
+            raise PatchfemError("the modes already contain all flexibility at the boundary, so no flexibility remains "
+                                "for the attachment modes; lower structure.reduced.modes, or use method = "
+                                "'craig-bampton'",
                                 "structure.reduced.modes")
         return out
 
@@ -137,8 +138,8 @@ def _lowest(K, M, count: int, factor, shift: float) -> tuple:
         return np.zeros(0), np.zeros((n, 0))
     if n <= FULL or count > n // 4:
         if n > MOST_COORDINATES:
-            raise PatchfemError(f"{count} modes were asked for out of {n}, which is too many for the solver; keep "
-                                "fewer", "structure.reduced.modes")
+            raise PatchfemError(f"{count} of {n} modes were asked for, which is too many for the solver; keep fewer "
+                                "modes", "structure.reduced.modes")
         held = (K + shift * M).toarray()
         inverse, shapes = eigh(M.toarray(), (held + held.T) / 2)  # M may have no mass somewhere, K holds everywhere
         there = np.flatnonzero(inverse > 1e-14 * inverse.max(initial=0.0))[::-1][:count]
@@ -267,5 +268,6 @@ def _strained(stiffness, mass) -> tuple:
     least = LOOSE * square[-1] * len(square)
     if square[0] < -least:
         raise PatchfemError(f"the stiffness is not positive: one motion has the stiffness {square[0]:.3g} 1/s^2 per "
-                            f"unit of mass, {square[0] / square[-1]:.2g} of the largest", "structure.reduced.stiffness")
+                            f"unit of mass, which is {square[0] / square[-1]:.2g} of the "
+                            "largest", "structure.reduced.stiffness")
     return square[square > least], shapes[:, square > least]

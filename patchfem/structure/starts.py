@@ -47,8 +47,8 @@ def released(basis: ModalBasis, displacement: float) -> Start:
         shape[moving] = basis.output[moving] / basis.omega[moving]**2
     reach = float(shape @ basis.output)
     if reach == 0:
-        raise PatchfemError("structure: no mode moves the output, so it cannot be released from a displacement; give "
-                            "[structure.start]")
+        raise PatchfemError("structure: no mode moves the output point, so the structure cannot be released from a "
+                            "displacement of this point; give [structure.start]")
     return Start(frozen_array(displacement / reach * shape), frozen_array(np.zeros(shape.size)))
 
 

@@ -42,7 +42,7 @@ def _modes(sets, factors) -> Shapes:
             f, d, m = one["freq"], one["modal_damp_vis"], one["modal_m"] * length / force
             if not d and one["modal_damp_his"]:
                 d = one["modal_damp_his"] / 2
-                notes.append(f"mode {number}: half its hysteretic damping is used as its viscous damping ratio")
+                notes.append(f"mode {number}: half of the hysteretic damping is used as the viscous damping ratio")
             values = np.array(list(shape.values()))
             if np.iscomplexobj(values):
                 values, _ = _rotated(values)
@@ -52,8 +52,8 @@ def _modes(sets, factors) -> Shapes:
             f, d = abs(eig) / (2 * np.pi), -eig.real / abs(eig) if eig else 0.0
             m = abs(one["modal_a"]) / max(2 * abs(eig.imag), 1e-300) * length / force
             left = np.linalg.norm(turn.imag) / max(np.linalg.norm(turn), 1e-300)
-            notes.append(f"mode {number} is complex; its phase is rotated and the real part used, which leaves out "
-                         f"{100 * left:.2g} % of the shape")
+            notes.append(f"mode {number} is complex; the shape is rotated in phase and only its real part is used, "
+                         f"which leaves out {100 * left:.2g} % of the shape")
             if not eig.imag:
                 raise PatchfemError(f"structure.file: mode {number} has the real eigenvalue {eig.real:.5g} 1/s; only "
                                     "vibrating modes can be converted to real ones")
@@ -90,11 +90,11 @@ def _responses(sets, factors) -> Shapes:
         kind, over = one["ordinate_spec_data_type"], one["orddenom_spec_data_type"]
         what = f"response {one['rsp_node']}:{one['rsp_dir']:+d} over {one['ref_node']}:{one['ref_dir']:+d}"
         if kind not in POWER or over not in FORCE:
-            raise PatchfemError(f"structure.file: {what} is type {kind} over {over}; displacement (8), velocity "
-                                "(11) or acceleration (12) over force (13) is needed")
+            raise PatchfemError(f"structure.file: {what} is a response of type {kind} per input of type {over}; "
+                                "displacement (8), velocity (11) or acceleration (12) per force (13) is needed")
         if len(one["x"]) != x.size or not np.allclose(one["x"], x, rtol=1e-6, atol=0):
-            raise PatchfemError(f"structure.file: {what} has other frequencies than the first response; all responses "
-                                "need the same frequencies")
+            raise PatchfemError(f"structure.file: {what} is given at other frequencies than the first response; all "
+                                "responses need the same frequencies")
         if not np.isfinite(one["data"]).all() or not np.iscomplexobj(one["data"]):
             raise PatchfemError(f"structure.file: {what} contains values that are not finite or not complex")
         sign_out, place = _place(one["rsp_node"], one["rsp_dir"])
@@ -109,13 +109,13 @@ def _unit(label, notes) -> float:
     label = (label or "").strip()
     known = {"", "none", "n", "m", "m/s", "m/s^2", "m/s2", "m/s**2", "mps2"}
     if label.lower() not in known and label not in UNITS:
-        note = f"structure.file: the unit label '{label}' is not known; the values are read as SI"
+        note = f"structure.file: the unit label '{label}' is not known; the values are taken as SI"
         notes += [note] if note not in notes else []
     return UNITS.get(label, 1.0)
 
 
 def _place(node, direction) -> tuple:
     if not 1 <= abs(direction) <= len(AXES):
-        raise PatchfemError(f"structure.file: direction {direction} of node {node}; +-1 to +-6 for x, y, z, rx, ry, rz "
-                            "is needed")
+        raise PatchfemError(f"structure.file: direction {direction} of node {node} is unknown; +-1 to +-6 for x, y, z, "
+                            "rx, ry, rz is needed")
     return (1.0 if direction > 0 else -1.0), (int(node), abs(direction) - 1)

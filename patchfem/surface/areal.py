@@ -89,7 +89,8 @@ def level(scan: Areal, degree: int) -> Areal:
     normal = np.einsum("mik,mj,ml->jilk", pairs.reshape(-1, degree + 1, degree + 1), along, along, optimize=True)
     normal = normal[terms][:, terms]
     if count < len(normal) or np.linalg.matrix_rank(normal / count, tol=1e-12, hermitian=True) < len(normal):
-        raise PatchfemError(f"{scan.source}: {count} heights, all in one line; a plane needs three that are not"
+        raise PatchfemError(f"{scan.source}: {count} heights, which all lie on one straight line; a plane needs three "
+                            "points that do not"
                             if degree == 1 else f"{scan.source}: {count} heights do not determine a polynomial of "
                             f"degree {degree}; use a lower degree")
     mean = scan.z[there].mean()

@@ -48,9 +48,10 @@ def too_fine(profile: Profile, element: float, limit: float = LIMIT) -> str | No
     if share <= limit:
         return None
     most, nearly = (_two_digits(element_for(waves, power, kept)) for kept in (1 - limit, 1 - limit / 10))
-    return (f"{profile.source} holds {100 * share:.0f} % of its height in waves shorter than {ELEMENTS} elements "
-            f'({say(ELEMENTS * element)}): add [contact.asperities], or set element_size = "{say(most)}" '
-            f'({100 - 100 * limit:g} % kept; "{say(nearly)}" keeps {100 - 10 * limit:g} %)')
+    return (f"{profile.source} has {100 * share:.0f} % of its rms height in waves shorter than {ELEMENTS} elements "
+            f"({say(ELEMENTS * element)}), which the mesh cannot resolve: add [contact.asperities], or set "
+            f'element_size = "{say(most)}", which keeps {100 - 100 * limit:g} % of the height '
+            f'("{say(nearly)}" keeps {100 - 10 * limit:g} %)')
 
 
 def _below(waves, power, length: float) -> float:
@@ -65,7 +66,7 @@ def element_for(waves, power, kept: float) -> float:
     """
     total = power.sum()
     if not 0 < kept < 1:
-        raise PatchfemError(f"the share kept is {kept:g}; it must lie between 0 and 1")
+        raise PatchfemError(f"the share of the height to keep must lie between 0 and 1, but is {kept:g}")
     if total == 0:
         return np.inf
     lost = np.cumsum(power[::-1])[::-1] / total  # in this wave and all shorter ones

@@ -27,7 +27,7 @@ def placed(profile: Profile, x: np.ndarray, how: str = "auto") -> Profile:
         shift = float(x[0] + x[-1] - there[0] - there[-1]) / 2
         if how == "auto":
             notes += (f"{profile.source}: x from {say(there[0])} to {say(there[-1])} does not cover the patch, "
-                      f"{say(x[0])} to {say(x[-1])}: the trace is centred, x moved by {say(shift)}",)
+                      f"{say(x[0])} to {say(x[-1])}: the trace is centred on the patch, which adds {say(shift)} to x",)
     there = there + shift
     _demand(profile.source, there, x)
     first = max(int(np.searchsorted(there, x[0], "right")) - 1, 0)
@@ -36,8 +36,8 @@ def placed(profile: Profile, x: np.ndarray, how: str = "auto") -> Profile:
     keep = (moved >= there[first]) & (moved <= there[last])
     apart, element = float(np.median(np.diff(moved[keep]))), float(np.diff(x).max())
     if apart > 1.5 * element:
-        notes += (f"{profile.source}: samples lie {say(apart)} apart but elements are {say(element)} long, so the "
-                  "surface is taken as straight between samples",)
+        notes += (f"{profile.source}: samples lie {say(apart)} apart, but elements are only {say(element)} long; "
+                  "between samples the surface is taken as straight",)
     return replace(profile, x=frozen_array(moved[keep]), z=frozen_array(profile.z[keep]), notes=notes)
 
 
@@ -99,7 +99,7 @@ def _demand(source: str, there, x) -> None:
         return
     length, patch = float(there[-1] - there[0]), float(x[-1] - x[0])
     if length < patch:
-        raise PatchfemError(f"{source}: the profile is {say(length)} long, the patch {say(patch)}; measure a longer "
-                            f'trace or set contact.length = "{say(length)}"')
-    raise PatchfemError(f"{source}: the profile runs from {say(there[0])} to {say(there[-1])}, the patch from "
-                        f"{say(x[0])} to {say(x[-1])}; move the profile's x so that it covers the patch")
+        raise PatchfemError(f"{source}: the profile is {say(length)} long, but the patch is {say(patch)} long; "
+                            f'measure a longer trace or set contact.length = "{say(length)}"')
+    raise PatchfemError(f"{source}: the profile runs from {say(there[0])} to {say(there[-1])}, but the patch reaches "
+                        f"from {say(x[0])} to {say(x[-1])}; shift x so that the profile covers the patch")

@@ -82,14 +82,14 @@ def even(profile: Profile) -> Profile:
         raise PatchfemError(f"{profile.source}: {known.size} heights; a trace needs at least two")
     x, notes = profile.x[(profile.x >= known[0]) & (profile.x <= known[-1])], profile.notes
     if not whole:
-        notes += (f"{profile.source}: {(~there).sum()} of {there.size} heights are missing; straight lines replace "
-                  f"them, the longest over {say(float(np.diff(known).max()))}",)
+        notes += (f"{profile.source}: {(~there).sum()} of {there.size} heights are missing; the gaps are bridged by "
+                  f"straight lines, of which the longest spans {say(float(np.diff(known).max()))}",)
     if not regular:
         step = max(float(np.percentile(steps, 10)), float(x[-1] - x[0]) / _MOST)
         count = int(np.ceil((x[-1] - x[0]) / step * (1 - 1e-9))) + 1
         x = np.linspace(x[0], x[-1], count)
         notes += (f"{profile.source}: samples lie {say(float(steps.min()))} to {say(float(steps.max()))} apart; the "
-                  f"trace is resampled every {say(float(x[1] - x[0]))} by straight lines",)
+                  f"trace is resampled at every {say(float(x[1] - x[0]))} by linear interpolation",)
     return replace(profile, x=frozen_array(x), z=frozen_array(np.interp(x, known, heights)), notes=notes)
 
 
@@ -114,7 +114,8 @@ def cleaned(profile: Profile, longest: float) -> Profile:
     if bridged[worst] > longest * (1 + 1e-9):
         raise PatchfemError(
             f"{profile.source}: no usable height between x = {say(x[worst])} and {say(x[worst + 1])}, and a straight "
-            f"line may bridge {say(longest)} at most; measure that stretch anew or use a larger contact.element_size")
+            f"line may bridge at most {say(longest)}; measure this part of the trace anew or use a larger "
+            "contact.element_size")
     keep = slice(good[0], good[-1] + 1)
     z = np.interp(profile.x[keep], x, profile.z[good])
     notes = tuple(_counts(profile, lost, peaked, float(bridged[worst])))
@@ -125,11 +126,12 @@ def _counts(profile: Profile, lost, peaked, widest: float):
     n, name = profile.x.size, profile.source
     if peaked.any():
         first = profile.x[np.argmax(peaked)]
-        yield (f"{name}: {peaked.sum()} of {n} heights are spikes, more than {SPIKE:g} robust standard deviations "
-               f"from the median of {WINDOW} samples (the first at x = {say(first)}); straight lines replace them")
+        yield (f"{name}: {peaked.sum()} of {n} heights are spikes (the first at x = {say(first)}), which lie more than "
+               f"{SPIKE:g} robust standard deviations from the median of {WINDOW} samples; straight lines replace "
+               "these heights")
     if lost.any():
-        yield (f"{name}: {lost.sum()} of {n} heights are missing; straight lines replace them, "
-               f"the longest over {say(widest)}")
+        yield (f"{name}: {lost.sum()} of {n} heights are missing; the gaps are bridged by straight lines, of which the "
+               f"longest spans {say(widest)}")
 
 
 def spikes(profile: Profile) -> np.ndarray:

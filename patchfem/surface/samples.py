@@ -9,7 +9,7 @@ LONGEST = 10.0  # [m] beyond which a unit must be wrong
 SHORTEST = 1e-9  # [m]
 ATOM = 1e-10  # [m], the width of one: heights that span less were not measured
 TRIMMED = 10, 100  # heights from which on, and of how many, the highest and the lowest may stand out
-METRES, GIVEN = "the file gives both in metres", "read in the units that were given"  # who says the units
+METRES, GIVEN = "the file gives both in metres", "taken in the units that were given"  # who says the units
 
 
 def checked(path, x, z, at, factors: tuple, stated: str = "") -> Profile:
@@ -43,7 +43,7 @@ def bounded(path, columns: tuple, names: tuple, at, factors: tuple) -> None:
     for name, values, factor in zip(names, columns, factors):
         worst = int(np.nanargmax(np.abs(values)))
         if abs(values[worst]) > LONGEST / factor:
-            raise PatchfemError(f"{_where(path, at, worst)}: {name} is {float(values[worst]) * factor:.4g} m; is its "
+            raise PatchfemError(f"{_where(path, at, worst)}: {name} is {float(values[worst]) * factor:.4g} m; is the "
                                 "unit right? write a missing height as nan")
 
 
@@ -70,7 +70,7 @@ def evened(path, x, factor: float, name: str = "x") -> tuple:
     digit = next((one for one in digits if np.abs(x / one - np.rint(x / one)).max() < 1e-4), 0.0)
     if off > 0.75 * digit:  # half a digit about the true line, a little more about the fitted one
         return x, ()
-    return even, (f"{path}: {name} is printed to {say(digit * factor)}; it is read as evenly spaced at "
+    return even, (f"{path}: {name} is printed only to {say(digit * factor)}; the samples are taken as evenly spaced by "
                   f"{say(step * factor)}",)
 
 
@@ -84,10 +84,11 @@ def _single(path, x, z, at, factor: float) -> tuple:
         if at is not None and at[one] > at[other]:
             one, other = other, one
         raise PatchfemError(f"{_where(path, at, other)}: x reverses: {say(x[one] * factor)} and then "
-                            f"{say(x[other] * factor)}; x of a trace must only rise or only fall, so keep one trace "
-                            "per file")
+                            f"{say(x[other] * factor)}; x of a trace must only rise or only fall, so keep only one "
+                            "trace per file")
     if x[-1] == x[0]:
-        raise PatchfemError(f"{path}: every sample lies at x = {say(x[0] * factor)}; a trace needs at least two places")
+        raise PatchfemError(f"{path}: every sample lies at x = {say(x[0] * factor)}; a trace needs at least two "
+                            "different x")
     if (step > same).all():
         return x, z, ()
     group = np.concatenate([[0], np.cumsum(step > same)])
@@ -96,7 +97,8 @@ def _single(path, x, z, at, factor: float) -> tuple:
         mean = np.bincount(group, np.nan_to_num(z)) / heights
     first = int(np.argmax(step <= same)) + 1
     place = f"sample {first + 1}" if at is None else f"line {at[first]}"
-    note = f"{path}: {x.size - mean.size} samples have the same x as another (the first in {place}); the mean is used"
+    note = (f"{path}: {x.size - mean.size} samples have the same x as another sample (the first in {place}); the mean "
+            "of their heights is used")
     return np.bincount(group, x) / np.bincount(group), mean, (note,)
 
 
@@ -113,16 +115,17 @@ def plausible(path, x, z, stated: str = "") -> tuple:
     if length < SHORTEST:
         raise PatchfemError(f"{path}: the profile is {say(length, 3)} long; is the unit of x right?")
     if 0 < span < ATOM:
-        return (f"{path}: heights span {say(span)}, less than an atom is wide; is their unit right?",)
+        return (f"{path}: heights span {say(span)}, which is less than the width of an atom; is the unit of the "
+                "heights right?",)
     if span <= length:
         return ()
     steep = f"{path}: heights span {say(span)} over a length of {say(length)}"
     few = max(1, there.size // TRIMMED[1]) if there.size >= TRIMMED[0] else 0
     most = float(there[-1 - few] - there[few])
     if most <= length:
-        return (f"{steep}, and {say(most)} without the {few} highest and the {few} lowest of {there.size}; write "
-                "nan for those that are faults of the measurement",)
+        return (f"{steep}, but only {say(most)} without the {few} highest and the {few} lowest of {there.size}; write "
+                "nan for each of these heights that is a fault of the measurement",)
     if not stated:
-        raise PatchfemError(f"{steep}; is the unit of z right? write a missing height as nan; --units of profile "
-                            "and compare overrides the header")
+        raise PatchfemError(f"{steep}; is the unit of z right? If not, correct the header or give --units to profile "
+                            "and compare; write a missing height as nan")
     return (f"{steep}: {stated}",)

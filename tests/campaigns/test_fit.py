@@ -299,7 +299,7 @@ def test_exact_keys_without_effect_are_named(tmp_path):
     loop = table(tmp_path / "loop.csv", time, slide, play(slide, 0.31, 2.3e-6))
     found = fit_loop(scene_of(tmp_path, "elastic-plastic"), loop,
                      [*free_of("friction.static"), "slide.cycles=1..3,friction.bond_length=50 m..70 m"])
-    assert "slide.cycles has no effect on the rows, so its value is not determined" in found.warnings
+    assert "slide.cycles has no effect on the computed data, so its value is not determined" in found.warnings
     found = fit_loop(scene_of(tmp_path, "elastic-plastic"), loop, ["friction.static=0.1..0.25"])
     assert found.found.values[0] == 0.25 and "at its high bound 0.25" in found.warnings[0]
 
@@ -420,10 +420,10 @@ BODY = "0,0,0\n1,1,1\n2,2,1\n3,3,1\n4,4,1\n"
     ("time [s],displacement [um],force\n" + BODY, ":1: a header like `time [s],displacement [um],force [N]` is needed"),
     ("time [s],displacement [um],force [lb]\n" + BODY, ":1: force [lb]: unknown unit; use one of N, kN, lbf"),
     ("time [s],force [N]\n0,1\n", ":1: a header like"), ("time [s],displacement [um],force [N],x [\n", ":1: a head"),
-    ("displacement [um],force [N],friction_ratio\n0,0,0\n1,1,1\n", ":1: force and friction_ratio are both given"),
+    ("displacement [um],force [N],friction_ratio\n0,0,0\n1,1,1\n", ":1: there are columns force and friction_ratio"),
     (HEAD + "0,0,0\n1,1\n", ":3: three cells are needed, time, displacement and force, not '1,1'"),
     (HEAD + "0,0,0\n1,1,\n", ":3: force: '' is not a finite number"),
-    (HEAD + "0,0,0\n1,1,1\n1,2,1\n", ":4: time 1 s does not follow 1 s"),
+    (HEAD + "0,0,0\n1,1,1\n1,2,1\n", ":4: time 1 s is not later than"),
     (HEAD + "0,5,0\n1,5,1\n", "displacement is the same in every row"),
     (HEAD + "0,0,0\n1,5,0\n", "force is 0 in every row"), (HEAD + "0,0,0\n1,5,1\n", "2 rows are not held out"),
 ])  # fmt: skip

@@ -79,7 +79,7 @@ def test_exact_json_says_why_there_is_no_depth(files, tmp_path, no_page):
     other = written(tmp_path / "elsewhere.csv", pair(50001, share=0.3).after)
     found = json.loads(cli("compare", files[0], other, "--json", "-o", tmp_path / "out").out)
     for name in NAMES[:4]:
-        assert found[name]["value"] is None and "no common place" in found[name]["reason"]
+        assert found[name]["value"] is None and "no common part" in found[name]["reason"]
     guess = found["worn_depth_mean_from_abbott"]
     assert guess["low"] < guess["value"] < guess["high"] and guess["high"] - guess["low"] > UM
     assert found["amplitude_ratio"]["value"] > 0
@@ -119,7 +119,7 @@ def test_always_a_scene_that_is_longer_than_the_trace_is_told(files, tmp_path):
     (tmp_path / "patch.toml").write_text(SCENE.replace("0.9 mm", "12.7 mm").replace("2 um", "50 um")
                                          .replace("before.csv", str(files[0])))
     answer = cli("compare", files[0], files[1], "--scene", tmp_path / "patch.toml", "-o", tmp_path / "out")
-    assert answer.code in (0, 2) and "long, the patch 12.7 mm" in answer.out + answer.err
+    assert answer.code in (0, 2) and "long, but the patch is 12.7 mm long" in answer.out + answer.err
 
 
 @pytest.mark.slow
@@ -162,7 +162,7 @@ def test_refuses_a_scene_without_a_patch(files, tmp_path):
 
 @pytest.mark.parametrize("words, says", [
     (("--direction", "z"), "compare --direction z: x or y is needed"),
-    (("third.csv",), "compare: 3 files; two are needed, or four"),
+    (("third.csv",), "compare: 3 files; two files are needed, or four"),
 ])
 def test_refuses_with_exit_code_2(files, words, says):
     answer = cli("compare", *files[:2], *words)
@@ -173,7 +173,7 @@ def test_refuses_traces_too_short_for_the_band(tmp_path):
     p = pair(1)
     short = written(tmp_path / "short.csv", Profile(p.before.x[:150], p.before.z[:150], ""))
     answer = cli("compare", short, short, "-o", tmp_path / "out")
-    assert answer.code == 2 and "not the band 60 um to 110 um" in answer.err
+    assert answer.code == 2 and "but not the whole band 60 um to 110 um" in answer.err
     assert not (tmp_path / "out").exists()
 
 

@@ -228,9 +228,9 @@ def test_always_a_ratio_written_as_per_cent_is_remarked(tmp_path):
     path.write_text(text_of("rig"), "utf-8")
     said = [cli("check", path, "--set", f"structure.mode.axial.damping={value}") for value in ("0.49", "0.5", "1")]
     assert [one.code for one in said] == [0, 0, 0] and said[0].err == ""
-    assert said[1].err.endswith("structure.mode.axial.damping = 0.5 is a damping ratio: 1 is critical, and 1 % is "
-                                "written 0.01\n")
-    assert "damping = 1 is a damping ratio: 1 is critical" in said[2].err
+    assert said[1].err.endswith("structure.mode.axial.damping = 0.5 is a damping ratio: 1 means critical damping, and "
+                                "1 % is written 0.01\n")
+    assert "damping = 1 is a damping ratio: 1 means critical" in said[2].err
 
 
 def test_refuses_with_the_key_that_was_meant(tmp_path):
@@ -238,7 +238,8 @@ def test_refuses_with_the_key_that_was_meant(tmp_path):
     path = tmp_path / "rig.toml"
     path.write_text(text_of("rig"), "utf-8")
     swept = cli("sweep", path, "--over", "contact.tilt=1 urad,2 urad", "-o", tmp_path / "sweep")
-    assert swept.code == 2 and "contact.tilt: a table, not a value; choose a key in it: contact.tilt.angle" in swept.err
+    assert swept.code == 2 and ("contact.tilt: is a table without a value of its own; choose a key of this table: "
+                                "contact.tilt.angle") in swept.err
     bare = cli("check", path, "--set", "acceleration=20 g")
     assert bare.code == 2 and "acceleration: unknown key; did you mean 'drive.acceleration'?" in bare.err
     lost = cli("help")

@@ -74,7 +74,7 @@ def test_exact_modes_of_a_record_are_the_structure_of_a_scene(shaken, tmp_path):
     modes = build(loads(FORCED + text)).rig.modes
     assert modes.omega == pytest.approx(OMEGA, rel=1e-8) and modes.mass == pytest.approx(1 / 1.2, rel=1e-6)
     assert modes.output**2 / modes.mass == pytest.approx(RESIDUE, rel=1e-6)
-    assert "# modes of shaker.uff" in text and "the windowed estimate reads" in text
+    assert "# modes of shaker.uff" in text and "the estimate with a window gives" in text
 
 
 def test_exact_a_band_keeps_the_mode_in_it_and_its_damping(shaken, tmp_path):
@@ -120,7 +120,7 @@ def test_exact_shapes_of_dataset_55_scaled_to_the_mass_they_hold(tmp_path):
              "freq": HERTZ[k], "modal_damp_vis": ZETA[k], "modal_damp_his": 0.0} for k in range(2)]
     path = written(tmp_path / "shapes.uff", [SI, *sets])
     answer = cli("import", path, "-o", tmp_path / "modes.toml")
-    assert answer.code == 2 and "give the one that slides, such as --map slide=11:+x" in answer.err
+    assert answer.code == 2 and "give the node and direction that slide, such as --map slide=11:+x" in answer.err
     answer = cli("import", path, "-o", tmp_path / "modes.toml", "--map", "slide=12:+x,output=11:+x")
     assert answer.code == 0, answer.err
     modes = build(loads(SHAKEN + (tmp_path / "modes.toml").read_text())).rig.modes
@@ -136,7 +136,7 @@ def test_exact_shapes_of_dataset_55_scaled_to_the_mass_they_hold(tmp_path):
     (["-o", "a.toml", "--segment", "2"], "--segment 2:"), (["-o", "a.toml", "--window", "flat"], "hann or none"),
     (["-o", "a.toml", "--band", "20 Hz"], "two rising frequencies"),
     (["-o", "a.toml", "--segment", "9 s"], "a segment"),
-    (["-o", "a.toml", "--map", "acceleration=tip"], "one input, force or base_acceleration"),
+    (["-o", "a.toml", "--map", "acceleration=tip"], "one input (force or base_acceleration)"),
     (["-o", "a.toml", "--map", "slide=12:+x"], "--map slide: unknown; use")])
 def test_refuses_by_name(shaken, tmp_path, monkeypatch, words, says):
     monkeypatch.chdir(tmp_path)

@@ -81,8 +81,8 @@ def test_always_the_interval_of_a_mean_holds_the_truth_in_95_of_100():
     ("before,after\n\n", ": no pair below its header"),
     ("before,after\na.csv\n", ":2: two cells are needed, before and after, not 'a.csv'"),
     ("before,after\na.csv,\n", ":2: after: the name of a file is needed"),
-    ("before,after,direction\na.csv,b.csv,z\n", ":2: direction: x, y or nothing is needed, not 'z'"),
-    ("before,after\na.csv,b.csv\na.csv,b.csv\n", ":3: repeats line 2"),
+    ("before,after,direction\na.csv,b.csv,z\n", ":2: direction: must be x, y or empty, not 'z'"),
+    ("before,after\na.csv,b.csv\na.csv,b.csv\n", ":3: repeats the pair of line 2"),
     ("", ":1: a header like `before,after` is needed"),
 ])
 def test_refuses_a_table_that_is_none(tmp_path, text, says):

@@ -68,6 +68,6 @@ def test_refuses_a_reading_that_is_none_or_lacks_its_cutoff(tmp_path, sets, said
 
 @pytest.mark.parametrize("sets, said", [
     (("measured.reading_cutoff=600 Hz",), "has no meaning for reading 'peak'"),
-    (("measured.reading=rms", "drive.waveform=step"), "has a meaning only under one sine drive")])
+    (("measured.reading=rms", "drive.waveform=step"), "has a meaning only under a sine drive")])
 def test_a_reading_without_meaning_is_remarked(tmp_path, sets, said):
     assert any(said in remark for remark in scene_of(tmp_path, *sets).remarks)

@@ -91,7 +91,7 @@ def test_exact_two_values_known_by_their_product_are_named():
     assert found.unknown[0, 0] * found.unknown[0, 1] == pytest.approx(-1, abs=1e-6)
     product, flat = remarks(found, "abcd")
     assert "a and b cannot be determined separately" in product and product.endswith("only their product is known")
-    assert flat == "d has no effect on the rows, so its value is not determined"
+    assert flat == "d has no effect on the computed data, so its value is not determined"
 
 
 def test_exact_a_ratio_is_named_and_the_rest_keeps_its_interval():
@@ -108,7 +108,7 @@ def test_exact_a_value_that_the_rows_do_not_rule_out_anywhere_has_no_interval():
     alone = fit(lambda v: v[0] - data + 1e-3 * v[1] * LINE[:20], [-5, 0], [5, 1])
     assert "cannot be determined separately" in remarks(found, "ab")[0]
     assert np.isnan(alone.intervals[1]).all() and alone.methods[1] == "none"
-    assert "b is not determined: every value in its range fits the rows" in remarks(alone, "ab")
+    assert "b is not determined: every value in its range fits the data" in remarks(alone, "ab")
 
 
 def test_exact_the_best_of_several_valleys_is_found_from_a_bad_start():
@@ -138,13 +138,13 @@ def test_always_failures_are_counted_and_passed_over():
 
 
 def test_refuses_what_cannot_be_fitted():
-    with pytest.raises(NotConverged, match="failed at every one of 9 starts: nothing works"):
+    with pytest.raises(NotConverged, match="failed at all 9 starting points of the search: nothing works"):
         fit(raising(PatchfemError("nothing works")), [0.0], [1.0], start=[0.5])
     with pytest.raises(Missing, match="no file"):
         fit(raising(Missing("no file")), [0.0], [1.0])
     with pytest.raises(KeyError):
         fit(raising(KeyError("a fault of ours")), [0.0], [1.0])
-    with pytest.raises(ValueError, match="2 rows cannot determine 3 values"):
+    with pytest.raises(ValueError, match="2 rows of data cannot determine 3 values"):
         fit(lambda v: v[:2], [0, 0, 0], [1, 1, 1])
     for low, high, log in (([1.0], [1.0], None), ([2.0], [1.0], None), ([0.0], [np.inf], None), ([], [], None),
                            ([0.0, 1.0], [1.0], None), ([0.0], [1.0], [True]), ([np.nan], [1.0], None)):
@@ -207,4 +207,4 @@ def test_always_the_valley_judges_descents_that_ran_out_of_evaluations(scores, e
         assert found.outcome is ended
         said = [text for text in remarks(found, "abc") if "not converged" in text]
         assert bool(said) == (ended is Outcome.NOT_CONVERGED)
-        assert all("100 evaluations, and no other start ended within 1 %" in text for text in said)
+        assert all("100 evaluations, and no search from another start ended within 1 %" in text for text in said)

@@ -49,7 +49,7 @@ def test_exact_channels_by_name_place_and_number(tmp_path):
     sets = [SI, record(TIME, SLIDE, 8, id1="upper", rsp_node=12), record(TIME, 2 * SLIDE, 8, id1="lower", rsp_dir=-1),
             record(TIME, FORCE, 0, id1="bridge")]
     path = written(tmp_path / "a.uff", sets)
-    with pytest.raises(PatchfemError, match=r"2 channels are displacement; choose .* 1 'upper' at 12:\+x"):
+    with pytest.raises(PatchfemError, match=r"2 channels contain displacement; choose .* 1 'upper' at 12:\+x"):
         read_records(path, [])
     for source in ("upper", "12:+x", "1"):
         assert np.array_equal(read_records(path, wanted([f"displacement={source}"])).values["displacement"], SLIDE)
@@ -87,7 +87,7 @@ def test_exact_spellings_of_units(unit, factor):
 
 @pytest.mark.parametrize("words, says", [
     (["force"], "NAME=CHANNEL"), (["mass=a"], "one of time, displacement"), (["force=a [furlong]"], "one of N, kN"),
-    (["force=a", "force=b"], "asked for twice"), (["force=nothing"], "no channel 'nothing'; it has 1 '"),
+    (["force=a", "force=b"], "given twice"), (["force=nothing"], "no channel 'nothing'; the file has 1 '"),
     (["force=3"], "no channel '3'")])
 def test_refuses_maps_by_name(tmp_path, words, says):
     path = written(tmp_path / "a.uff", [SI, record(TIME, FORCE, 13)])
@@ -103,8 +103,8 @@ def spoilt(values, at=3, to=np.nan):
 
 @pytest.mark.parametrize("sets, says", [
     ([SI], "no record over time"),
-    ([record(spoilt(TIME, to=0.0), FORCE, 13)], "of sample 4 does not follow"),
-    ([record(TIME, FORCE, 13), record(TIME + 1, SLIDE, 8)], "has other times than"),
+    ([record(spoilt(TIME, to=0.0), FORCE, 13)], "of sample 4 is not later than"),
+    ([record(TIME, FORCE, 13), record(TIME + 1, SLIDE, 8)], "is sampled at other times than"),
     ([record(TIME, FORCE + 1j, 13)], "complex"), ([record(TIME, FORCE, 0)], "no channel label names a quantity"),
     ([SI | {"length": 0.0}, record(TIME, FORCE, 13)], "must be > 0")])
 def test_refuses_universal_files_by_name(tmp_path, sets, says):
@@ -137,7 +137,8 @@ def test_refuses_other_files_and_spoilt_ones(tmp_path):
     (tmp_path / "b.uff").write_bytes(b"    -1\n    58\nnothing\n    -1\n")
     (tmp_path / "c.tdms").write_bytes(b"")
     for words, code, says in (
-            (["a.mat"], 2, "assign its variables"), (["a.mat", "--map", "force=F [N]"], 2, "no variable 'F'"),
+            (["a.mat"], 2, "assign the variables of the "
+                           "file"), (["a.mat", "--map", "force=F [N]"], 2, "no variable 'F'"),
             (["a.mat", "--map", "force=t"], 2, "has no units"),
             (["a.mat", "--map", "force=wide [N]"], 2, "wide(:,1)"),
             (["a.mat", "--map", "force=wide(:,4) [N]"], 2, "no column 4"), (["b.uff"], 2, "cannot be read"),

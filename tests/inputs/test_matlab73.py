@@ -79,7 +79,7 @@ def test_exact_fields_of_structures_are_named_and_mapped(data, tmp_path):
     for force in ("run.load.F", "run.load.all(:,2)"):
         records = read_records(tmp_path / "a.mat", wanted(["time=run.t [s]", f"force={force} [kN]"])).values
         assert np.array_equal(records["time"], TIME) and np.array_equal(records["force"], 1e3 * FORCE)
-    with pytest.raises(PatchfemError, match=r"no variable 'run.F'; it contains .*run\.load\.F 51x1"):
+    with pytest.raises(PatchfemError, match=r"no variable 'run.F'; the file contains .*run\.load\.F 51x1"):
         read_records(tmp_path / "a.mat", wanted(["time=run.t [s]", "force=run.F [N]"]))
 
 

@@ -184,7 +184,7 @@ def test_exact_rows_of_places_that_files_order_in_their_own_way():
 
 
 HEAD = "%%MatrixMarket matrix coordinate real "
-BAD = {"a.mtx": ("hello\n", "cannot be read"), "b.mtx": ("1 2\n3 4\n", "is not a matrix: write Matrix Market"),
+BAD = {"a.mtx": ("hello\n", "cannot be read"), "b.mtx": ("1 2\n3 4\n", "is not a matrix: write a Matrix Market"),
        "c.mtx": (HEAD + "general\n9 9 99999999999\n1 1 1\n", "announces 99999999999 numbers"),
        "d.mtx": (HEAD + "general\n2 3 1\n1 1 1\n", "must be square, not of shape (2, 3)"),
        "e.mtx": (HEAD + "general\n2 2 3\n1 1 1\n2 2 1\n1 2 0.5\n", "not symmetric: entries differ from the transpose "
@@ -231,7 +231,7 @@ def test_refuses_names_that_are_not_known_and_sizes_that_differ(tmp_path):
         matrices.read(tmp_path / "a.npz", "stiffness")
     np.savez(tmp_path / "k.npz", K=K)
     for wanted in ("mass", "damping"):
-        with pytest.raises(PatchfemError, match=rf"its one array, K, has the name of a stiffness, but the {wanted}"):
+        with pytest.raises(PatchfemError, match=rf"of the file, K, has the name of a stiffness, but the {wanted}"):
             matrices.read(tmp_path / "k.npz", wanted)
     one, small = (matrices.Matrix(sparse.csr_array(part)) for part in (K, M[:2, :2]))
     with pytest.raises(PatchfemError, match="differ in size: 4 x 4 and 2 x 2"):

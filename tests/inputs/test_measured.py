@@ -58,9 +58,11 @@ def test_exact_units_of_a_table(tmp_path):
     (HEAD + "143,,6.0,,\n", ":2: frequency and input are needed"),
     (HEAD + "143,5,1e999,,\n", ":2: acceleration: '1e999' is not a finite number"),
     (HEAD + "1" * 200_000 + ",5,6,,\n", ":2: frequency: '1111"),
-    (HEAD + "1" * 200_000 + ",\"5\",6,,\n", ":2: its quotes cannot be read (field larger than field limit"),
+    (HEAD + "1" * 200_000 + ",\"5\",6,,\n", ":2: the quotation marks in this row cannot be read (field larger than "
+                                            "field limit"),
     (HEAD + "143,-5,6,,\n", ":2: input: '-5' is below 0"),
-    ("frequency [Hz],input [g],flags\n143,5,U\n", ":1: column 'flags' is not known; known are flag and frequency"),
+    ("frequency [Hz],input [g],flags\n143,5,U\n", ":1: column 'flags' is unknown; possible columns "
+                                               "are flag and frequency"),
 ])  # fmt: skip
 def test_refuses_a_faulty_table(tmp_path, text, wanted):
     path = tmp_path / "t.csv"

@@ -185,8 +185,8 @@ def share(m):
 
 SPOILT = {
     "off the line": (lambda m: move(m, interface_node(m), (0, 2e-5)), "upper_interface is not the straight line y = 0"),
-    "shifted": (lambda m: move(m, slice(len(m.points) // 2, None), (1e-5, 0)), "do not match .*; give both the same "
-                                                                               "ends"),
+    "shifted": (lambda m: move(m, slice(len(m.points) // 2, None), (1e-5, 0)), "do not match .*; let both interfaces "
+                                                                               "begin and end"),
     "end node aside": (lambda m: move(m, interface_node(m, k=-1), (1e-7, 0)), "do not match .* 1e-07 m apart"),
     "double node": (lambda m: double(m, m.quads[20, 0], 20), "coincide, the first at .*merge"),
     "double interface node": (lambda m: twin(m, interface_node(m)), "upper_interface has two nodes at x = .*; merge"),
@@ -195,14 +195,14 @@ SPOILT = {
     "shared nodes": (share, "the two pieces share 9 nodes"),
     "steep edge": (bend, "rounded edges may reach a slope of 0.1\\): the node"),
     "across": (lambda m: np.negative(m.points[:, 1], out=m.points[:, 1]), "piece reaches 0.001 m across y = 0"),
-    "no far face": (lambda m: drop_edge(m, "upper_far"), r"nothing is tagged upper_far \("),
-    "no interface": (lambda m: drop_edge(m, "lower_interface"), r"nothing is tagged lower_interface \("),
+    "no far face": (lambda m: drop_edge(m, "upper_far"), r"no cells or nodes are tagged upper_far \("),
+    "no interface": (lambda m: drop_edge(m, "lower_interface"), r"no cells or nodes are tagged lower_interface \("),
     "hole in the interface": (lambda m: drop_edge(m, "lower_interface", 2), "lower_interface has a hole .* make the "
                                                                             "interface"),
     "far at the interface": (lambda m: m.edges.__setitem__(m.edge_tags == EDGE_TAGS["lower_far"], interface_node(
         m, "lower")), "lower_far must contain two nodes or more"),
     "foreign far": (lambda m: m.edge_tags.__setitem__(m.edge_tags == EDGE_TAGS["lower_far"], EDGE_TAGS["upper_far"]),
-                    "nothing is tagged lower_far"),
+                    "no cells or nodes are tagged lower_far"),
     "foreign node": (lambda m: m.edges.__setitem__((np.flatnonzero(m.edge_tags == EDGE_TAGS["lower_far"])[0], 0),
                                                    interface_node(m)), "lower_far contains 1 nodes that belong to no "
                                                                        "cell"),
@@ -210,7 +210,8 @@ SPOILT = {
     "twisted": (lambda m: m.quads.__setitem__((5, [1, 2]), m.quads[5, [2, 1]]), "1 cells are twisted"),
     "no area": (lambda m: m.quads.__setitem__((5, 1), m.quads[5, 0]), "1 cells are twisted or have no area"),
     "not finite": (lambda m: move(m, 7, (np.nan, 0)), "not finite"),
-    "missing piece": (lambda m: m.quad_tags.__setitem__(m.quad_tags <= 2, 3), "nothing is tagged upper_substrate"),
+    "missing piece": (lambda m: m.quad_tags.__setitem__(m.quad_tags <= 2, 3), "no cells or nodes are tagged "
+                                                                              "upper_substrate"),
 }
 
 
@@ -244,11 +245,11 @@ def test_refuses_curved_cells_bent_meshes_and_unknown_tags(tmp_path):
     mesh = meshio.Mesh(np.column_stack([m.points, m.points[:, 0]]), [(k, c) for k, c, _ in blocks(m)],
                        cell_data={"tag": [t for _, _, t in blocks(m)]})
     meshio.write(path, mesh)
-    with pytest.raises(PatchfemError, match=r"not plane: z runs over 0\.002 m"):
+    with pytest.raises(PatchfemError, match=r"not plane: its z values span 0\.002 m"):
         read_pieces(path)
     mesh.cell_data = {"tag": [t + 100 for _, _, t in blocks(m)]}
     meshio.write(path, mesh)
-    with pytest.raises(PatchfemError, match=r"nothing is tagged .*cell array `tag`: 1 upper_substrate"):
+    with pytest.raises(PatchfemError, match=r"no cells or nodes are tagged .*cell array `tag`: 1 upper_substrate"):
         read_pieces(path)
     meshio.write(path, meshio.Mesh(m.points @ np.eye(2, 3), [("triangle6", m.quads[:, [0, 1, 2, 3, 0, 1]])]))
     with pytest.raises(PatchfemError, match="triangle6 cells; only linear"):
@@ -256,7 +257,7 @@ def test_refuses_curved_cells_bent_meshes_and_unknown_tags(tmp_path):
     path = tmp_path / "pair.inp"
     write_inp(m, path)
     path.write_text(path.read_text().replace("ELSET=UPPER_COATING", "ELSET=GLUE"))
-    with pytest.raises(PatchfemError, match=r"cells with the unknown no tag;"):
+    with pytest.raises(PatchfemError, match=r"some cells have an unknown tag \(no tag\);"):
         read_pieces(path)
 
 
@@ -264,14 +265,14 @@ def test_refuses_curved_cells_bent_meshes_and_unknown_tags(tmp_path):
     ("*NODE\n1,0,0\n1,1,0\n*NODE\n1,2,2\n", "given twice"),
     ("*NODE\n1,0,0\n*ELEMENT,TYPE=C3D8\n1,1,1,1,1,1,1,1,1\n", "C3D8 elements; only linear"),
     ("*NODE\n1,0,0\n*ELEMENT,TYPE=CPE3\n1,1,1\n", "do not all have 3 nodes"),
-    ("*NODE\n1,0,0\n*NSET,NSET=upper_far,GENERATE\n1,2000000000,1\n", "more than the deck has"),
+    ("*NODE\n1,0,0\n*NSET,NSET=upper_far,GENERATE\n1,2000000000,1\n", "longer than the deck"),
     ("*NODE\n1,0,0\n*NSET,NSET=upper_far\nnobody\n", "unknown set nobody"),
     ("*NODE\n1,0,0\n3,1,0\n*ELEMENT,TYPE=CPE3\n12,1,3,7\n", "element 12 names node 7, which the file does not define"),
     ("*NODE\n1,0,0\n*NSET,NSET=upper_far\n1,9\n", "upper_far names node 9, which the file does not define"),
     ("*INCLUDE, INPUT=other.inp\n", "INCLUDE is not supported yet"),
     ("*NODE\n1,zero,0\n", "not a readable .inp"),
-    ("", "nothing is tagged .*ELSET"),
-    ("\x00\ufffd*", "nothing is tagged"),
+    ("", "no cells or nodes are tagged .*ELSET"),
+    ("\x00\ufffd*", "no cells or nodes are tagged"),
 ])
 def test_refuses_decks_it_cannot_use(text, message, tmp_path):
     (tmp_path / "pair.inp").write_text(text, encoding="utf-8")

@@ -69,7 +69,7 @@ def test_always_any_nodes_between_the_same_ends_are_read(cells, shift, tmp_path_
 @pytest.mark.parametrize("factor", [1 + 1e-6, 1.05, 0.95, 1 - 1e-8])
 def test_refuses_interfaces_of_other_lengths(factor, tmp_path):
     grid = TensorGrid(FINER.x * factor, FINER.depth, FINER.coating_rows)
-    with pytest.raises(PatchfemError, match=r"do not match \(lengths 0\.002 and .*give both the same ends"):
+    with pytest.raises(PatchfemError, match=r"do not match \(lengths 0\.002 and .*let both interfaces begin and end"):
         stored(unlike(drawn("quads"), drawn("quads", grid)), tmp_path)
     grid = TensorGrid(FINER.x * (1 + 1e-10), FINER.depth, FINER.coating_rows)
     assert stored(unlike(drawn("quads"), drawn("quads", grid)), tmp_path).upper.x.size == FINER.x.size

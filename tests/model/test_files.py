@@ -37,23 +37,24 @@ def mesh_text(name="{}") -> str:
 
 
 FAULTS = {
-    "profile": (PROFILE, "a.csv", "0,1\n1,2\n", "contact.profile.file", "a.csv:1: no header, and units are never"),
+    "profile": (PROFILE, "a.csv", "0,1\n1,2\n", "contact.profile.file", "a.csv:1: there is no header, and units"),
     "profile, short": (PROFILE, "a.csv", "x [mm],z [um]\n0,1\n2,2\n4,1\n", "contact.profile.file",
-                       "the profile is 4 mm long, the patch 12.7 mm"),
+                       "the profile is 4 mm long, but the patch is 12.7 mm"),
     "profile, areal": (PROFILE, "a.sdf", write.sdf_ascii(write.scan()), "contact.profile.file",
-                       "an areal scan of 4 x 6 heights where one trace is needed"),
+                       "an areal scan of 4 x 6 heights, but a single trace is needed"),
     "slide": (SLIDE, "p.csv", "time [s],displacement [um]\n0,0\n1,x\n", "slide.file",
               "p.csv:3: displacement: 'x' is not a finite number"),
     "drive": (DRIVE, "d.csv", "time [s],acceleration [g]\n0,0\n0,1\n", "drive.file",
-              "d.csv:3: time 0 s does not follow 0 s"),
+              "d.csv:3: time 0 s is not later than"),
     "structure": (ARRAYS, "a.npz", b"PK\x03\x04 no archive", "structure.file", "a.npz cannot be read"),
     "measured": (MEASURED, "m.csv", "frequency [Hz],output [g]\n1,1\n", "measured.file",
                  "not 'frequency [Hz],output [g]' (columns with a unit: frequency, input"),
     "mesh": (mesh_text(), "a.msh", "$MeshFormat\nnonsense\n", "contact.mesh", "a.msh: not a readable .msh file"),
     "mesh, lying": (mesh_text(), "a.msh", "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n9999999\n1 0 0 0\n$EndNodes\n",
                     "contact.mesh", "a.msh: Nodes announces 9999999 entries"),
-    "mesh, .inp": (mesh_text(), "a.inp", "*NODE\n1,0,0\n", "contact.mesh", "a.inp: nothing is tagged lower_far"),
-    "mesh, .unv": (mesh_text(), "a.unv", "    -1\n  2411\n", "contact.mesh", "a.unv: dataset 2411 does not end"),
+    "mesh, .inp": (mesh_text(), "a.inp", "*NODE\n1,0,0\n", "contact.mesh", "a.inp: no cells or nodes are tagged "
+                                                                           "lower_far"),
+    "mesh, .unv": (mesh_text(), "a.unv", "    -1\n  2411\n", "contact.mesh", "a.unv: dataset 2411 has no end mark"),
     "mesh, .vtu": (mesh_text(), "a.vtu", "<?xml version='1.0'?>", "contact.mesh", "a.vtu: not a readable .vtu file"),
 }  # fmt: skip
 
@@ -114,7 +115,7 @@ def test_exact_check_says_of_a_profile_what_the_run_warns_of(tmp_path):
     x = np.linspace(0, 13e-3, 131)
     rows = "".join(f"{1e3 * a},{1e6 * (1e-4 * a + 2e-7 * np.cos(900 * a))}\n" for a in x)
     code, lines = checked(tmp_path, PROFILE, "p.csv", f"x [mm],z [um]\n{rows}")
-    assert code == 0 and "x moved by -6.5 mm" in lines[0] and "was subtracted; give a tilt" in lines[1], lines
+    assert code == 0 and "adds -6.5 mm to x" in lines[0] and "was subtracted; to include a tilt" in lines[1], lines
     answer = json.loads(cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out", "--no-page", "--json").out)
     told = [text for text in (*answer["warnings"], *answer["notes"]) if "p.csv" in text]
     assert lines == [f"note: {text}" for text in told]
@@ -181,9 +182,9 @@ HOSTILE = {
         write.scan().tobytes()), "the checksum of bindata/data.bin is wrong"),
     "path traversal": ("a.x3p", lambda _: write.x3p(write.main_xml(
         write.axis("CX", increment=1e-6) + write.axis("CY", increment=1e-6) + write.axis("CZ", "A"),
-        write.matrix(6, 4) + write.link(b"", name="../../etc/passwd"))), "leads out of the file"),
-    "29 TiB": ("a.npy", lambda _: npy_of("(2000000000000, 2)"), "4000000000000 numbers by its header, more than"),
-    "pickle": ("a.npy", pickled, "holds Python objects, which are never loaded"),
+        write.matrix(6, 4) + write.link(b"", name="../../etc/passwd"))), "names a place outside the file"),
+    "29 TiB": ("a.npy", lambda _: npy_of("(2000000000000, 2)"), "4000000000000 numbers are announced in"),
+    "pickle": ("a.npy", pickled, "contains Python objects, which are not loaded"),
     "2e9 places": ("a.x3p", lambda _: write.x3p(write.main_xml(
         write.axis("CX") + write.axis("CY") + write.axis("CZ", "A"), write.matrix(2 * 10**9, 2) + write.link(b"")),
         b""), "SizeX is '2000000000'"),

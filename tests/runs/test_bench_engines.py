@@ -152,7 +152,7 @@ def test_refuses_a_list_that_takes_too_long_and_merging_where_none_is():
                      "accuracy.steps_per_cycle=4000")
     with pytest.raises(Missing, match=f"more than {LONGEST:.0f} s; lower accuracy.steps_per_cycle"):
         plan(model)
-    with pytest.raises(SceneError, match="'merged' where the pressure of a point changes"):
+    with pytest.raises(SceneError, match=r"'merged' with friction\.breakaway, or with a pressure"):
         plan(model_of(BONDS + "order = 2\n", "sine", "accuracy.quadrature=merged", where=PATCH + 'on = "lower"\n'))
 
 

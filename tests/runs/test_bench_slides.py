@@ -241,7 +241,7 @@ HEAD = "time [s],displacement [um]\n"
     (HEAD + "0,0\n1,nan\n", ":3: displacement: 'nan' is not a finite number"),
     (HEAD + "0,0\n1,1e999\n", ":3: displacement: '1e999' is not"), (HEAD + "0,0\n1;1\n", ":3: two cells"),
     (HEAD + "0,0\n\n1,1\n", ":3: two cells"), (HEAD + "0,0\n1,1,2\n", ":3: two cells"),
-    (HEAD + "0,0\n1,\n", ":3: displacement: '' is not"), (HEAD + "0,0\n1,1\n1,2\n", ":4: time 1 s does not follow 1 s"),
+    (HEAD + "0,0\n1,\n", ":3: displacement: '' is not"), (HEAD + "0,0\n1,1\n1,2\n", ":4: time 1 s is not later than"),
     (HEAD + "0,5\n1,1\n", ":2: displacement starts at 5e-06"), (HEAD + "1,0\n2,1\n", ":2: time starts at 1"),
     (HEAD + "0,0\n1,0\n", "displacement is 0 in every row"), (b"\xff\xfe\x00", "cannot be read"),
 ])  # fmt: skip

@@ -99,9 +99,9 @@ def test_exact_another_mode_that_slides_leaves_no_ratio():
 
 def test_always_a_mode_that_slides_unseen_is_noted():
     second = '[[structure.mode]]\nname = "second"\nfrequency = "300 Hz"\ndamping = 0.02\nslide = 0.5\n{}'
-    said = "mode 'second' does not move the output (output = 0, its default)"
+    said = "mode 'second' does not move the output point (`output` is 0 by default)"
     assert loads(scene("coulomb", more=second.format(""))).notes == \
-        (f"{said}, nor does the base drive it (base = 0, its default)",)
+        (f"{said}, and the base motion does not drive this mode (`base` is 0 by default)",)
     assert loads(scene("coulomb", more=second.format("base = 0.0"))).notes == (said,)
     result = pf.run(loads(scene("coulomb", more=second.format("base = 0.0"))))
     assert said in result.notes

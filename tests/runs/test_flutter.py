@@ -94,7 +94,7 @@ def test_a_motion_that_grows_past_all_bounds_ends(law):
 
 def test_without_friction_negative_damping_is_refused():
     lone = text().replace('[friction]\nlaw = "coulomb"\nstatic = 0.3\n', "").replace('[normal]\nload = "30 N"\n', "")
-    with pytest.raises(pf.SceneError, match=r"damping: -0\.02 is negative damping and nothing dissipates"):
+    with pytest.raises(pf.SceneError, match=r"damping: -0\.02 is negative damping, and without friction"):
         pf.load(lone)
     with pytest.raises(pf.SceneError, match="damping: must be > -1"):
         pf.load(text(damping=-1.5))

@@ -290,7 +290,7 @@ def test_exact_the_plan_prints_stiffness_and_capacity():
 
 
 @pytest.mark.parametrize(("text", "sets", "key", "words"), [
-    (BENCH, ["friction.static=2"], "normal.grooves.amplitude", "which lock with static = 2"),
+    (BENCH, ["friction.static=2"], "normal.grooves.amplitude", "on which the pieces lock with static = 2"),
     (BENCH, ["friction.static=2"], "normal.grooves.amplitude", "= 6.3662e-06 m is needed"),
     (RIG, ["accuracy.method=exact"], "accuracy.method", "no exact solution exists with [normal.grooves]"),
     (RIG, ["accuracy.method=newmark"], "accuracy.method", "with [normal.grooves]"),

@@ -137,7 +137,7 @@ def test_exact_a_scene_on_triangles_is_within_its_error_of_the_quads(tmp_path):
 def test_refuses_a_mesh_whose_interfaces_do_not_match(tmp_path):
     triangles(tmp_path / "pieces.msh", 5e-4, shift=1e-4)
     (tmp_path / "scene.toml").write_text(TEXT.format(LOAD + '\nmesh = "pieces.msh"', ""), "utf-8")
-    with pytest.raises(PatchfemError, match=r"pieces.msh.*give both the same ends"):
+    with pytest.raises(PatchfemError, match=r"pieces.msh.*let both interfaces begin and end"):
         bodies_of(build(scene.load(tmp_path / "scene.toml")).patch)
 
 

@@ -302,15 +302,15 @@ def test_a_mesh_of_few_elements_leaves_the_errors_of_the_motion_open():
 @pytest.mark.parametrize("old, new, says", [
     ("[drive]", '[structure.interface.contact.approach]\ndistance = "1 um"\n[drive]', "contact.approach"),
     ("[drive]", '[structure.interface.contact.grooves]\nwavelength = "80 um"\namplitude = "2 um"\n[drive]',
-     "structure.interface[2].contact.grooves: not supported yet with [[structure.interface]]; leave it out"),
-    ('static = 0.3\n[structure', 'static = 0.3\nload = "5 N"\n[structure', "has a load of its own; leave this one out"),
+     "structure.interface[2].contact.grooves: not supported yet with [[structure.interface]]; leave out this entry"),
+    ('static = 0.3\n[structure', 'static = 0.3\nload = "5 N"\n[structure', "has its own load; leave this key out"),
     ('radius = "2.0 m"', 'radius = "2.0 m"\non = "lower"', "put the shapes on the upper piece"),
     ('load = "60 N"\n', "", "structure.interface[2].contact.load: missing"),
     ('height = "8 mm"\nload = "60', 'height = "8 mm"\nelement_size = "20 mm"\nload = "60', "contact.element_size"),
     (LAW + "[structure.interface.contact]\nlength", 'law = "nonlocal"\nstatic = 0.3\nbond_length = "1 um"\n'
      "[structure.interface.contact]\nlength", "or use law 'coulomb' or 'elastic-plastic'"),
     (LAW, LAW + "kinetic = 0.2\n", "structure.interface[1].kinetic: 0.2 below static = 0.3 with "
-     "[structure.interface.contact.shear] is not supported yet; leave kinetic out"),
+     "[structure.interface.contact.shear] is not supported yet; leave out the key kinetic"),
     (LAW, LAW.replace("0.3", "0.0"), "leave out [structure.interface.contact.shear]"),
     ("[drive]", '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n[drive]', "wear: not supported yet"),
     ("cycles = 40\n", 'cycles = 40\n[accuracy]\nmethod = "newmark"\n', "use 'march'"),

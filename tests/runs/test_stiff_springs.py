@@ -69,10 +69,10 @@ def test_exact_wear_of_the_coefficient_leaves_the_stiffness():
 
 
 @pytest.mark.parametrize("sets, key, says", [
-    (["friction.bond_length=1 um"], "friction.stiffness", "in place of bond_length; leave one of the two out"),
+    (["friction.bond_length=1 um"], "friction.stiffness", "takes either this key or bond_length"),
     (["normal.amplitude=3 N", "normal.frequency=50 Hz"], "friction.stiffness", "give bond_length in"),
     (["normal.grooves.wavelength=80 um", "normal.grooves.amplitude=1 um"], "friction.stiffness", "give bond_length"),
-    (["friction.static=0"], "friction.static", "static > 0 is needed")])
+    (["friction.static=0"], "friction.static", "static: must be > 0")])
 def test_refuses_a_stiffness_that_is_not_one(sets, key, says):
     text, found = both(RIG)[0], mistakes(both(RIG)[0], *sets)
     assert len(found) == 1 and f": {key}: " in found[0] and says in found[0]
@@ -83,7 +83,7 @@ def test_refuses_a_stiffness_that_is_not_one(sets, key, says):
 def test_refuses_a_stiffness_under_an_approach_and_one_that_wears():
     text = both(SMALL_PATCH + LAW + TRIANGLE)[0].replace('load = "26 lbf"', "")
     text += '[contact.approach]\ndistance = "0.2 um"\n'
-    assert "or contact.load in place of the approach" in mistakes(text)[0]
+    assert "or contact.load in place of [contact.approach]" in mistakes(text)[0]
     worn = both(SMALL_PATCH + LAW + TRIANGLE)[0] + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1e5\n' \
         '[wear.friction]\ndepth = ["0 um", "1 um"]\nbond_length_factor = [1, 2]\n'
     assert "give friction.bond_length" in mistakes(worn)[0]

@@ -94,7 +94,7 @@ def test_exact_a_sweep_goes_on_from_each_of_two_runs(place):
     (["wear.start=one/summary.json"], "not the result.nc of a run with [wear]"),
     (["wear.start=new.nc"], "not the result.nc of a run with [wear]"),
     (["wear.start=one/result.nc", "contact.length=10 mm", "wear.upper_share=0.6"],
-     "that run wore other pieces: contact.length, wear.upper_share differ"),
+     "are not those of this scene (contact.length, wear.upper_share differ"),
     (["wear.start=nowhere.nc"], "there is no file")])
 def test_refuses_what_is_no_worn_depth_of_these_pieces(place, sets, told):
     if not (place / "new.nc").exists():
@@ -109,7 +109,7 @@ def test_refuses_a_trace_that_was_not_worn(place):
     rows = (f"{x},{(x / 6400 - 1)**2}" for x in range(0, 12801, 100))
     (place / "bulge.csv").write_text("\n".join(("x_um,z_um", *rows)))
     scene = loads(SCENE, place / "a.toml", ["wear.start=one/result.nc", "contact.profile.file=bulge.csv"])
-    with pytest.raises(PatchfemError, match="its unworn surfaces differ from those of this scene"):
+    with pytest.raises(PatchfemError, match="the unworn surfaces of that run differ from those of this scene"):
         pf.run(scene)
 
 

@@ -108,13 +108,12 @@ def test_exact_a_resumed_run_has_the_same_bits():
 
 @pytest.mark.parametrize("sets, told", [
     (['wear.friction.depth=["1 um","2 um"]'], "wear.friction.depth: depths that rise from 0 are needed"),
-    (['wear.friction.depth=["0 um","1 um","3 um"]'], "2 factors at 3 depths; give one at each"),
+    (['wear.friction.depth=["0 um","1 um","3 um"]'], "2 factors for 3 depths; give one factor for each"),
     (['wear.friction.depth=["0 um"]'], "wear.friction.depth: at least 2 values are needed, not 1"),
-    (["wear.friction.coefficient_factor=[1.1,2]"], "1.1 at depth 0, where [friction] itself describes the unworn "
-                                                   "contact"),
+    (["wear.friction.coefficient_factor=[1.1,2]"], "the first factor must be 1, not 1.1, because [friction] itself"),
     (["friction.law=coulomb", "wear.friction.bond_length_factor=[1,2]"], "law 'coulomb' has no bond_length"),
     (["contact.grooves.wavelength=80 um", "contact.grooves.amplitude=20 um", "wear.friction.coefficient_factor=[1,2]"],
-     "locks on the flanks of the new grooves, of slope 1.5708; factors below 1.59155 are needed"),
+     "lock on the flanks of the unworn grooves (slope 1.5708); factors below 1.59155 are needed"),
 ])
 def test_refuses_a_table_that_makes_no_sense(sets, told):
     with pytest.raises(SceneError) as error:

@@ -75,7 +75,7 @@ def test_exact_a_text_gives_the_value_beside_it():
     ("friction.static=-inf", "a plain number is needed, not -inf"), ("structure.mode.axial.slide=nan", "not nan"),
     ("contact.load=nan N", "is not a finite number"), ("friction.static=-1..2:3log", "both ends > 0"),
     ("friction.static=0.1..0.1:3", "both ends are the same"),
-    ("friction.static=0.1,,0.2", "an empty value"),
+    ("friction.static=0.1,,0.2", "no value between"),
     ("contact.pairs=1..4:3", "a whole number is needed"),
     ("contact.tilt.angle=1 mrad,0.001 rad", "is given twice"),
     ("contact.tilt.angle", "table.key=v1,v2"),
@@ -106,7 +106,7 @@ def test_exact_drawn_values_lie_between_the_ends():
     np.testing.assert_allclose(span.axis([0, 0.25, 0.5, 1]).values, [1e-3, 10**-2.5, 1e-2, 1e-1], rtol=1e-14)
     even = axis("friction.static=0.2..0.6:lin", sampled=True)
     np.testing.assert_allclose(even.axis([0, 0.25, 1]).values, [0.2, 0.3, 0.6], rtol=1e-14)
-    assert "a whole number takes no range" in read(["contact.pairs=1..4"], True)[1][0]
+    assert "takes whole numbers takes no range" in read(["contact.pairs=1..4"], True)[1][0]
     assert "leave out :9" in read(["friction.static=0.2..0.6:9"], True)[1][0]
 
 
@@ -149,5 +149,5 @@ def test_refuses_mistakes_of_the_table_with_their_lines():
 
 
 def test_refuses_one_run_of_many_cases():
-    with pytest.raises(PatchfemError, match=r"sweep: one run cannot compute its 12 cases; use `patchfem sweep`"):
+    with pytest.raises(PatchfemError, match=r"sweep: has 12 cases, but a single run computes only one; use `patch"):
         pf.run(SWEPT)

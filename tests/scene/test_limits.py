@@ -21,10 +21,11 @@ UNBUILT = "not supported yet"
 
 # (text, sets, key, what the message says)
 REFUSED = [
-    (RIG, [SHEAR, "contact.strips.count=8"], "contact.strips", "with [contact.shear]; leave one of them out"),
+    (RIG, [SHEAR, "contact.strips.count=8"], "contact.strips", "with [contact.shear]; leave one of the two out"),
     (PATCH_BENCH, [SHEAR, *REPORT[:2], "friction.order=2", "friction.breakaway=0.1"], "friction.breakaway",
      "not supported yet with order = 2 and [contact.shear]; use order = 1"),
-    (PATCH_BENCH, [SHEAR, "friction.kinetic=0.2"], "friction.kinetic", "is not supported yet; leave kinetic out"),
+    (PATCH_BENCH, [SHEAR, "friction.kinetic=0.2"], "friction.kinetic",
+     "is not supported yet; leave out the key kinetic"),
     (RIG, [SHEAR, COULOMB, "friction.kinetic=0.2"], "friction.kinetic", "0.2 below static = 0.3 with"),
     (PATCH_BENCH, ["contact.crown.radius=1 m", LOWER], "contact.tilt.on", "put all shapes on one piece"),
     (RIG, ["contact.crown.radius=1 m", "contact.crown.on=lower"], "contact.crown.on", "supported yet; put all "
@@ -40,17 +41,17 @@ REFUSED = [
      "accuracy.method", "'harmonic' with law 'coulomb', whose force jumps, and structure.bonded.wavelength"),
 ]
 PLAIN = [
-    (RIG, [SHEAR, "friction.static=0"], "friction.static", "no point carries friction; static > 0 is needed"),
+    (RIG, [SHEAR, "friction.static=0"], "friction.static", "static: must be > 0 with"),
     (PATCH_BENCH, [SHEAR, "friction.static=0"], "friction.static", "or leave out [contact.shear]"),
     (RIG, ["accuracy.method=exact"], "accuracy.method", "no exact solution exists for law 'nonlocal'; use 'march'"),
     (RIG, ["accuracy.method=exact", PLASTIC, "structure.stiffening.cubic=1e12 N/m^3"], "accuracy.method",
      "no exact solution exists with [structure.stiffening]; use 'march' or leave"),
     (RIG, ["accuracy.method=exact", PLASTIC, SHEAR, "structure.mode.second.pitch=1 rad/m"], "accuracy.method",
      "no exact solution exists with a mode's pitch"),
-    (LINEAR, ["drive.cycles=0.2"], "drive.cycles", "at least a quarter of a cycle is needed, cycles >= 0.25, not 0.2"),
-    (LINEAR, [STEADY, "drive.kind=free", "drive.displacement=1 mm"], "accuracy.method", "steady motion under a sine"),
-    (LINEAR, [STEADY, "drive.waveform=step"], "accuracy.method", "use 'march' or leave method out"),
-    (RIG, ["drive.cycles=1e-9"], "drive.cycles", "at least a quarter of a cycle is needed"),
+    (LINEAR, ["drive.cycles=0.2"], "drive.cycles", "at least a quarter of a cycle: cycles >= 0.25 is needed, not 0.2"),
+    (LINEAR, [STEADY, "drive.kind=free", "drive.displacement=1 mm"], "accuracy.method", "finds only steady motion"),
+    (LINEAR, [STEADY, "drive.waveform=step"], "accuracy.method", "use 'march' or leave `method` out"),
+    (RIG, ["drive.cycles=1e-9"], "drive.cycles", "at least a quarter of a cycle"),
 ]
 
 
@@ -69,7 +70,7 @@ def test_refuses_at_the_line_of_the_file():
         f"a.toml:{line_of(text, 'on =')}: contact.tilt.on: 'lower' with friction.breakaway and [contact.shear] "
         "is not supported yet; put the shapes on the upper piece",
         f"a.toml:{line_of(text, 'method')}: accuracy.method: no exact solution exists for law 'nonlocal' with "
-        "[contact.shear]; use 'march' or leave method out",
+        "[contact.shear]; use 'march' or leave `method` out",
     ]
 
 
@@ -81,15 +82,16 @@ def test_refuses_combinations_beside_the_list_of_keys():
 def test_refuses_a_rig_in_which_nothing_slides():
     text = RIG.replace("slide = 0.8", "slide = 0.0").replace("slide = 0.1", "slide = 0.0")
     message = only(text)
-    assert message.startswith(f"a.toml:{line_of(text, 'slide')}: structure.mode.axial.slide: slide is 0 in every mode")
+    assert message.startswith(f"a.toml:{line_of(text, 'slide')}: structure.mode.axial.slide: `slide` is 0 in every "
+                              "mode")
     assert loads(RIG, sets=["structure.mode.axial.slide=0"]).structure.mode[1].slide == 0.1
     assert loads(text[text.index("[structure]") :]).kind == "linear"
 
 
 def test_refuses_a_duration_below_a_quarter_of_a_cycle():
     text = LINEAR.replace("cycles = 200", 'duration = "1 ms"')
-    assert f"a.toml:{line_of(text, 'duration')}: drive.duration: at least a quarter of a cycle is needed" in only(text)
-    assert only(text).endswith("duration >= 0.00174825 s, not 0.001 s")
+    assert f"a.toml:{line_of(text, 'duration')}: drive.duration: the run must last at least a" in only(text)
+    assert only(text).endswith("duration >= 0.00174825 s is needed, not 0.001 s")
     assert loads(text, sets=["drive.duration=1.75 ms"]).drive.duration == 1.75e-3
     assert loads(LINEAR, sets=["drive.cycles=0.25"]).drive.cycles == 0.25
 
@@ -131,7 +133,7 @@ def test_exact_what_runs_is_let_through(text, sets, kind):
         (RIG, ["friction.kinetic=0.2"], "friction.kinetic has no effect while the bond length is constant; "
                                         "add rest_growth and slip_growth"),
         (PATCH, ["contact.mesh=a.msh", "contact.element_size=100 um"],
-         "contact.element_size is not used with contact.mesh, whose file gives the elements"),
+         "contact.element_size is not used, because the file of contact.mesh gives the elements"),
     ],
 )  # fmt: skip
 def test_exact_remarks_on_what_has_no_effect(text, sets, remark):

@@ -120,9 +120,9 @@ def _written(folder, text):
 
 
 REFUSED = {
-    ("boundary", "[40, 25]", "[40, 41]"): "there is no coordinate 41: the matrices have 40, counted from 1",
+    ("boundary", "[40, 25]", "[40, 41]"): "there is no coordinate 41: the matrices have 40, numbered from 1",
     ("boundary", "[40, 25]", "[40, 40]"): "names 40 twice; name each coordinate once",
-    ("boundary", "[40, 25]", '["40:x", 2]'): "'40:x' names a node, but the files name none",
+    ("boundary", "[40, 25]", '["40:x", 2]'): "'40:x' names a node, but the files name no nodes",
     ("boundary", "[40, 25]", "[]"): "whole numbers are needed, such as [1, 2]",
     ("mass", '"both.npz"', '"k.mtx"'): "contains the same numbers as the stiffness; give the file of the mass",
     ("stiffness", "k.mtx", "k.txt"): "the name ends in '.txt'",
@@ -134,8 +134,8 @@ REFUSED = {
     ("damping", '"both.npz"\nboundary', "1.5\nboundary"): "must be < 1, not 1.5",
     ("modes", "modes = 4", "modes = -1"): "must be >= 0, not -1",
     ("moved", "modes = 4", 'modes = 4\nmoved = ["1..60"]'): "'1..60' is not a range of rows from 1 to 40",
-    ("unit", "modes = 4", 'modes = 4\nunit = "1 kg"'): "'kg' is a unit of mass, but this is a length",
-    ("slide", "modes = 4", "modes = 4\nslide = [1, 0]"): "is given with [friction]",
+    ("unit", "modes = 4", 'modes = 4\nunit = "1 kg"'): "'kg' is a unit of mass, but a length is needed",
+    ("slide", "modes = 4", "modes = 4\nslide = [1, 0]"): "applies only to [friction]",
 }
 
 
@@ -173,7 +173,7 @@ def test_refuses_a_patch_beside_interfaces_with_what_goes(folder):
     """What is advised, for one interface or several, is a scene that can run."""
     for text in (SCENE, SCENE.replace("[drive]", OTHER)):
         answer = cli("check", _written(folder, PATCH + text))
-        assert answer.code == 2 and "write it as [structure.interface.contact] below the interface" in answer.err
+        assert answer.code == 2 and "move [contact] into the interface that it presses" in answer.err
         own = PATCH.replace("[contact", "[structure.interface.contact")
         for load in ('load = "50 N"\n', 'load = "9 N"\n'):
             text = text.replace(load, "")

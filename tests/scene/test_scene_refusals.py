@@ -31,7 +31,7 @@ BAD_VALUES = [
     ('load = "26 lb"', "contact.load", "did you mean 'lbf'"),
     ("load = 26", "contact.load", "a bare number without a unit; a force with its unit is needed, such as '26 lbf'"),
     ('load = "26#"', "contact.load", "'#' is ambiguous"),
-    ('load = "6 mil"', "contact.load", "'mil' is a unit of length, but this is a force; use one of N, kN, lbf, kgf"),
+    ('load = "6 mil"', "contact.load", "'mil' is a unit of length, but a force is needed; use one of N, kN, lbf, kgf"),
     ('load = "-1 N"', "contact.load", "must be >= 0, not '-1 N'; a force"),
     ('load = "nan N"', "contact.load", "not a finite number"),
     ('load = "1e999 N"', "contact.load", "too large"),
@@ -42,11 +42,11 @@ BAD_VALUES = [
     ('length = "0 mm"', "contact.length", "must be > 0"),
     ('width = "3 Ra"', "contact.width", "unknown unit 'Ra'"),
     ('height = "1 volt/0.001 in"', "contact.height", "use one of m, km"),
-    ('substrate = "Ti-8Al"', "contact.substrate", "did you mean 'Ti-8Al-1Mo-1V'? one of Ti-8Al-1Mo-1V, WC-Co"),
+    ('substrate = "Ti-8Al"', "contact.substrate", "did you mean 'Ti-8Al-1Mo-1V'? use one of Ti-8Al-1Mo-1V, WC-Co"),
     ("substrate = 3", "contact.substrate", "a material name or {young ="),
-    ('material = "xyz"', "contact.coating.material", "unknown material 'xyz'; one of Ti-8Al-1Mo-1V"),
-    ('thickness = "6.35 mm"', "contact.coating.thickness", "must be thinner than the height"),
-    ('law = "nonlocl"', "friction.law", "did you mean 'nonlocal'? one of coulomb, tanh"),
+    ('material = "xyz"', "contact.coating.material", "unknown material 'xyz'; use one of Ti-8Al-1Mo-1V"),
+    ('thickness = "6.35 mm"', "contact.coating.thickness", "must be thinner than its piece"),
+    ('law = "nonlocl"', "friction.law", "did you mean 'nonlocal'? use one of coulomb, tanh"),
     ("law = 3", "friction.law", "one of coulomb, tanh, elastic-plastic, nonlocal, convolution"),
     ('static = "0.3"', "friction.static", "a plain number is needed, not '0.3'"),
     ("static = true", "friction.static", "a plain number is needed, not true"),
@@ -55,10 +55,10 @@ BAD_VALUES = [
     ("static = inf", "friction.static", "a plain number is needed, not inf"),
     ("static = 1979-05-27", "friction.static", "a plain number is needed"),
     ('moving_mass = "-1 kg"', "structure.moving_mass", "must be > 0"),
-    ('moving_mass = "1 N"', "structure.moving_mass", "'N' is a unit of force, but this is a mass"),
+    ('moving_mass = "1 N"', "structure.moving_mass", "'N' is a unit of force, but a mass is needed"),
     ("damping = -1.0", "structure.mode.axial.damping", "must be > -1"),
     ('frequency = "-1 Hz"', "structure.mode.axial.frequency", "must be >= 0"),
-    ('kind = "bass"', "drive.kind", "did you mean 'base'? one of base, force, free"),
+    ('kind = "bass"', "drive.kind", "did you mean 'base'? use one of base, force, free"),
     ("cycles = 0", "drive.cycles", "must be > 0"),
     ("title = 5", "title", "a text in quotes is needed, not 5"),
 ]
@@ -82,7 +82,7 @@ BAD_SETS = [
     ("friction.initial_bonds=-0.1", "friction.initial_bonds", "must be >= 0"),
     ("friction.breakaway=1.01", "friction.breakaway", "must be <= 1"),
     ("friction.breakaway=-0.1", "friction.breakaway", "must be >= 0"),
-    ("friction.reading=reprot", "friction.reading", "did you mean 'report'? one of stretch, report"),
+    ("friction.reading=reprot", "friction.reading", "did you mean 'report'? use one of stretch, report"),
     ("friction.temperature=5", "friction.temperature", "a table [friction.temperature] is needed, not 5"),
     ("contact.pairs=0", "contact.pairs", "must be >= 1, not 0; a whole number"),
     ("contact.pairs=1.5", "contact.pairs", "a whole number is needed, not 1.5"),
@@ -93,18 +93,18 @@ BAD_SETS = [
     ("contact.lower.length=12.7000001 mm", "contact.lower.length", "write the same length for both"),
     ("contact.lower.chamfer=-1 mm", "contact.lower.chamfer", "must be > 0"),
     ("contact.lower.chamfer=6.2 mm", "contact.lower.chamfer", "do not fit into the height"),
-    ("contact.lower.end_radius=6.4 mm", "contact.lower.end_radius", "leaves no face"),
+    ("contact.lower.end_radius=6.4 mm", "contact.lower.end_radius", "leaves no flat face"),
     ("contact.upper.chamfer=1 nm", "contact.upper.chamfer", "less than 1e-5 of the length"),
-    ("contact.load_line.offset=1 mm", "contact.load_line", "without [contact.holder]"),
-    ("contact.crown.radius=-1 m", "contact.crown.radius", "for a hollow leave out [contact.crown]"),
+    ("contact.load_line.offset=1 mm", "contact.load_line", "unless [contact.holder]"),
+    ("contact.crown.radius=-1 m", "contact.crown.radius", "for a hollow surface leave out [contact.crown]"),
     ("contact.crown.radius=0 m", "contact.crown.radius", "must be > 0"),
     ("contact.tilt.on=both", "contact.tilt.on", "one of upper, lower"),
     ("structure.mode.axal.frequency=1 Hz", "structure.mode.axal", "did you mean 'axial'?"),
-    ("structure.mode.second.base=0.7", "structure.mode.axial.slide", "sum of base^2"),
+    ("structure.mode.second.base=0.7", "structure.mode.axial.slide", "sum of `base`^2"),
     ("structure.mode.second.name=axial", "structure.mode[2].name", "two modes are named"),
     ("structure.travel=-1 mm", "structure.travel", "must be > 0"),
-    ("drive.displacement=1 mm", "drive.displacement", "acceleration and displacement exclude each other"),
-    ("drive.duration=1 s", "drive.duration", "cycles and duration exclude each other"),
+    ("drive.displacement=1 mm", "drive.displacement", "`acceleration` and `displacement` exclude each other"),
+    ("drive.duration=1 s", "drive.duration", "`cycles` and `duration` exclude each other"),
     ("drive.wavform=sine", "drive.wavform", "unknown key; did you mean 'waveform'?"),
     ("drive.zzz=1", "drive.zzz", "unknown key; known here: kind, waveform, frequency, from, to"),
     ("contact.shear.k=1", "contact.shear.k", "unknown key; this table has no keys"),
@@ -112,7 +112,7 @@ BAD_SETS = [
     ("strucure.moving_mass=1 kg", "strucure", "unknown table; did you mean 'structure'?"),
     ("accuracy.tolerance=0", "accuracy.tolerance", "must be > 0"),
     ("accuracy.tolerance=-1e-3", "accuracy.tolerance", "must be > 0"),
-    ("accuracy.method=exakt", "accuracy.method", "did you mean 'exact'? one of auto, exact"),
+    ("accuracy.method=exakt", "accuracy.method", "did you mean 'exact'? use one of auto, exact"),
     ("accuracy.steps_per_cycle=3", "accuracy.steps_per_cycle", "must be >= 4"),
     ("accuracy.steps_per_cycle=400.5", "accuracy.steps_per_cycle", "a whole number is needed, not 400.5"),
     ("contact.load.x=1", "contact.load.x", "contact.load is a value, not a table"),
@@ -188,12 +188,12 @@ def test_refuses_a_key_missing_for_the_selector(sets, key, says):
 def test_refuses_kinetic_for_laws_with_one_coefficient(law):
     found = mistakes(BENCH, f"friction.law={law}", "friction.kinetic=0.2", "friction.bond_length=1 um",
                      "friction.reference_speed=1 mm/s")  # fmt: skip
-    assert found == [f"--set: friction.kinetic: law '{law}' has only one coefficient; "
-                     "laws with a kinetic coefficient are coulomb, nonlocal and lugre"]  # fmt: skip
+    assert found == [f"--set: friction.kinetic: law '{law}' has only one coefficient of friction; laws with a kinetic "
+                     "coefficient are coulomb, nonlocal and lugre"]  # fmt: skip
 
 
 def test_refuses_first_bonds_that_hold_any_force_beside_shear():
-    assert "bonds at rest have an unbounded" in only(RIG, "contact.shear={}", "friction.reading=report",
+    assert "gives points that no force can move" in only(RIG, "contact.shear={}", "friction.reading=report",
                                                    "friction.order=-0.5")
     sets = ["contact.shear={}", "friction.reading=report", "friction.order=-0.5", "friction.initial_bonds=0"]
     assert loads(RIG, sets=sets).friction.initial_bonds == 0
@@ -216,7 +216,7 @@ def test_refuses_load_lines_outside_the_patch():
 def test_refuses_a_free_roll_without_a_load_or_a_second_strip():
     at, text = "contact.strips.offset", PATCH + '[contact.strips]\ncount = 4\noffset = "1 mm"\n'
     assert loads(text).contact.strips.offset == 1e-3
-    assert "keep one of the two" in only(text, "contact.strips.roll=1 mrad")
+    assert "keep only one of these two keys" in only(text, "contact.strips.roll=1 mrad")
     assert "raise contact.strips.count" in only(text, "contact.strips.count=1")
     assert "|offset| < 0.0047625 m" in only(text, f"{at}=-4.7625 mm")
     approach = text.replace('load = "26 lbf"', "") + '[contact.approach]\ndistance = "1 um"\n'
@@ -231,8 +231,8 @@ def test_refuses_approach_together_with_load():
 COMBINATIONS = [
     ("", "a.toml: missing [contact]: "),
     ('[measured]\nfile = "x"\n', "a.toml: missing [contact]: "),
-    (RIG[: RIG.index("[drive]")], "a.toml: missing [drive]: [structure] needs it"),
-    (LINEAR[LINEAR.index("[drive]") :], "a.toml: missing [structure]: [drive] needs it"),
+    (RIG[: RIG.index("[drive]")], "a.toml: missing [drive]: [structure] needs this table"),
+    (LINEAR[LINEAR.index("[drive]") :], "a.toml: missing [structure]: [drive] needs this table"),
     (PATCH + LINEAR, "a.toml: missing [friction]: "),
     (BENCH[: BENCH.index("[slide]")], "a.toml: missing [slide]: friction needs a motion"),
     (BENCH[BENCH.index("[friction]") :], "a.toml: missing [contact]: friction needs a normal load"),
@@ -300,7 +300,7 @@ def test_refuses_a_value_without_its_quotes_or_digits_by_how_it_is_written(text,
 
 
 def test_refuses_odd_keys_and_huge_numbers_with_one_line_each():
-    assert "sum of base^2" in only(RIG, "structure.mode.axial.base=1e40")
+    assert "sum of `base`^2" in only(RIG, "structure.mode.axial.base=1e40")
     assert "outside the computable range" in only(RIG, "structure.mode.axial.base=1e200")
     assert "outside the computable range" in only(RIG, "structure.mode.axial.frequency=1e300 Hz")
     assert "outside the computable range" in only(RIG, "structure.moving_mass=1e-300 kg")
@@ -397,10 +397,11 @@ cycles = 2
 
 OUTLINES = [
     ('[contact.upper]\nchamfer = "1 mm"\nend_radius = "1 mm"\n', (), "contact.upper.end_radius", "exclude each other"),
-    ('[contact.upper]\nlength = "8 mm"\n', ("contact.element_size=9 mm",), "contact.element_size", "the interface,"),
+    ('[contact.upper]\nlength = "8 mm"\n', ("contact.element_size=9 mm",), "contact.element_size", "the interface of"),
     ('[contact.upper]\nlength = "8 mm"\n', ("contact.load_line.offset=4 mm",), "contact.load_line.offset", "outside"),
     ('[contact.lower]\nchamfer = "3 mm"\n', ('contact.step={height="1 um",at="4 mm"}',), "contact.step.at", "outside"),
-    *((f'mesh = "a.msh"\n[contact.lower]\n{key} = "1 mm"\n', (), f"contact.lower.{key}", "is given with contact.mesh")
+    *((f'mesh = "a.msh"\n[contact.lower]\n{key} = "1 mm"\n', (), f"contact.lower.{key}", "cannot be used with "
+                                                                                         "contact.mesh")
       for key in ("length", "chamfer", "end_radius")),
 ]
 

@@ -154,7 +154,7 @@ def test_exact_starts_of_a_scene():
 
 
 @pytest.mark.parametrize("sets, key, says", [
-    (["structure.spring.0.between=[3, 0]"], "structure.spring[1].between", "there is no mass 3: masses has 2"),
+    (["structure.spring.0.between=[3, 0]"], "structure.spring[1].between", "no mass 3: structure.masses has 2"),
     (["structure.spring.0.between=[1, 1]"], "structure.spring[1].between", "joins mass 1 to itself"),
     (["structure.damper.0.between=[0, 0]"], "structure.damper[1].between", "joins the base to itself"),
     (["structure.interface.0.between=[2, 2]"], "structure.interface[1].between", "joins mass 2 to itself"),
@@ -164,8 +164,8 @@ def test_exact_starts_of_a_scene():
     (["structure.masses=[]"], "structure.masses", "at least one mass is needed"),
     (["structure.masses=['1 kg', '0 kg']"], "structure.masses[2]", "must be > 0"),
     (["structure.spring.0.stiffness=-1 N/m"], "structure.spring[1].stiffness", "must be >= 0"),
-    (["structure.start.displacement=['1 mm']"], "structure.start.displacement", "1 value for 2 masses; give one for "
-                                                                                "each"),
+    (["structure.start.displacement=['1 mm']"], "structure.start.displacement", "1 value for 2 masses; give one value "
+                                                                                "for each"),
     (["structure.start={}"], "structure.start.displacement", "or structure.start.velocity"),
     (["structure.slide_at=12:+x"], "structure.slide_at", "names a place in a file"),
     (["drive={kind = 'force', mass = 3, force = '1 N', frequency = '1 Hz', cycles = 9}"], "drive.mass", "no mass 3"),
@@ -188,7 +188,7 @@ def test_refuses_at_the_line_of_the_file():
     (MASSES + '[structure.bonded]\nstiffness = "1 N/m"\n', "structure.bonded", "there are 0 interfaces"),
     (RUB + RUB + MASSES + '[structure.bonded]\nstiffness = "1 N/m"\n', "structure.bonded", "there are 2 interfaces"),
     (STRUCTURE + '[structure.start]\nvelocity = ["1 m/s", "2 m/s"]\n', "structure.start.velocity",
-     "2 values for 1 mode; give one for each"),
+     "2 values for 1 mode; give one value for each"),
     (STRUCTURE.replace("cycles", "mass = 1\ncycles").replace('"base"', '"force"').replace(
         "acceleration", 'force = "1 N"\nacceleration'), "drive.mass", "leave drive.mass out"),
     (STRUCTURE[:STRUCTURE.index("[[")].replace("moving", 'file = "rig.csv"\nmoving') +
@@ -269,7 +269,7 @@ def test_refuses_files_at_the_line_of_the_scene(tmp_path):
         plan(write_scene(tmp_path, FILE))
     assert str(caught.value).startswith(f"{tmp_path / 'scene.toml'}:2: structure.file: lacks output")
     np.savez(tmp_path / "rig.npz", M=M, K=K, output=[0, 1])
-    with pytest.raises(PatchfemError, match=r"structure\.file: lacks slide"):
+    with pytest.raises(PatchfemError, match=r"structure\.file: lacks `slide`"):
         modes_of(write_scene(tmp_path, POINT + FILE))
     late = write_scene(tmp_path, FILE + '[structure.start]\nvelocity = ["1 m/s"]\n')
     with pytest.raises(PatchfemError, match=r":8: structure\.start: 1 values are given for 2 modes or masses"):
@@ -292,11 +292,12 @@ MODES = STRUCTURE + '[[structure.mode]]\nname = "3"\nfrequency = "160 Hz"\ndampi
     ("structure.spring[2].stiffness", "structure.spring[2].stiffness: a bare number", MASSES),
     ("structure.mode[1].frequency", "structure.mode.axial.frequency: a bare number", MODES),
     ("structure.mode[2].frequency", "structure.mode[2].frequency: a bare number", MODES),  # its name is "3"
-    ("structure.spring[9].stiffness", "structure.spring[9]: no such item here; structure.spring has 2, counted from "
-     "one as in structure.spring[1]", MASSES),
-    ("structure.mode[9].damping", "structure.mode[9]: no such item here; one of axial, 3", MODES),
-    ("structure.mode.9.damping", "structure.mode.9: no such item here; one of axial, 3; structure.mode.0, with a dot, "
-     "is structure.mode[1]", MODES),  # it once answered structure.mode[10], which nobody had written
+    ("structure.spring[9].stiffness", "structure.spring[9]: no such item here; structure.spring has 2, numbered from 1 "
+                                      "as in structure.spring[1]", MASSES),
+    ("structure.mode[9].damping", "structure.mode[9]: no such item here; use one of axial, 3", MODES),
+    ("structure.mode.9.damping", "structure.mode.9: no such item here; use one of axial, 3; structure.mode.0, "
+                                 "with a dot, means structure.mode[1]", MODES),
+    # it once answered structure.mode[10], which nobody had written
     ("structure.mode.axil.damping", "structure.mode.axil: no 'axil' here; did you mean 'axial'?", MODES)])
 def test_exact_items_count_from_one_where_people_read_and_write(key, message, text):
     text = POINT + text if text is MODES else text
@@ -306,7 +307,7 @@ def test_exact_items_count_from_one_where_people_read_and_write(key, message, te
 def test_exact_a_remark_counts_a_mode_whose_name_is_a_number_from_one():
     """It once named structure.mode[4] where the name is "3"."""
     assert loads(POINT + MODES, sets=["structure.mode[2].damping=0.7"]).remarks == [
-        "structure.mode[2].damping = 0.7 is a damping ratio: 1 is critical, and 1 % is written 0.01"]
+        "structure.mode[2].damping = 0.7 is a damping ratio: 1 means critical damping, and 1 % is written 0.01"]
 
 
 def test_exact_an_item_by_its_number_from_one_is_the_one_that_python_counts_from_zero():
@@ -357,7 +358,7 @@ def test_refuses_other_masses_beside_a_contact_by_the_same_way_out(rest):
     pair = "[1, 2]" if "masses" in rest else "[1, 0]"
     spring = f'[[structure.spring]]\nbetween = {pair}\nstiffness = "200 kN/m"\n'
     found = refusal(BLOCK + COULOMB + "[structure]\n" + rest + spring + PUSH)
-    assert "with [contact], give" in found and "write [[structure.interface]]" not in found
+    assert "with [contact], " in found and "write [[structure.interface]]" not in found
     assert ('frequency = "41.0936 Hz"' in found) == ("moving" in rest)
 
 

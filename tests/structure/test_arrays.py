@@ -71,7 +71,7 @@ def test_exact_modal_file(tmp_path):
 
 
 @pytest.mark.parametrize("change, says", [
-    ({"K": None}, "lacks the matrix K; it contains M, C, slide"), ({"M": None, "K": None}, "lacks M and K, or omega"),
+    ({"K": None}, "lacks the matrix K; the file contains M, C"), ({"M": None, "K": None}, "lacks M and K, or omega"),
     ({"slide": None}, "lacks output"), ({"slide": np.ones(3)}, "slide has shape (3,), but M has 2"),
     ({"slide": np.array(["a", "b"])}, "slide does not contain real numbers"),
     ({"base": np.ones(5)}, "base has shape (5,)"),
@@ -86,9 +86,9 @@ def test_refuses_matrices_that_lack_something(change, says):
 
 
 @pytest.mark.parametrize("change, says", [
-    ({"damping": None}, "lacks damping of the modes; it contains frequency"), ({"base": None}, "lacks base of the"),
+    ({"damping": None}, "lacks damping of the modes; the file contains"), ({"base": None}, "lacks base of the"),
     ({"moving_mass": None}, "lacks moving_mass > 0"), ({"slide": np.ones(3)}, "slide has shape (3,), but there are 2"),
-    ({"frequency": np.array([-1.0, 2.0])}, "frequencies must be >= 0"), ({"base": np.ones(2)}, "the sum of base^2"),
+    ({"frequency": np.array([-1.0, 2.0])}, "frequencies must be >= 0"), ({"base": np.ones(2)}, "the sum of `base`^2"),
     ({"damping": np.array([-0.1, 0.1])}, "damping must be >= 0"), ({"output": np.array([np.nan, 0])}, "not finite"),
     ({"damping": -np.eye(2)}, "damping adds energy"), ({"damping": np.full(2, 0.1j)}, "damping is complex"),
     ({"slide": np.array(["a", "b"])}, "does not contain real numbers"),
@@ -103,7 +103,7 @@ def test_refuses_modes_that_lack_something(change, says):
 def test_refuses_interfaces_that_are_not_there():
     bare = {key: FULL[key] for key in "MK"} | {"output": np.ones(2)}
     for data, pairs, pushed, says in ((bare, [(3, 0)], None, "there is no coordinate 3: M has 2"),
-                                      (FULL, [(1, 0)], None, "contains slide, but"),
+                                      (FULL, [(1, 0)], None, "contains `slide`, but"),
                                       (FULL, [], 9, "no coordinate 9"), (MODAL, [(1, 0)], None, "no numbered masses")):
         with pytest.raises(PatchfemError) as caught:
             arrays.basis(data, pairs, pushed, forced=pushed is not None)

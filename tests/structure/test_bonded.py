@@ -84,7 +84,7 @@ def test_exact_a_rigid_mode_that_a_joint_held_is_rigid_again():
 
 
 def test_refuses_a_joint_stiffer_than_the_modes():
-    with pytest.raises(PatchfemError, match=r"has 111\.1 % of the stiffness"):
+    with pytest.raises(PatchfemError, match=r"is 111\.1 % of the stiffness"):
         freed(one(), [9 * 2 / 0.64 / 0.9])
     with pytest.raises(PatchfemError, match=r"bonded\.damping is larger than the damping"):
         freed(one(), [5.0], 1.0)

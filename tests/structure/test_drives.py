@@ -173,7 +173,7 @@ def test_refuses_a_drive_that_is_not_whole(drive, key):
 
 @pytest.mark.parametrize("text, word", [
     ("time [s],acceleration [g]\n0,0\n1,0\n", "0 in every row"), ("time [s],force [N]\n0,0\n1,1\n", "acceleration"),
-    ("time [s],acceleration [g]\n0,1\n0,2\n", "rising"), ("time [s],acceleration\n0,1\n1,2\n", "acceleration"),
+    ("time [s],acceleration [g]\n0,1\n0,2\n", "strictly rise"), ("time [s],acceleration\n0,1\n1,2\n", "acceleration"),
 ])
 def test_refuses_a_broken_signal(tmp_path, text, word):
     (tmp_path / "shake.csv").write_text(text, "utf-8")

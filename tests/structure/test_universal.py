@@ -138,12 +138,13 @@ def test_exact_places_give_the_basis(tmp_path):
 
 
 @pytest.mark.parametrize("where, says", [
-    ({"slide_at": "99:+y"}, "structure.slide_at: the file has no motion of 99:y; it has 11:x, 11:y, 11:z"),
+    ({"slide_at": "99:+y"}, "structure.slide_at: the file has no motion of 99:y; the file has 11:x, 11:y, 11:z"),
     ({"slide_at": "twelve"}, "structure.slide_at: 'twelve' is not a node with a direction; write node:direction"),
     ({"slide_at": "12:+x"}, "structure.slide_at: no mode of the file moves '12:+x'"),
     ({"slide_at": "12:+y", "output_at": "11:+z"}, "structure.output_at: no mode of the file moves"),
     ({"slide_at": "12:+ry"}, "structure.slide_at: the file has no motion of 12:ry"),
-    ({"slide_at": "12:+y", "base_at": "13:y"}, "structure.base_at: the modes contain 4 of moving_mass"),
+    ({"slide_at": "12:+y", "base_at": "13:y"}, "structure.base_at: at this place the modes contain 4 times "
+                                               "structure.moving_mass"),
 ])  # fmt: skip
 def test_refuses_places_that_are_not_there(tmp_path, where, says):
     shapes = universal.read(write(tmp_path / "a.uff", normal_modes()))
@@ -155,10 +156,10 @@ def test_refuses_places_that_are_not_there(tmp_path, where, says):
 @pytest.mark.parametrize("sets, says", [
     (normal_modes((1.0, 0.0, 1.0)), "mode 2 ("), (normal_modes(modal_m=0.0), "has no modal mass"),
     (normal_modes(modal_damp_vis=-0.01), "both must be >= 0"),
-    (responses(12, orddenom_spec_data_type=12), "is type 12 over 12; displacement (8), velocity (11)"),
+    (responses(12, orddenom_spec_data_type=12), "is a response of type 12 per input of type 12; displacement (8)"),
     (responses(8, func_type=1), "dataset 58 contains no frequency response function"),
-    (responses(12, ref_node=99), "no response at the driven point itself (99:y)"),
-    (responses(12)[:2] + responses(12, every=0.25)[2:], "has other frequencies than the first"),
+    (responses(12, ref_node=99), "a response at the driven point itself (99:y)"),
+    (responses(12)[:2] + responses(12, every=0.25)[2:], "is given at other frequencies than the first"),
     ([{"type": 164, "units_code": 1, "units_description": "SI", "temp_mode": 1, "length": 1.0, "force": 1.0,
        "temp": 1.0, "temp_offset": 0.0}], "has neither mode shapes (dataset 55"),
 ])  # fmt: skip

@@ -54,11 +54,11 @@ def tries(tables: dict, key: str, message: str) -> list:
             kind, [beside[1]] if beside else [key] if key.startswith("accuracy.") else [])
         out += [dict.fromkeys(at, word[1:-1]) for word in re.findall(WORD, words) if at]
     if 'use reading = "stretch" with order = 1' in message:
-        more = {"breakaway": None} if "and no breakaway" in message else {}
+        more = {"breakaway": None} if "breakaway" in message else {}
         out.append({f"{one}.{name}": value for one in laws for name, value in (PRINTED | more).items()})
     out += [{key: word} for words in ONE_OF.findall(message) for word in words.split(", ")]
     out += [{key: ("", word)} for word in MEANT.findall(message)]
-    if re.search(r"leave (?:it|method) out", message):
+    if re.search(r"leave (?:it|`?method`?) out", message):
         out.append({key: None})
     if "on the upper piece" in message and key.endswith(".on"):
         out.append({key: "upper"})

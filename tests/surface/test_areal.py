@@ -56,5 +56,5 @@ def test_refuses_rows_that_are_not_there_and_heights_in_one_line():
     line[range(4), range(4)] = 1e-6
     line[0, 0], line[1, 1] = 2e-6, 1e-6
     for heights in (line, np.full((4, 6), np.nan)):
-        with pytest.raises(PatchfemError, match="all in one line; a plane needs three that are not"):
+        with pytest.raises(PatchfemError, match="all lie on one straight line; a plane needs three points"):
             level_plane(scan(heights))

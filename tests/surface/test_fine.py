@@ -97,8 +97,9 @@ def test_exact_uneven_samples_give_the_same_share():
 def test_refuses_fine_waves_with_the_numbers_and_the_remedy():
     profile = Profile(X, cosines([20, 500], [2.0, 1.0]).z, "profile.csv")
     assert too_fine(profile, 100e-6) == (
-        'profile.csv holds 45 % of its height in waves shorter than 2 elements (200 um): add [contact.asperities], '
-        'or set element_size = "25 um" (90 % kept; "25 um" keeps 99 %)')
+        'profile.csv has 45 % of its rms height in waves shorter than 2 elements (200 um), which the mesh cannot '
+        'resolve: add [contact.asperities], or set element_size = "25 um", which keeps 90 % of the height '
+        '("25 um" keeps 99 %)')
     assert too_fine(profile, 25e-6) is None
     assert too_fine(cosines([20, 500], [2.0, 0.1]), 100e-6) is None
     assert too_fine(Profile(X, 0 * X, "flat.csv"), 1.0) is None
@@ -108,6 +109,6 @@ def test_refuses_fine_waves_with_the_numbers_and_the_remedy():
 def test_refuses_missing_heights_and_no_share():
     with pytest.raises(PatchfemError, match=r"a\.csv: 1 heights are missing; clean the trace first"):
         fine_share(Profile(X, np.where(X == X[7], np.nan, X), "a.csv"), 1.0)
-    with pytest.raises(PatchfemError, match="the share kept is 1; it must lie between 0 and 1"):
+    with pytest.raises(PatchfemError, match="must lie between 0 and 1, but is 1"):
         element_for(*spectrum(sine(X, 1.0, LENGTH)), 1.0)
     assert element_for(*spectrum(Profile(X, 0 * X, "a")), 0.9) == np.inf

@@ -54,7 +54,8 @@ def test_exact_the_step_of_the_stylus_is_length_over_points(data):
     profile = dektak(data)
     assert np.diff(profile.x) == pytest.approx(np.full(9599, 1500e-6 / 9600), rel=1e-9)
     assert profile.x[0] == 0 and profile.x[-1] == pytest.approx(9599 * 0.15625e-6, rel=1e-14)
-    assert profile.notes[0].endswith("x is printed to 100 nm; the step is 1.5 mm/9600 = 156.2 nm by the header")
+    assert profile.notes[0].endswith("x is printed only to 100 nm; the step 1.5 mm/9600 = 156.2 nm of the header is "
+                                     "used")
     assert profile.tip_radius == pytest.approx(2.5e-6)
 
 
@@ -142,7 +143,7 @@ def test_exact_a_measured_trace_on_the_nodes_of_a_patch(data):
     """Coarse nodes see the means: their variance is what the waves keep after a box of one element."""
     nodes = np.linspace(-4.9e-3, 4.9e-3, 197)
     trace = level(cleaned(placed(mitutoyo(data), nodes), 1e-4))
-    assert "the trace is centred, x moved by -4.997 mm" in trace.notes[0]
+    assert "the trace is centred on the patch, which adds -4.997 mm to x" in trace.notes[0]
     gap = on_nodes(trace, nodes)
     fine = np.interp(np.linspace(nodes[0], nodes[-1], 196 * 50 + 1), trace.x, trace.z)
     box = np.convolve(fine, np.r_[0.5, np.ones(49), 0.5] / 50, "valid")[25::50]

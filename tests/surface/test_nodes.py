@@ -115,13 +115,13 @@ def test_exact_centred_where_it_does_not_and_said():
     profile = placed(trace(x, x), EVEN)
     assert on_nodes(profile, EVEN) == pytest.approx(EVEN + 7.5e-3, abs=2e-15)
     assert profile.notes == ("before.csv: x from 0 um to 15 mm does not cover the patch, -6.35 mm to 6.35 mm: the "
-                             "trace is centred, x moved by -7.5 mm",)
+                             "trace is centred on the patch, which adds -7.5 mm to x",)
 
 
 def test_exact_coarse_samples_are_said():
     profile = placed(trace(np.linspace(-HALF, HALF, 51), np.zeros(51)), EVEN)
-    assert profile.notes == ("before.csv: samples lie 254 um apart but elements are 63.5 um long, so the surface "
-                             "is taken as straight between samples",)
+    assert profile.notes == ("before.csv: samples lie 254 um apart, but elements are only 63.5 um long; between "
+                             "samples the surface is taken as straight",)
 
 
 def test_exact_half_an_element_goes_on_flat():
@@ -136,7 +136,7 @@ def test_exact_missing_ends_are_no_trace():
     x = np.linspace(-10e-3, 10e-3, 4001)
     z = np.where(np.abs(x - 1e-3) < 7e-3, x, np.nan)
     profile = placed(trace(x, z), EVEN)
-    assert "the trace is centred, x moved by -1 mm" in profile.notes[0]
+    assert "the trace is centred on the patch, which adds -1 mm to x" in profile.notes[0]
     assert not profile.missing.any()
     assert on_nodes(profile, EVEN) == pytest.approx(EVEN + 1e-3, abs=1e-15)
 
@@ -145,12 +145,12 @@ def test_refuses_a_trace_that_does_not_cover_the_patch():
     x = np.linspace(0, 10e-3, 100)
     with pytest.raises(PatchfemError) as caught:
         placed(trace(x, x), EVEN)
-    assert str(caught.value) == ('before.csv: the profile is 10 mm long, the patch 12.7 mm; measure a longer trace or '
-                                 'set contact.length = "10 mm"')
+    assert str(caught.value) == ('before.csv: the profile is 10 mm long, but the patch is 12.7 mm long; measure a '
+                                 'longer trace or set contact.length = "10 mm"')
     with pytest.raises(PatchfemError) as caught:
         placed(trace(2 * x, x), EVEN, "own")
-    assert str(caught.value) == ("before.csv: the profile runs from 0 um to 20 mm, the patch from -6.35 mm to 6.35 mm; "
-                                 "move the profile's x so that it covers the patch")
+    assert str(caught.value) == ("before.csv: the profile runs from 0 um to 20 mm, but the patch reaches from -6.35 mm "
+                                 "to 6.35 mm; shift x so that the profile covers the patch")
     with pytest.raises(PatchfemError, match="the profile runs from 0 um to 20 mm"):
         on_nodes(trace(2 * x, x), EVEN)
 

@@ -50,9 +50,9 @@ def test_exact_planted_spikes_are_found_all_and_only(seed):
     smooth = np.abs(trace.z[hit] - np.interp(trace.x[hit], np.delete(trace.x, hit), np.delete(trace.z, hit)))
     assert np.abs(back.z - trace.z).max() == pytest.approx(smooth.max(), rel=1e-12)
     assert back.notes == (
-        f"self-affine trace (seed {seed}): {hit.size} of 4001 heights are spikes, more than 8 robust standard "
-        f"deviations from the median of 7 samples (the first at x = {say(trace.x[hit[0]])}); straight lines replace "
-        "them",)
+        f"self-affine trace (seed {seed}): {hit.size} of 4001 heights are spikes (the first at x = "
+        f"{say(trace.x[hit[0]])}), which lie more than 8 robust standard deviations from the median of 7 samples; "
+        "straight lines replace these heights",)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -91,8 +91,8 @@ def test_exact_missing_ends_are_cut_off_and_counted():
     z = np.array([np.nan, np.nan, 1, 2, 3, np.nan, np.nan, 6, 7, 8, 9, np.nan]) * UM
     back = cleaned(Profile(x, z, "before.csv", ("first",)), 3 * UM)
     assert back.x == pytest.approx(x[2:11]) and back.z == pytest.approx((x - UM)[2:11])
-    assert back.notes == ("first", "before.csv: 5 of 12 heights are missing; straight lines replace them, "
-                                   "the longest over 3 um")
+    assert back.notes == ("first", "before.csv: 5 of 12 heights are missing; the gaps are bridged by straight lines, "
+                                   "of which the longest spans 3 um")
 
 
 def test_refuses_a_long_hole_and_an_empty_trace():
@@ -101,8 +101,8 @@ def test_refuses_a_long_hole_and_an_empty_trace():
     with pytest.raises(PatchfemError) as caught:
         cleaned(Profile(x, z, "before.csv"), 5 * UM)
     assert str(caught.value) == (
-        "before.csv: no usable height between x = 2 um and 9 um, and a straight line may bridge 5 um at most; measure "
-        "that stretch anew or use a larger contact.element_size")
+        "before.csv: no usable height between x = 2 um and 9 um, and a straight line may bridge at most 5 um; measure "
+        "this part of the trace anew or use a larger contact.element_size")
     with pytest.raises(PatchfemError, match=r"before\.csv: 0 usable heights; a trace needs at least two"):
         cleaned(Profile(x, np.full(12, np.nan), "before.csv"), 1.0)
 

@@ -17,10 +17,10 @@ def _quadrature(draft: Draft, kind: str) -> None:
     alone = law.reading == "stretch" and law.order == 1
     key, shear = "accuracy.quadrature", contact.gives_way if contact is not None else ""
     if engine == "recursion" and not alone:
-        draft.say(key, "'recursion' sums only reading 'stretch' with order = 1; use 'auto' or 'merged'")
+        draft.say(key, "'recursion' can be used only with reading = 'stretch' and order = 1; use 'auto' or 'merged'")
     elif engine != "recursion" and shear and alone:
-        draft.say(key, f"'{engine}' cannot be used with {shear}, where every point has its own path; use "
-                       "'recursion' or 'auto'")
+        draft.say(key, f"'{engine}' cannot be used with {shear}, because each point of the interface then slips "
+                       "differently; use 'recursion' or 'auto'")
 
 
 def _knobs(draft: Draft, kind: str) -> None:
@@ -28,7 +28,7 @@ def _knobs(draft: Draft, kind: str) -> None:
     if not kind or draft.tables.accuracy is None or not pinned(draft.tables.accuracy):
         return
     for knob, where in knobs_unused(draft.tables, kind).items():
-        draft.remark(f"accuracy.{knob} has no meaning {where} and is not used")
+        draft.remark(f"accuracy.{knob} is not used, because it has no effect {where}")
 
 
 def knobs_unused(tables, kind: str) -> dict[str, str]:
@@ -59,5 +59,6 @@ def _beside_laws(knob: str, accuracy, found: Motion) -> str:
         if not found.soft:
             return "for pieces that are rigid in shear"
         changes = found.varies or found.spring.endswith("grooves]") or any(has(one.law, "bonds") for one in found.laws)
-        return "" if changes else f"for law '{found.laws[0].law}' under a constant load, whose elements are exact"
+        return "" if changes else (f"for law '{found.laws[0].law}' under a constant load, because this case is solved "
+                                   "exactly without the key")
     return ""

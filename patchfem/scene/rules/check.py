@@ -48,7 +48,7 @@ def _measured(draft: Draft) -> None:
         draft.lacks("measured.reading_cutoff", "reading 'lowpass' needs this key, such as '600 Hz'")
     drive = draft.tables.drive
     if draft.tables.measured.reading != "peak" and (drive is None or drive.kind == "free" or drive.waveform != "sine"):
-        draft.remark("measured.reading has a meaning only under one sine drive and is not used")
+        draft.remark("measured.reading has a meaning only under a sine drive and is not used")
     if cut and not low:
         draft.remark(f"measured.reading_cutoff has no meaning for reading '{draft.tables.measured.reading}' and is not "
                      "used")
@@ -77,8 +77,8 @@ def _kind(draft: Draft) -> str:
            if draft.given(name)}  # fmt: skip
     if draft.given("structure.interface"):
         for name in sorted(has & {"friction", "normal", "contact"}):
-            instead = "; write it as [structure.interface.contact] below the interface that it presses, in place of " \
-                      "that interface's load" if name == "contact" else ""
+            instead = ("; move [contact] into the interface that it presses, as [structure.interface.contact] in place "
+                       "of `load`") if name == "contact" else ""
             draft.say(name, f"[{name}] and [[structure.interface]] exclude each other: each interface has its own "
                             f"law and load{instead}")
         has = has - {"contact"} | {"friction", "normal"}  # an interface's load is no [normal] that someone wrote
@@ -87,8 +87,8 @@ def _kind(draft: Draft) -> str:
         has.discard("normal")
     moves, pressed = has & {"structure", "drive"}, has & {"contact", "normal"}
     if "slide" in has and moves:
-        draft.say("slide", "[slide] prescribes the motion, [structure] with [drive] computes it: keep only one of "
-                           "the two")
+        draft.say("slide", "[slide] prescribes the motion, but [structure] with [drive] computes the motion: keep only "
+                           "[slide], or only [structure] with [drive]")
         return ""
     if has == {"contact"}:
         return "patch"
@@ -99,24 +99,25 @@ def _kind(draft: Draft) -> str:
 
 def _with_friction(draft: Draft, has: set[str], pressed: set[str], moves: set[str]) -> str:
     if not has:
-        draft.lacks_table("contact", "a scene needs [contact], or [structure] with [drive], or both with [friction]")
+        draft.lacks_table("contact", "a scene needs [contact], or [structure] with [drive], or all of these with "
+                                     "[friction]")
         return ""
     if moves and "drive" not in has:
-        draft.lacks_table("drive", "[structure] needs it")
+        draft.lacks_table("drive", "[structure] needs this table")
     if moves and "structure" not in has:
-        draft.lacks_table("structure", "[drive] needs it")
+        draft.lacks_table("structure", "[drive] needs this table")
     friction = pressed or has & {"friction", "slide", "wear"}
     if friction and "friction" not in has:
         others = ", ".join(f"[{name}]" for name in sorted(has))
-        draft.lacks_table("friction", f"{others} without it do not make a run")
+        draft.lacks_table("friction", f"a run with {others} also needs this table")
     if friction and draft.given("structure.masses") and not draft.given("structure.interface"):
         if "contact" in has:
             draft.say("structure.masses", f"structure.masses cannot be used with [contact]; {modes_instead(draft)}, or "
-                                          "keep the masses and write law and patch below [[structure.interface]], as "
-                                          "[structure.interface.contact]")
+                                          "keep the masses, write the friction law in [[structure.interface]] and the "
+                                          "patch in [structure.interface.contact]")
         else:
             draft.lacks("structure.interface", "friction between masses needs an interface: write "
-                                               "[[structure.interface]] with its law and load instead of [friction]")
+                                               "[[structure.interface]] with `law` and `load` instead of [friction]")
     if friction and not pressed:
         draft.lacks_table("contact", "friction needs a normal load, [contact] or [normal]")
     if friction and not moves and "slide" not in has:
@@ -136,13 +137,12 @@ def _idle(draft: Draft, kind: str) -> None:
         for index, mode in enumerate(modes or ()):
             if getattr(mode, key):
                 at = draft.shown(f"structure.mode.{index}.{key}")
-                draft.remark(f"{at} has no meaning in a linear scene, where nothing rubs, and is not used")
+                draft.remark(f"{at} has no meaning in a linear scene, which has no friction, and is not used")
 
 
 def _sliding(draft: Draft, kind: str) -> None:
     structure = draft.tables.structure
     modes = structure.mode if kind == "rig" and structure is not None else ()
     if modes and all(mode.slide == 0 for mode in modes):
-        draft.say("structure.mode.0.slide", "slide is 0 in every mode, so nothing slides at the patch; give slide for "
-                                            "the mode that moves the patch, "
-                                            "or leave out [friction] and its load")  # fmt: skip
+        draft.say("structure.mode.0.slide", "`slide` is 0 in every mode, so nothing slides at the patch; give `slide` "
+                                            "for the mode that moves the patch, or leave out [friction] and the load")

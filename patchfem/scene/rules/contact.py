@@ -60,18 +60,19 @@ def _contact(draft: Draft) -> None:
     outlines(draft)
     if contact.height and contact.length and contact.height > TALLEST * contact.length:
         draft.say("contact.height", f"{contact.height:g} m is more than {TALLEST} times contact.length, but the stress "
-                                    f"reaches only a few lengths deep; use at most {TALLEST * contact.length:.3g} m, "
-                                    "and represent the rest by a spring of the structure")
+                                    "is noticeable only to a depth of a few times contact.length; use at most "
+                                    f"{TALLEST * contact.length:.3g} m, and represent the rest of the height by a "
+                                    "spring of the structure")
     flat = flat_of(contact)
     if contact.element_size and flat and contact.element_size > flat:
-        name = "contact.length" if flat == contact.length else "the interface,"
+        name = "contact.length =" if flat == contact.length else "the interface of"
         draft.say("contact.element_size", f"{contact.element_size} m is longer than {name} {flat} m")
     if contact.element_size and contact.length and contact.length > MOST_ELEMENTS * contact.element_size:
-        draft.say("contact.element_size", f"{contact.element_size:g} m makes more than {MOST_ELEMENTS} elements over "
+        draft.say("contact.element_size", f"{contact.element_size:g} m gives more than {MOST_ELEMENTS} elements over "
                                           f"{contact.length:g} m; use at least {contact.length / MOST_ELEMENTS:.3g} m, "
-                                          "or leave it out")
+                                          "or leave this key out")
     if contact.element_size and contact.mesh:
-        draft.remark("contact.element_size is not used with contact.mesh, whose file gives the elements")
+        draft.remark("contact.element_size is not used, because the file of contact.mesh gives the elements")
     pieces = [("contact.coating", contact.coating, contact.height)]
     for name in ("upper", "lower"):
         if piece := getattr(contact, name):
@@ -82,12 +83,12 @@ def _contact(draft: Draft) -> None:
         thickness = getattr(coating, "thickness", None)
         if thickness and height and thickness >= height:
             key = f"{at}.thickness" if at.endswith("coating") else f"{at}.height"
-            draft.say(key, f"coating of {thickness} m must be thinner than the height {height} m of its piece")
+            draft.say(key, f"the coating of {thickness} m must be thinner than its piece, which is {height} m high")
     if contact.holder and not draft.given("contact.holder.rotational_stiffness"):
         if not draft.given("contact.holder.tangential_stiffness"):
             draft.say("contact.holder", "rotational_stiffness, tangential_stiffness or both are needed")
     if contact.step and contact.step.at is not None and flat and abs(contact.step.at) >= flat / 2:
-        draft.say("contact.step.at", f"{contact.step.at} m lies outside the patch, |at| < length/2 is needed")
+        draft.say("contact.step.at", f"{contact.step.at} m lies outside the patch: |`at`| < length/2 is needed")
     if contact.strips and draft.given("contact.strips.offset"):
         _free_roll(draft, contact)
     if contact.asperities:
@@ -96,12 +97,14 @@ def _contact(draft: Draft) -> None:
             _peaks(draft)
         if draft.given("contact.asperities.cutoff") and not any(
                 draft.given(f"contact.{one}") for one in ("profile", "asperities.from", "asperities.rms_height")):
-            draft.say("contact.asperities.cutoff", "divides the waves of a trace, but the scene has no trace: add "
-                                                   "[contact.profile] or from, or leave the key out")
+            draft.say("contact.asperities.cutoff", "separates the long waves of a trace from the short ones, but the "
+                                                   "scene has no trace: add [contact.profile] or `from`, or leave this "
+                                                   "key out")
         bare = contact.asperities.law == "exponential" and contact.asperities.normal_stiffness is None
         if contact.approach and bare:
-            draft.lacks("contact.asperities.normal_stiffness", "law 'exponential' with [contact.approach] needs "
-                        "the stiffness at first touch, where the approach starts")  # fmt: skip
+            draft.lacks("contact.asperities.normal_stiffness", "law 'exponential' with [contact.approach] needs this "
+                                                               "stiffness at first touch, because the approach is "
+                                                               "measured from first touch")  # fmt: skip
 
 
 def _peaks(draft: Draft) -> None:
@@ -110,10 +113,11 @@ def _peaks(draft: Draft) -> None:
                                                                   for one in way)]
     if len(told) > 1:
         second = next(one for one in told[1] if draft.given(f"{at}.{one}"))
-        draft.say(f"{at}.{second}", f"is given with {', '.join(told[0])}, which describes the same peaks; keep one")
+        draft.say(f"{at}.{second}", f"describes the same peaks as {', '.join(told[0])}; keep only one description of "
+                                    "the peaks")
     for one in (told or PEAKS)[0]:
         if len(told) < 2 and not draft.given(f"{at}.{one}"):
-            others = "" if told else "; or give from, or rms_height, rms_slope and rms_curvature"
+            others = "" if told else "; instead you can give `from`, or rms_height, rms_slope and rms_curvature"
             draft.lacks(f"{at}.{one}", f"law 'hertz' needs this key{others}")
 
 
@@ -121,12 +125,12 @@ def _free_roll(draft: Draft, contact) -> None:
     """A load line over the width leaves the roll free, which a load alone determines, and two strips at least."""
     at, strips = "contact.strips.offset", contact.strips
     if draft.given("contact.strips.roll"):
-        draft.say(at, "offset leaves the rotation about x free, but contact.strips.roll prescribes it: keep one of the "
-                      "two")
+        draft.say(at, "`offset` leaves the rotation about x free, but contact.strips.roll prescribes this rotation: "
+                      "keep only one of these two keys")
     if draft.given("contact.approach"):
         draft.say(at, "a load line needs a load: use contact.load in place of [contact.approach]")
     if strips.count is not None and strips.count < 2:
-        draft.say(at, f"{strips.count} strip does not react to a rotation about x: raise contact.strips.count")
+        draft.say(at, f"{strips.count} strip cannot resist a rotation about x: raise contact.strips.count")
     elif strips.count and contact.width and strips.offset is not None:
         most = outermost(contact.width, strips.count)
         if abs(strips.offset) >= most:
@@ -145,12 +149,13 @@ def _load_line(draft: Draft) -> None:
     if not offset and not moment:
         draft.lacks(f"{at}.offset", "or load_line.moment instead")
     if draft.given("contact.tilt.angle") and not draft.given("contact.holder"):
-        draft.say(at, "is given with contact.tilt.angle but without [contact.holder]: a piece free to rotate has no "
-                      "prescribed angle; keep one of the two or add the holder's spring")  # fmt: skip
+        draft.say(at, "cannot be used with contact.tilt.angle unless [contact.holder] is given: a piece that is free "
+                      "to rotate has no prescribed angle; leave out one of these two keys, or add the spring of "
+                      "[contact.holder]")  # fmt: skip
     flat = flat_of(contact)
     half = flat / 2 if flat else None
     if half and line.offset is not None and abs(line.offset) >= half:
         draft.say(f"{at}.offset", f"{line.offset} m lies outside the patch: |offset| < length/2 = {half} m is needed")
     if half and line.moment and contact.load is not None and abs(line.moment) >= half * contact.load:
-        draft.say(f"{at}.moment", f"{line.moment} N m over the load {contact.load} N lies outside the patch: "
-                                  f"|moment|/load < length/2 = {half} m is needed")  # fmt: skip
+        draft.say(f"{at}.moment", f"{line.moment} N m divided by the load {contact.load} N puts the load line outside "
+                                  f"the patch: |moment|/load < length/2 = {half} m is needed")  # fmt: skip

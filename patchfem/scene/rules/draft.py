@@ -103,8 +103,8 @@ def _needs(draft: Draft, at: str, table: Any, selector: str, used: dict[str, tup
         if not given:
             draft.lacks(f"{at}.{key}", " or ".join((f"{selector} '{value}' needs this key", *others)))
         elif len(given) > 1:
-            draft.say(f"{at}.{given[-1]}", f"{selector} '{value}' takes this key in place of {key}; leave one of the "
-                                           "two out")
+            draft.say(f"{at}.{given[-1]}", f"{selector} '{value}' takes either this key or {key}, not both; leave one "
+                                           "of the two keys out")
     for key in sorted(unused(table, selector, used)):
         if draft.given(f"{at}.{key}") and key not in ("kinetic", "spread"):
             draft.remark(f"{at}.{key} has no meaning for {selector} '{value}' and is not used")

@@ -26,7 +26,7 @@ def check_drive(draft: Draft) -> None:
                 draft.remark(f"drive.{key} has no meaning for waveform '{drive.waveform}' and is not used")
     cycles, duration = draft.given("drive.cycles"), draft.given("drive.duration")
     if cycles and duration:
-        draft.say("drive.duration", "cycles and duration exclude each other: keep one")
+        draft.say("drive.duration", "`cycles` and `duration` exclude each other: keep one")
     if not cycles and not duration and (drive.kind == "free" or waves(drive.waveform, "endless")):
         draft.lacks("drive.cycles", "or drive.duration instead")
     _size(draft, drive)
@@ -51,11 +51,12 @@ def _onset(draft: Draft, drive: Any) -> None:
 def _sweep(draft: Draft, drive: Any) -> None:
     rate, octaves = draft.given("drive.rate"), draft.given("drive.log_rate")
     if rate and octaves:
-        draft.say("drive.log_rate", "rate (Hz/s) and log_rate (oct/min) exclude each other: keep one")
+        draft.say("drive.log_rate", "`rate` (Hz/s) and `log_rate` (oct/min) exclude each other: keep one")
     elif not rate and not octaves:
         draft.lacks("drive.rate", "or drive.log_rate instead, such as '1 oct/min'")
     if drive.from_ is not None and drive.from_ == drive.to:
-        draft.say("drive.to", f"{drive.to:g} Hz is also where the sweep starts; give another frequency")
+        draft.say("drive.to", f"{drive.to:g} Hz is also the frequency at which the sweep starts; give a different "
+                              "frequency")
 
 
 def _tones(draft: Draft, drive: Any) -> None:
@@ -65,8 +66,8 @@ def _tones(draft: Draft, drive: Any) -> None:
     for key in ("accelerations", "phases"):
         given = getattr(drive, key)
         if given is not None and drive.frequencies is not None and len(given) != len(drive.frequencies):
-            draft.say(f"drive.{key}", f"{len(given)} values for {len(drive.frequencies)} frequencies; give one "
-                                      "for each")
+            draft.say(f"drive.{key}", f"{len(given)} values for {len(drive.frequencies)} frequencies; give one value "
+                                      "for each frequency")
     if drive.accelerations is not None and not any(drive.accelerations):
         draft.say("drive.accelerations", "all accelerations are 0, so nothing moves")
 
@@ -77,12 +78,13 @@ def _random(draft: Draft, drive: Any) -> None:
         draft.say("drive.kind", "a random drive can only shake the base; set drive.kind = 'base', or give a "
                                 "record of the force with drive.waveform = 'file'")
     if level and table:
-        draft.say("drive.file", "spectrum and file exclude each other: keep one")
+        draft.say("drive.file", "`spectrum` and `file` exclude each other: keep one")
     elif not level and not table:
         draft.lacks("drive.spectrum", "or drive.file, a table with the header frequency [Hz],level [g^2/Hz]")
     for key in ("from", "to") if level else ():
         if not draft.given(f"drive.{key}"):
-            draft.lacks(f"drive.{key}", "a spectrum needs a lowest and a highest frequency")
+            draft.lacks(f"drive.{key}", "drive.spectrum needs a lowest frequency (`from`) and a highest frequency "
+                                        "(`to`)")
     if drive.from_ is not None and drive.to is not None and drive.to <= drive.from_:
         draft.say("drive.to", f"{drive.to:g} Hz is not above drive.from, {drive.from_:g} Hz")
 
@@ -92,15 +94,15 @@ def _size(draft: Draft, drive: Any) -> None:
     acceleration, displacement = draft.given("drive.acceleration"), draft.given("drive.displacement")
     if drive.kind == "base" and sized:
         if acceleration and displacement:
-            draft.say("drive.displacement", "acceleration and displacement exclude each other: keep one")
+            draft.say("drive.displacement", "`acceleration` and `displacement` exclude each other: keep one")
         if not acceleration and not displacement:
             draft.lacks("drive.acceleration", "or drive.displacement instead")
     if drive.kind == "force" and sized and not draft.given("drive.force"):
         draft.lacks("drive.force", "kind 'force' needs this key")
     begins = draft.given("structure.start")
     if drive.kind == "free" and not displacement and not begins:
-        draft.lacks("drive.displacement", "kind 'free' needs this key as the point of release; or give "
-                                          "[structure.start]")
+        draft.lacks("drive.displacement", "kind 'free' needs this key, the displacement from which the structure is "
+                                          "released; instead you can give [structure.start]")
     if drive.kind == "free" and displacement and begins:
         draft.say("structure.start", "[structure.start] and drive.displacement exclude each other: keep one")
     drives_mass(draft)
@@ -139,7 +141,8 @@ def check_length(draft: Draft, kind: str) -> None:
     if kind not in ("rig", "linear") or drive is None:
         return
     if drive.cycles is not None and drive.cycles < LEAST:
-        draft.say("drive.cycles", f"at least a quarter of a cycle is needed, cycles >= {LEAST}, not {drive.cycles:g}")
+        draft.say("drive.cycles", f"the run must last at least a quarter of a cycle: cycles >= {LEAST} is needed, not "
+                                  f"{drive.cycles:g}")
     elif drive.duration is not None and drive.frequency and drive.duration * drive.frequency < LEAST:
-        draft.say("drive.duration", f"at least a quarter of a cycle is needed, duration >= {LEAST / drive.frequency:g} "
-                                    f"s, not {drive.duration:g} s")  # fmt: skip
+        draft.say("drive.duration", "the run must last at least a quarter of a cycle: duration >= "
+                                    f"{LEAST / drive.frequency:g} s is needed, not {drive.duration:g} s")  # fmt: skip

@@ -48,9 +48,10 @@ def _locks(draft: Draft, at: str, grooves: Any, law: Any) -> None:
     wave = 2 * pi / grooves.wavelength
     if law.static * wave * grooves.amplitude >= 1:
         most = 1 / (wave * law.static)
-        draft.say(f"{at}.amplitude", f"{grooves.amplitude:.6g} m makes flanks of slope {wave * grooves.amplitude:.6g}, "
-                  f"which lock with static = {law.static:g}: no force moves the load over them; an amplitude below "
-                  f"wavelength/(2 pi static) = {most:.6g} m is needed, or a smaller static")
+        draft.say(f"{at}.amplitude", f"{grooves.amplitude:.6g} m gives flanks of slope {wave * grooves.amplitude:.6g}, "
+                                     f"on which the pieces lock with static = {law.static:g}: no force can move one "
+                                     "piece over the flanks of the other; an amplitude below wavelength/(2 pi static) "
+                                     f"= {most:.6g} m is needed, or a smaller `static`")
 
 
 def _under_changing_load(draft: Draft, beside: str) -> None:
@@ -58,9 +59,9 @@ def _under_changing_load(draft: Draft, beside: str) -> None:
     cause, normal = changing_load(draft.tables), draft.tables.normal
     if cause == "normal.amplitude":
         if normal.load is not None and normal.amplitude >= normal.load:
-            draft.say(cause, f"{normal.amplitude:.6g} N lets the load fall to zero, where nothing holds the "
-                      f"pieces in their grooves; an amplitude below normal.load = {normal.load:.6g} N is needed "
-                      f"{beside}")
+            draft.say(cause, f"{normal.amplitude:.6g} N lets the load fall to zero, and without a load nothing holds "
+                             f"the pieces in their grooves; an amplitude below normal.load = {normal.load:.6g} N is "
+                             f"needed {beside}")
     elif cause:
         draft.say(cause, unbuilt(beside, "either"))
 

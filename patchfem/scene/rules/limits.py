@@ -68,7 +68,7 @@ def _interfaces(draft: Draft, interfaces: tuple) -> None:
     for index, one in enumerate(interfaces):
         at = f"structure.interface.{index}"
         if one.contact is None and one.load is None and not draft.given(f"{at}.load"):
-            draft.lacks(f"{at}.load", "or give it a patch, [structure.interface.contact]")
+            draft.lacks(f"{at}.load", "or give this interface a patch with [structure.interface.contact]")
         if one.spread is not None and takes(one.law, "spread"):
             draft.say(f"{at}.spread", unbuilt("with masses, where an interface has no width", "out"))
         if len(interfaces) > 1 and one.law is not None and not carries(one, "joints"):
@@ -82,8 +82,8 @@ def _of_patch(draft: OfInterface, contact: Contact, law: Interface, alone: bool)
     there is no other interface."""
     patch, soft = "[structure.interface.contact]", law.gives_way
     if draft.given("friction.load"):
-        draft.say("friction.load", f"{patch} has a load of its own; leave this one out")
-    for key, instead in (("approach", "give contact.load in its place"), ("grooves", "out")):
+        draft.say("friction.load", f"{patch} has its own load; leave this key out")
+    for key, instead in (("approach", "give contact.load instead"), ("grooves", "out")):
         if draft.given(f"contact.{key}"):
             draft.say(f"contact.{key}", unbuilt("with [[structure.interface]]", instead))
     _on_pieces(draft, contact, "with [[structure.interface]]")
@@ -110,12 +110,12 @@ def _quadrature(draft: Draft, kind: str, law: Friction, shear: str) -> None:
         return
     lower = contact is not None and any(shape.on == "lower" for shape in contact.shapes.values())
     if kind == "rig" and (lower or law.breakaway) and not listed(law):
-        beside = "the pressure on the lower piece" if lower else "friction.breakaway"
+        beside = "a shape on the lower piece" if lower else "friction.breakaway"
         draft.say("accuracy.quadrature", unbuilt(f"'{engine}' with {beside} in a rig", "use 'recursion' or 'auto'"))
     varies = normal is not None and normal.amplitude
     if kind == "bench" and engine == "merged" and (lower or law.breakaway or varies):
-        draft.say("accuracy.quadrature", unbuilt("'merged' where the pressure of a point changes during the slide, or "
-                                                 "with friction.breakaway", "use 'auto', 'direct' or 'truncated'"))
+        draft.say("accuracy.quadrature", unbuilt("'merged' with friction.breakaway, or with a pressure that changes at "
+                                                 "a point during the slide,", "use 'auto', 'direct' or 'truncated'"))
 
 
 def sideways(tables: Tables) -> str:
@@ -131,13 +131,13 @@ def sideways(tables: Tables) -> str:
     elif contact is not None and contact.gives_way:
         reason = f"{contact.gives_way}: {MEANWHILE['either']}"
     elif lower:
-        reason = f"the pressure on the lower piece: {MEANWHILE['shapes']}"
+        reason = f"a shape on the lower piece: {MEANWHILE['shapes']}"
     elif normal is not None and normal.amplitude:
         reason = f"normal.amplitude: {MEANWHILE['either']}"
     else:
         return ""
     what, _, remedy = reason.partition(": ")
-    return unbuilt(f"a lateral column with {what}", f"{remedy}, or leave the column out")
+    return unbuilt(f"a lateral column with {what}", f"{remedy}, or leave the lateral column out")
 
 
 def _yawing(draft: Draft, law: Friction, contact: Contact | None) -> None:
@@ -146,7 +146,8 @@ def _yawing(draft: Draft, law: Friction, contact: Contact | None) -> None:
     if not key:
         return
     if contact is None or contact.strips is None:
-        draft.say(key, "yaw turns the patch about its normal; add [contact.strips], whose strips slide independently")
+        draft.say(key, "`yaw` rotates the patch about its normal; add [contact.strips], whose strips slide "
+                       "independently")
     elif not carries(law, "joints"):
         draft.say(key, unbuilt(f"in strips with {named(law)}", refusal("joints", odd=law)))
 
@@ -182,10 +183,10 @@ def _under_changing_load(draft: Draft, law: Friction, shear: str, cause: str) ->
 
 def _behind_shear(draft: Draft, law: Friction, shear: str) -> None:
     if has(law.law, "bonds") and law.reading == "report" and _inside(law.order, -1, 0) and law.initial_bonds:
-        draft.say("friction.initial_bonds", f"{law.initial_bonds:g} with order = {law.order:g} and {shear}: in "
-                                            "the law as printed in the report, bonds at rest have an unbounded "
-                                            "(R/eps)^order, so that no force moves their point; "
-                                            "set initial_bonds = 0 or use order >= 0")
+        draft.say("friction.initial_bonds", f"{law.initial_bonds:g} with order = {law.order:g} and {shear} gives "
+                                            "points that no force can move: in the law as printed in the report, "
+                                            "(R/eps)^order is unbounded for bonds at rest; set initial_bonds = 0 or "
+                                            "use order >= 0")
     if not has(law.law, "bonds") and not carries(law, "shear"):
         draft.say("friction.law", unbuilt(f"'{law.law}' with {shear}", f"leave out {shear}, or {refusal('shear')}"))
     weakens = law.static is not None and _inside(law.kinetic, -1, law.static)

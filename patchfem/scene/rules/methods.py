@@ -174,7 +174,7 @@ def _exact(m: Motion, method: str) -> str:
     if not all(reasons.values()):
         return ""
     why = next((reason for engine, reason in reasons.items() if _odd(TAKES[engine].law, m) is None), reasons["exact"])
-    return f"no exact solution exists {why}; use 'march' or leave method out"
+    return f"no exact solution exists {why}; use 'march' or leave `method` out"
 
 
 def _harmonic(m: Motion, method: str) -> str:
@@ -182,8 +182,8 @@ def _harmonic(m: Motion, method: str) -> str:
     drive = m.drive
     once = drive is not None and drive.waveform in WAVEFORMS and not waves(drive.waveform, "steady")
     if drive is not None and (drive.kind == "free" or once):
-        return ("'harmonic' finds the steady motion under a sine, or its curve over a sweep or over levels; use "
-                "'march' or leave method out")
+        return ("'harmonic' finds only steady motion: under a sine, over the frequencies of a sweep, or over the "
+                "levels of waveform 'levels'; use 'march' or leave `method` out")
     if drive is not None and drive.kind == "base" and drive.waveform == "sweep" and drive.displacement is not None:
         return ("'harmonic' needs a constant acceleration over a sweep; give drive.acceleration in place of "
                 "drive.displacement")
@@ -193,7 +193,7 @@ def _harmonic(m: Motion, method: str) -> str:
         return ""  # over grooves by a balance, or a march that is brought to repeat
     law = m.laws[0]
     if len(m.laws) > 1:
-        return unbuilt("'harmonic' with several interfaces where a law has no exact solution or a spring is nonlinear",
+        return unbuilt("'harmonic' with several interfaces and a law without exact solution or a nonlinear spring",
                        "march")
     if has(law.law, "set-valued") and not m.soft:
         return unbuilt(f"'harmonic' with law '{law.law}', whose force jumps, and {m.spring}", "march or stiff")

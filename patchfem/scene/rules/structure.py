@@ -40,7 +40,8 @@ def check_structure(draft: Draft) -> None:
         draft.lacks("structure.masses", "structure.interface needs this key, or structure.file or [structure.reduced]")
     for key in PLACES:
         if "file" not in forms and draft.given(f"structure.{key}"):
-            draft.say(f"structure.{key}", "names a place in a file of modes or responses; give structure.file")
+            draft.say(f"structure.{key}", "names a place in a file of modes or responses, but the scene has no such "
+                                          "file; give structure.file")
     if forms in (["masses"], ["reduced"]) and draft.given("structure.moving_mass"):
         draft.remark(f"structure.moving_mass has no meaning with structure.{forms[0]} and is not used")
     _modes(draft)
@@ -63,12 +64,12 @@ def modes_instead(draft: Draft) -> str:
     k, c = (sum(value or 0.0 for _, value in one) for one in (springs, dampers))
     pairs = [sorted(pair) if pair else None for pair, _ in springs + dampers]
     if len(masses) != 1 or not masses[0] or not k or pairs != [[0, 1]] * len(pairs):
-        return ("with [contact], give the modes of these masses and springs: structure.moving_mass and for each a "
-                "[[structure.mode]] with its frequency, which for one mass on one spring is sqrt(k/m)/(2 pi)")
+        return ("with [contact], describe these masses and springs by their modes: give structure.moving_mass, and for "
+                "each mode a [[structure.mode]] with its frequency (sqrt(k/m)/(2 pi) for one mass on one spring)")
     frequency, ratio = sqrt(k / masses[0]) / (2 * pi), c / (2 * sqrt(k * masses[0]))
     damping = f"damping = {ratio:.3g} (c/(2 sqrt(k m)))" if dampers else "its damping ratio"
     return (f"with [contact], give structure.moving_mass = \"{masses[0]:g} kg\" and a [[structure.mode]] with "
-            f"frequency = \"{frequency:.6g} Hz\" (sqrt(k/m)/(2 pi)), {damping} and slide = 1.0")
+            f"frequency = \"{frequency:.6g} Hz\" (sqrt(k/m)/(2 pi)), {damping} and `slide` = 1.0")
 
 
 def _modes(draft: Draft) -> None:
@@ -80,7 +81,8 @@ def _modes(draft: Draft) -> None:
         names.add(mode.name)
         if mode.damping is not None and mode.damping >= HEAVY:
             key = draft.shown(f"structure.mode.{index}.damping")
-            draft.remark(f"{key} = {mode.damping:g} is a damping ratio: 1 is critical, and 1 % is written 0.01")
+            draft.remark(f"{key} = {mode.damping:g} is a damping ratio: 1 means critical damping, and 1 % is written "
+                         "0.01")
     _instruments(draft, modes)
     bases = [mode.base if draft.given(f"structure.mode.{index}.base") else 0.0 if index else mode.slide
              for index, mode in enumerate(modes)]  # fmt: skip
@@ -88,8 +90,9 @@ def _modes(draft: Draft) -> None:
     if sum(squares) > 1 + 1e-9:
         at = f"structure.mode.{squares.index(max(squares))}"
         key = f"{at}.base" if draft.given(f"{at}.base") else f"{at}.slide"
-        draft.say(key, f"the sum of base^2 over the modes is {sum(squares):.6g}; <= 1 is needed (base is the share of "
-                       "the base motion; the first mode's is its slide unless given)")  # fmt: skip
+        draft.say(key, f"the sum of `base`^2 over the modes is {sum(squares):.6g}, but at most 1 is possible (`base` "
+                       "is the participation of a mode in the base motion; for the first mode, `base` = `slide` unless "
+                       "given)")  # fmt: skip
 
 
 def check_gains(draft: Draft, kind: str) -> None:
@@ -97,9 +100,9 @@ def check_gains(draft: Draft, kind: str) -> None:
     structure = draft.tables.structure
     for index, mode in enumerate((structure.mode or ()) if structure is not None and kind == "linear" else ()):
         if mode.damping is not None and mode.damping < 0:
-            draft.say(f"structure.mode.{index}.damping", f"{mode.damping:g} is negative damping and nothing "
-                      "dissipates the energy that it adds, so the motion would grow for ever; add [friction], or "
-                      "set damping >= 0")
+            draft.say(f"structure.mode.{index}.damping", f"{mode.damping:g} is negative damping, and without friction "
+                                                         "the motion would grow for ever; add [friction], or set "
+                                                         "damping >= 0")
 
 
 def unseen(structure, driven: bool) -> list:
@@ -107,8 +110,9 @@ def unseen(structure, driven: bool) -> list:
     out = []
     for mode in (structure.mode or ())[1:] if structure is not None else ():
         if mode.slide and (mode.output, mode.accelerometer, mode.gauge) == (None, None, None):
-            still = ", nor does the base drive it (base = 0, its default)" if driven and mode.base is None else ""
-            out.append(f"mode '{mode.name}' does not move the output (output = 0, its default){still}")
+            still = (", and the base motion does not drive this mode (`base` is 0 by "
+                     "default)") if driven and mode.base is None else ""
+            out.append(f"mode '{mode.name}' does not move the output point (`output` is 0 by default){still}")
     return out
 
 
@@ -128,7 +132,7 @@ def _instruments(draft: Draft, modes: tuple) -> None:
         beside = "drive.kind = 'free'" if drive.kind == "free" else \
             f"drive.waveform = '{drive.waveform}'" if drive.waveform in ("sweep", "levels") and not steady else ""
     if beside:
-        draft.say(written[0], unbuilt(f"with {beside}", "give the accelerometer and the gauge the value of output"))
+        draft.say(written[0], unbuilt(f"with {beside}", "give `accelerometer` and `gauge` the value of `output`"))
 
 
 def _masses(draft: Draft, structure: Any) -> None:
@@ -156,17 +160,17 @@ def _between(draft: Draft, key: str, pair: Any, count: int | None) -> None:
     what = "mass" if draft.tables.structure.reduced is None else "boundary coordinate"
     if pair[0] == pair[1]:
         draft.say(key, f"joins {'the base' if pair[0] == 0 else f'{what} {pair[0]}'} to itself; two different ends are "
-                       f"needed, or a {what} and 0, the base")
+                       "needed, where 0 stands for the base")
     for one in dict.fromkeys(pair):
         _known(draft, key, one, count)
 
 
 def _known(draft: Draft, key: str, mass: int | None, count: int | None) -> None:
     if count is not None and mass is not None and mass > count:
-        what, where = ("mass", "masses") if draft.tables.structure.reduced is None else \
+        what, where = ("mass", "structure.masses") if draft.tables.structure.reduced is None else \
             ("boundary coordinate", "structure.reduced.boundary")
-        draft.say(key, f"there is no {what} {mass}: {where} has {count}, counted from 1" +
-                  ("; 0 is the base" if key.endswith(("between", "slide")) else ""))
+        draft.say(key, f"there is no {what} {mass}: {where} has {count}, numbered from 1" +
+                  ("; 0 stands for the base" if key.endswith(("between", "slide")) else ""))
 
 
 def drives_mass(draft: Draft) -> None:
@@ -175,8 +179,8 @@ def drives_mass(draft: Draft) -> None:
     if drive.mass is None or structure is None or drive.kind == "base":
         return
     if draft.given("structure.mode"):
-        draft.say("drive.mass", "applies to structure.masses, but [[structure.mode]] is driven at its output: leave "
-                                "drive.mass out")  # fmt: skip
+        draft.say("drive.mass", "applies only to structure.masses, but a structure of [[structure.mode]] is driven at "
+                                "its output point: leave drive.mass out")  # fmt: skip
     else:
         _known(draft, "drive.mass", drive.mass, _numbered(structure))
 
@@ -215,12 +219,12 @@ def _reduced(draft: Draft, reduced: Any) -> None:
         draft.say("structure.reduced.boundary", f"names {twice[0]} twice; name each coordinate once")
     drive = draft.tables.drive
     if reduced.moved is not None and drive is not None and drive.kind in ("force", "free"):
-        draft.remark("structure.reduced.moved has a meaning only with a base drive and is not used")
+        draft.remark("structure.reduced.moved is not used, because it applies only to a base drive")
     _between(draft, "structure.reduced.slide", reduced.slide, len(reduced.boundary) if reduced.boundary else None)
     if draft.given("structure.interface"):
         if reduced.slide is not None:
-            draft.say("structure.reduced.slide", "is given with [friction]; an interface names its two sides with "
-                                                 "the key between")
+            draft.say("structure.reduced.slide", "applies only to [friction]; a [[structure.interface]] names its two "
+                                                 "sides with the key `between`: leave structure.reduced.slide out")
     elif draft.given("friction") and reduced.slide is None:
         draft.lacks("structure.reduced.slide", "which two boundary coordinates rub against each other, such as slide = "
                                                "[1, 0] for coordinate 1 against the base (0); or write "
@@ -231,8 +235,9 @@ def _bonded(draft: Draft, structure: Any) -> None:
     """The spring beside the contact needs to know which contact."""
     if structure.bonded is None or structure.masses is None or len(structure.interface or ()) == 1:
         return
-    draft.say("structure.bonded", f"applies to one contact, but there are {len(structure.interface or ())} interfaces; "
-                                  "write a [[structure.spring]] between the same masses")  # fmt: skip
+    draft.say("structure.bonded", f"applies only to a single contact, but there are {len(structure.interface or ())} "
+                                  "interfaces; instead write a [[structure.spring]] between the masses of the "
+                                  "interface")  # fmt: skip
 
 
 def _bolted(draft: Draft, structure: Any) -> None:
@@ -240,8 +245,8 @@ def _bolted(draft: Draft, structure: Any) -> None:
     tables, key = draft.tables, "structure.measured"
     under = tables.contact if tables.contact is not None else tables.normal
     if tables.friction is None and not structure.interface:
-        draft.say(key, "'stuck' subtracts the stiffness of the joint from the modes, but this scene has no joint; "
-                       "add [friction] and its load, or leave measured out")
+        draft.say(key, "'stuck' subtracts the stiffness of the joint from the modes, but this scene has no joint; add "
+                       "[friction] and its load, or leave `measured` out")
     for reason, holds in (("structure.masses, which are not measured", structure.masses is not None),
                           ("structure.reduced, which is not measured", structure.reduced is not None),
                           ("a spring of structure.bonded.wavelength", structure.bonded is not None
@@ -269,4 +274,5 @@ def _start(draft: Draft, structure: Any) -> None:
         values = getattr(start, key)
         if values is not None and count and len(values) != count:
             many = f"{len(values)} value{'s' if len(values) > 1 else ''}"
-            draft.say(f"structure.start.{key}", f"{many} for {count} {form}; give one for each, in their order")
+            draft.say(f"structure.start.{key}", f"{many} for {count} {form}; give one value for each, in the same "
+                                                "order")

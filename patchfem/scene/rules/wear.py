@@ -32,8 +32,8 @@ def check_wear(draft: Draft, kind: str) -> None:
             if draft.given(f"wear.{key}"):
                 draft.remark(f"wear.{key} has no meaning without [contact] and is not used")
     elif draft.given("wear.upper_share") and grooves_of(tables) is None and not _coated(tables.contact):
-        draft.remark("wear.upper_share has no effect on the measures without grooves or a coating: worn_depth is that "
-                     "of both pieces together")
+        draft.remark("wear.upper_share has no effect on the measures without grooves or a coating: the measure "
+                     "worn_depth is the depth worn off both pieces together")
 
 
 def _friction(draft: Draft, change: WornFriction) -> None:
@@ -50,19 +50,20 @@ def _friction(draft: Draft, change: WornFriction) -> None:
     for name in names:
         factors = getattr(change, name)
         if factors is not None and depth is not None and len(factors) != len(depth):
-            draft.say(f"{at}.{name}", f"{len(factors)} factors at {len(depth)} depths; give one at each")
+            draft.say(f"{at}.{name}", f"{len(factors)} factors for {len(depth)} depths; give one factor for each depth")
         elif factors is not None and factors[0] != 1:
-            draft.say(f"{at}.{name}", f"{factors[0]:g} at depth 0, where [friction] itself describes the unworn "
-                                      "contact; the first factor must be 1")
+            draft.say(f"{at}.{name}", f"the first factor must be 1, not {factors[0]:g}, because [friction] itself "
+                                      "describes the contact at depth 0")
     if law is None:
         return
     if change.bond_length_factor is not None and not takes(law.law, "bond_length"):
         draft.say(f"{at}.bond_length_factor", f"law '{law.law}' has no bond_length; leave this key out, or use "
                                               f"{using('bond_length')}")
     elif change.bond_length_factor is not None and law.stiffness is not None:
-        draft.say(f"{at}.bond_length_factor", "has no meaning beside friction.stiffness; give friction.bond_length")
+        draft.say(f"{at}.bond_length_factor", "has no meaning with friction.stiffness; give friction.bond_length in "
+                                              "place of friction.stiffness")
     if change.coefficient_factor is not None and law.static == 0:
-        draft.remark(f"{at}.coefficient_factor has no effect on static = 0")
+        draft.remark(f"{at}.coefficient_factor has no effect, because static = 0")
     _locks(draft, change, law.static)
 
 
@@ -73,9 +74,10 @@ def _locks(draft: Draft, change: WornFriction, static: float | None) -> None:
         return
     steepest, most = 2 * pi * found[1].amplitude / found[1].wavelength, static * max(change.coefficient_factor)
     if most * steepest >= 1 > static * steepest:
-        draft.say("wear.friction.coefficient_factor", f"{max(change.coefficient_factor):g} makes static = {most:g}, "
-                  f"which locks on the flanks of the new grooves, of slope {steepest:.6g}; factors below "
-                  f"{1 / steepest / static:.6g} are needed")
+        draft.say("wear.friction.coefficient_factor", f"{max(change.coefficient_factor):g} raises static to {most:g}, "
+                                                      "at which the pieces lock on the flanks of the unworn grooves "
+                                                      f"(slope {steepest:.6g}); factors below "
+                                                      f"{1 / steepest / static:.6g} are needed")
 
 
 def _coated(contact) -> bool:
@@ -87,7 +89,7 @@ def _coated(contact) -> bool:
 def _beside_strips(draft: Draft, contact):
     """What wear of strips does not go with, each with what to do."""
     if contact.gives_way:
-        yield f"contact.strips with {contact.gives_way}", LATER.format("either")
+        yield f"contact.strips with {contact.gives_way}", LATER.format(contact.gives_way)
     if any(shape.on == "lower" for shape in contact.shapes.values()):
         yield "contact.strips with a shape on the lower piece", LATER.format("put all shapes on the upper piece")
     if draft.given("wear.start"):
@@ -108,12 +110,12 @@ def _beside(draft: Draft, tables, kind: str):
     if tables.normal is not None and tables.normal.amplitude and kind == "rig":
         yield "normal.amplitude", LATER.format("the amplitude")
     if structure is not None and structure.interface:
-        yield "[[structure.interface]]", LATER.format("write one interface as [friction] and [normal]")
+        yield "[[structure.interface]]", LATER.format("describe a single interface by [friction] and [normal]")
     if structure is not None and any(mode.normal or mode.pitch for mode in structure.mode or ()):
-        yield "modes with normal or pitch", LATER.format("these keys")
+        yield "modes with `normal` or `pitch`", LATER.format("these keys")
     if kind == "rig" and drive is not None and (drive.kind == "free" or drive.waveform not in (None, "sine")):
-        yield f"a drive '{drive.kind if drive.kind == 'free' else drive.waveform}'", \
-            "wear repeats the last cycle of a steady motion: use " + \
+        yield "drive.kind = 'free'" if drive.kind == "free" else f"drive.waveform = '{drive.waveform}'", \
+            "wear is computed from the last cycle of a steady motion: use " + \
             ("kind 'base' or 'force'" if drive.kind == "free" else "waveform 'sine'")
     if kind == "rig" and method in ("duhamel", "newmark", "euler", "harmonic"):
         yield f"accuracy.method '{method}'", "use 'auto', 'exact' or 'march'"

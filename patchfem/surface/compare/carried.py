@@ -14,8 +14,8 @@ PART, SAMPLES, FILLED = 0.05, 40, 0.7  # of the length, samples, and share of un
 WORN, BROAD, LEAST = 2 * REACH, 16, 0.005  # deviations of a rubbed place, its samples at half of them, share of x
 CURVED, BOWED = 30.0, 0.75  # chi-squared of a bow in an unworn part, and its size in noises, from which it is none
 TURNS, HIGHER, VALLEYS = 8, 0.65, 0.1  # worn tops, share of unworn heights that lie lower than they, share of valleys
-HIDDEN = ("mean worn depth if the tilt between the traces, up to the end of its interval, is wedge-shaped wear; "
-          "uniform wear has no such limit")
+HIDDEN = ("mean worn depth if all of the tilt between the traces, taken at the upper end of its interval, is "
+          "wedge-shaped wear; for uniform wear no such limit can be given")
 NO_LIMIT = "no limit"
 
 
@@ -109,24 +109,26 @@ def _what(by: Carried) -> str:
 def told(by: Carried) -> str:
     """What the worn depths count from, as a sentence."""
     if by.by == "valleys":
-        return (f"Depths are measured from the valleys between the worn tops, {100 * by.share:.0f} % of the heights, "
-                "which agree in both traces and are taken as unworn; if these heights wore uniformly too, all depths "
-                "are larger by that wear.")
+        return (f"Depths are measured from the valleys between the worn tops. These valleys ({100 * by.share:.0f} % of "
+                "the heights) agree in both traces and are taken as unworn; if they wore uniformly too, all depths are "
+                "larger by that wear.")
     spans = ", ".join(f"{say(a, 4)} to {say(b, 4)}" for a, b in by.parts[:4])
     more = f" and {len(by.parts) - 4} more" if len(by.parts) > 4 else ""
-    return (f"Depths are measured from the parts that agree, x = {spans}{more} of the second trace (after wear), which "
-            "are taken as unworn; if these parts wore uniformly or as a wedge too, all depths are larger by that wear.")
+    return (f"Depths are measured from the parts in which the traces agree: x = {spans}{more} of the second trace "
+            "(after wear). These parts are taken as unworn; if they wore uniformly or as a wedge too, all depths are "
+            "larger by that wear.")
 
 
 def may_hide(found: Registration, hidden: Quantity) -> str:
     """What may hide where nothing carries the registration, and what would settle it, as a sentence."""
-    bow = (f" A curvature (bow) of {say(abs(found.bend), 3)} "
-           "was subtracted; it may be a bent datum or wear.") if found.bend else ""
+    bow = (f" A curvature (bow) of {say(abs(found.bend), 3)} was subtracted; this bow may come from a bent datum of "
+           "the instrument or from wear.") if found.bend else ""
     tilt, most = (plain(1e6 * one, 3) for one in (abs(found.slope), 2 * hidden.value / float(found.x[-1] - found.x[0])))
-    return ("Uniform wear of any depth would look the same, as would wedge-shaped wear that was removed when the part "
-            f"was mounted level. The tilt of {tilt} urad between the traces, up to {most} urad by its interval, may "
-            f"hide up to {say(hidden.value, 3)} of mean wear: half the tilt times the length.{bow} To find out, "
-            "measure an unworn flank beside the rubbed part, or a reference mark, in both traces.")
+    return ("Uniform wear of any depth would give the same two traces. Wedge-shaped wear would do so too, if the worn "
+            f"part was then mounted level. The tilt of {tilt} urad between the traces, up to {most} urad within its "
+            f"confidence interval, may hide up to {say(hidden.value, 3)} of mean wear: half the tilt times the "
+            f"length.{bow} To find out, measure an unworn flank beside the rubbed part, or a reference mark, in both "
+            "traces.")
 
 
 def median_of_five(rest) -> np.ndarray:

@@ -22,8 +22,9 @@ from .same import Place, found_place
 from .specks import without_specks
 from .tracks import Tracks, beside_flanks, of_flanks, pieces_of, tracks_of
 
-SHIFT = "the place at x in the first trace (before wear) is at x + shift in the second (after wear)"
-STRETCH = "length of the second trace (after wear) divided by that of the first, found from their unworn valleys"
+SHIFT = "shift: the point at x in the first trace (before wear) is at x + shift in the second trace (after wear)"
+STRETCH = ("length of the second trace (after wear) divided by the length of the first trace for the same stretch of "
+           "surface, found from the unworn valleys")
 TILT = "tilt of the second trace (after wear) relative to the first (before wear)"
 AMPLITUDE = ("amplitude of a sine with the same mean square as the waves of 60 um to 110 um: value after wear divided "
              "by value before")
@@ -151,7 +152,7 @@ def _placed(place: Place, direction: str, band: tuple, removed: tuple) -> Compar
         tracks = tracks_of(found, worn_depth.neighbours(found), band[1])
     else:
         worn = worn_depth.nowhere("no part of the traces is known to be unworn, so uniform, wedge-shaped or bow-shaped "
-                                  "wear cannot be distinguished from no wear", worn.deposited if raised(found) else 0.0)
+                                  "wear cannot be told from no wear", worn.deposited if raised(found) else 0.0)
     pieces = pieces_of(found, tracks, band[1])
     flat = pieces_of(found, tracks, band[1], True)
     ratios, sizes = [], [tuple(_pooled(side, step, band) for side in zip(*one)) for one in (flat, pieces)]
@@ -173,13 +174,14 @@ def _apart(place: Place, direction: str, band: tuple, removed: tuple) -> Compari
     before, after, why = place.before, place.after, place.why
     notes, step = _steps(before, after)
     if place.order:
-        notes.append("the two traces match only in exchanged order: material grew between "
-                     "the measurements, or the two files are in the wrong order")
+        notes.append("the two traces match only if the second is taken as the unworn one: material grew between the "
+                     "measurements, or the two files are in the wrong order")
     flanks = flanks_of(before, after)
     abbott = None if flanks is not None else worn_depth.abbott_estimate(before, after)
     sides = [[before], [after] if flanks is None else beside_flanks(after, flanks, band[1])]
     worn = worn_depth.of_flanks(flanks) if flanks is not None else worn_depth.nowhere(
-        why + ", and there are no unworn flanks beside a track; a worn depth needs one of the two")
+        why + ", and there are no unworn flanks beside a track; for a worn depth, either matching traces or such "
+              "flanks are needed")
     sizes = tuple(_pooled(side, step, band) for side in sides)
     freedom = [[scattered(one, step, band) for one in side] for side in sides]
     sizes = tuple(one._replace(freedom=tuple(min(a, b) for a, b in zip(one.freedom, np.sum(each, axis=0))))
@@ -196,8 +198,8 @@ def _steps(before: Profile, after: Profile) -> tuple:
     steps = [one.length / (one.x.size - 1) for one in (even(before), even(after))]
     notes = list(before.notes + after.notes)
     if max(steps) > 1.01 * min(steps):
-        notes.append(f"samples lie {say(steps[0])} apart before and {say(steps[1])} after; slopes and amplitudes are "
-                     f"computed at a step of {say(max(steps))}")
+        notes.append(f"samples lie {say(steps[0])} apart before wear and {say(steps[1])} apart after wear; slopes and "
+                     f"amplitudes are computed at a step of {say(max(steps))}")
     return notes, max(steps)
 
 
@@ -226,9 +228,9 @@ def _told(found: Registration) -> list:
     value, error, out = found.stretch
     if not np.isfinite(value) or abs(value) < max(SIDE * 2 * error, 1e-4):
         return []
-    text = (f"the second trace (after wear) shows the same place {1 + value:.5g} times as long as the first (+- "
-            f"{SIDE * error:.1g})")
-    return [text + ("; the difference is corrected" if out else "; calibrate x of the instrument")]
+    text = (f"the same stretch of surface is {1 + value:.5g} (+- {SIDE * error:.1g}) times as long in the second trace "
+            "(after wear) as in the first")
+    return [text + ("; this difference in length is corrected" if out else "; calibrate x of the instrument")]
 
 
 def compared_scans(before: Areal, after: Areal, first: str = "x", keep_spikes: bool = False) -> list[Comparison]:
@@ -242,7 +244,7 @@ def compared_scans(before: Areal, after: Areal, first: str = "x", keep_spikes: b
 
 def _waves(before: Areal, after: Areal, flat: tuple, direction: str) -> Comparison:
     """The waves of two scans in one direction; flat: both as `bridged`."""
-    why = "areal scans are compared place by place in both directions at once"
+    why = "areal scans are compared point by point in x and y together"
     try:
         sizes = tuple(size_along(*one, direction) for one in flat)
         ratios = [ratio(part, text, *sizes[::-1]) for part, text in (("amplitude", AMPLITUDE), ("slope", SLOPE))]
@@ -265,7 +267,8 @@ def directions_of(parts: list) -> list:
     if isinstance(parts[0].before, Profile):
         step = max(one.length / (one.x.size - 1) for pair in sides for one in map(even, pair))
         sizes = [tuple(size_of(one, step) for one in pair) for pair in sides]
-    return [(when, *(ratio(part, f"{part} along x over along y, {when}", *pair) for part in ("amplitude", "slope")))
+    return [(when, *(ratio(part, f"{part} along x divided by that along y, "
+                                 f"{when}", *pair) for part in ("amplitude", "slope")))
             for when, pair in zip(("before", "after"), sizes)]
 
 
@@ -282,8 +285,8 @@ def compared_files(paths: tuple, direction: str = "", units: tuple | None = None
     if direction not in ("", "x", "y"):
         raise PatchfemError(f"compare: direction {direction!r}: x or y is needed")
     if len(paths) not in (2, 4):
-        raise PatchfemError(f"compare: {len(paths)} files; two are needed, or four: before and after along one "
-                            "direction, then before and after along the other")
+        raise PatchfemError(f"compare: {len(paths)} files; two files are needed, or four: before and after along one "
+                            "direction, then before and after along the other direction")
     files = [read_surface(path, units) for path in paths]
     scans = {isinstance(one, Areal) for one in files}
     if shift is not None and len(files) != 2:

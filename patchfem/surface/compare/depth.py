@@ -18,8 +18,8 @@ from .registration import REACH, Registration, together
 
 MAX, MEAN, AREA = ("largest worn depth, corrected for noise",
                    "mean worn depth over the common length",
-                   "worn area of the section, that is worn volume per width")
-WITHIN = "mean worn depth from the first to the last worn place, unworn valleys between them included"
+                   "worn area of the section, which is the worn volume per unit of width")
+WITHIN = "mean worn depth between the first and the last worn point, including the unworn valleys between these points"
 TAIL = (0.02, 0.25)  # share of the lowest heights that both Abbott curves are laid on each other over
 DEPOSIT = 4.0  # deviations above the trace before from which a height is a deposit, not noise
 FROM, TO = "first worn place", "last worn place"

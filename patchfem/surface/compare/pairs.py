@@ -45,11 +45,11 @@ def read_pairs(path) -> list[Asked]:
         if empty := [name for name in HEADER.split(",") if not cells[name]]:
             raise PatchfemError(f"{path}:{number}: {empty[0]}: the name of a file is needed")
         if cells.get("direction", "") not in ("", "x", "y"):
-            raise PatchfemError(f"{path}:{number}: direction: x, y or nothing is needed, not "
-                                f"'{cells['direction'][:40]}'")
+            raise PatchfemError(f"{path}:{number}: direction: must be x, y or empty, not '{cells['direction'][:40]}'")
         pair = tuple(path.parent / cells[name] for name in HEADER.split(","))
         if pair in seen:
-            raise PatchfemError(f"{path}:{number}: repeats line {seen[pair]}; the pair would count twice in a mean")
+            raise PatchfemError(f"{path}:{number}: repeats the pair of line {seen[pair]}; this pair would count twice "
+                                "in a mean")
         seen[pair] = number
         labels = {name: cell for name, cell in cells.items() if name not in ("before", "after", "direction")}
         out.append(Asked(number, tuple(cells[name] for name in HEADER.split(",")), pair, cells.get("direction", ""),

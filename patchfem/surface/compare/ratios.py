@@ -75,8 +75,8 @@ def size_along(scan: Areal, lost, direction: str, band: tuple = BAND) -> Size:
     rows = np.flatnonzero(lost.mean(axis=1) <= BRIDGED)
     z = z[rows[np.linspace(0, rows.size - 1, min(rows.size, MOST)).astype(int)]]
     if not len(z):
-        raise PatchfemError(f"{scan.source}: along {direction} more than a third of the heights of every trace are "
-                            "missing")
+        raise PatchfemError(f"{scan.source}: along {direction} every line of the scan lacks more than a third of its "
+                            "heights")
     step = float(x[-1] - x[0]) / (x.size - 1)
     refuse_band(scan.source, *band, step * (x.size - 1), step)
     sizes = [_size(level(Profile(x, row, scan.source)).z, step, band) for row in z]

@@ -127,7 +127,7 @@ def register(before: Profile, after: Profile, shift: float, lowest: float = LOWE
         if other is not None and (best is None or other.noise < better * best.noise or _inside_out(best, other)):
             best = other
     if best is None:
-        raise PatchfemError(f"{after.source}: fewer than {FEWEST} of its heights lie on the valleys of "
+        raise PatchfemError(f"{after.source}: fewer than {FEWEST} heights of this trace lie on the valleys of "
                             f"{before.source}, so there is no common reference")
     return best
 

@@ -122,15 +122,15 @@ def _registered(before: Profile, after: Profile, match: Match) -> Registration |
 def _told(before: Profile, after: Profile, shift: float) -> Place:
     """The traces registered from a shift [m] that is known; refused where they do not agree near it."""
     first, _, step, _ = prepared(before, after)
-    why = f"at the given shift of {say(shift)} "
+    why = f"at the given shift of {say(shift)}, "
     try:
         found = register(before, after, shift)
     except PatchfemError:
         return Place(None, None, why + "hardly any heights of the traces agree; is the shift right?")
     if abs(found.shift - shift) > alone(first) * step:
-        return Place(None, None, why + f"the traces do not match; the fit moves the shift to {say(found.shift)}")
+        return Place(None, None, why + f"the traces do not match: the best fit has a shift of {say(found.shift)}")
     if not (_quiet(found, TOLD) and found.used.mean() > SHARE):
-        return Place(None, None, why + _apart(found) + ": no better than chance; is the shift right?")
+        return Place(None, None, why + _apart(found) + ", which is no better than chance; is the shift right?")
     return Place(None, found)
 
 
@@ -181,25 +181,24 @@ def _likelier(before: Profile, after: Profile, shift: float, other: Registration
 
 def _apart(found: Registration) -> str:
     return (f"the best-matching {100 * found.used.mean():.0f} % of the heights still differ by {say(found.noise)}, "
-            f"{100 * found.noise / _height(found):.0f} % of the root mean square height before")
+            f"{100 * found.noise / _height(found):.0f} % of the root mean square height before wear")
 
 
 def _why(before: Profile, after: Profile, match: Match, valleys: Match) -> str:
     """Why no place was found, in words to act on."""
     if valleys.repeats and valleys.clear > CLEAR and match is valleys:
-        return (f"the surface is periodic, with a period of {say(_period(before, after))}, so distant shifts "
-                f"match equally well (correlations {valleys.likeness:.3f} and {valleys.second:.3f}); {MARK}")
+        return (f"the surface is periodic, with a period of {say(_period(before, after))}, so shifts that are far "
+                f"apart match equally well (correlations {valleys.likeness:.3f} and {valleys.second:.3f}); {MARK}")
     if match.clear > CLEAR and not match.repeats:
         try:
             found = register(before, after, match.shift)
         except PatchfemError:
             return f"at the most likely shift, {say(match.shift)}, hardly any heights are unworn"
-        return ("no common place was found in the traces that is unworn: at the most likely shift, "
-                f"{say(match.shift)}, {_apart(found)}; {MARK}")
+        return (f"no unworn part was found that both traces show: at the most likely shift, {say(match.shift)}, "
+                f"{_apart(found)}; {MARK}")
     mean, scatter = valleys.chance
-    return ("no common place was found in the traces: the best correlation of their valleys is "
-            f"{valleys.likeness:.2f}, but only values above {np.tanh(mean + CLEAR * scatter):.2f} are significant; "
-            f"{MARK}")
+    return (f"the two traces show no common part: the best correlation of their valleys is {valleys.likeness:.2f}, but "
+            f"only values above {np.tanh(mean + CLEAR * scatter):.2f} are significant; {MARK}")
 
 
 def _period(before: Profile, after: Profile) -> float:

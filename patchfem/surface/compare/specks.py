@@ -66,7 +66,7 @@ def _left_out(profile: Profile, marked) -> Profile:
     if not marked.any():
         return profile
     z = np.where(marked, np.nan, profile.z)
-    note = (f"{profile.source}: {marked.sum()} of {z.size} heights stand out with walls much steeper than elsewhere "
-            f"(the first at x = {say(profile.x[np.argmax(marked)])}); they are taken as dust or dropouts and left out; "
-            "use --keep-spikes to keep them")
+    note = (f"{profile.source}: {marked.sum()} of {z.size} heights stand out with walls much steeper than the rest of "
+            f"the trace (the first at x = {say(profile.x[np.argmax(marked)])}); these heights are taken as dust or "
+            "dropouts and left out; use --keep-spikes to keep them")
     return replace(profile, z=frozen_array(z), notes=(*profile.notes, note))

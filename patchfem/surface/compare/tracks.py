@@ -23,16 +23,17 @@ NEW = 10.0  # noises that a new valley is deeper than the trace before, and 3 be
 FORM = 2.5  # longest waves, from which the shape of the depth is the form of a track
 FROM, TO = ("x in the second trace (after wear) at which the longest track begins",
             "x in the second trace (after wear) at which the longest track ends")
-DEPTH, BOTTOM = ("mean depth: lost area of the longest track over its width",
+DEPTH, BOTTOM = ("mean depth of the longest track: lost area divided by width",
                  "floor of the longest track: bottom of the parabola through the deepest fifth of its width")
 WIDTH, STEP = ("width of the longest track",
-               "step: mean depth over the middle third of the longest track, as of a groove in ISO 5436-1, type A1")
-LEFT, RIGHT = ("pile-up: area above the first "
-               f"trace (before wear), within one track width {side} the longest track" for side in
+               "step: mean depth over the middle third of the longest track, as ISO 5436-1 defines for a groove of "
+               "type A1")
+LEFT, RIGHT = (f"pile-up: area above the first trace (before wear), up to one track width {side} the longest "
+               "track" for side in
                ("before", "behind"))
-GROSS, PILED, NET = ("area lost in the longest track", "pile-up: area above the first trace (before wear), within one "
-                                                       "track width of the longest track, both "
-                                                       "sides together", "lost area less pile-up")
+GROSS, PILED, NET = ("area lost in the longest track", "pile-up: area above the first trace (before wear), up to one "
+                                                       "track width from the longest track, sum of both "
+                                                       "sides", "lost area less pile-up")
 
 
 class Valley(NamedTuple):
@@ -179,7 +180,7 @@ def of_flanks(found: Flanks) -> Tracks:
     return Tracks((), {"from": ends[0], "to": ends[1], "width": width,
                        "depth_mean": Quantity(*(one / found.width for one in found.area), "m", DEPTH),
                        "depth_floor": Quantity(floor, max(floor - off, 0.0), floor + off, "m", BOTTOM),
-                       "step": refused("m", STEP, "the roughness that wore away is not known place by place"),
+                       "step": refused("m", STEP, "the roughness that wore away is not known at each point"),
                        "area_net": refused("m2", NET, why), "area_gross": Quantity(*found.area, "m2", GROSS),
                        **{name: refused("m2", text, why) for name, text in
                           (("pile_up", PILED), ("pile_up_left", LEFT), ("pile_up_right", RIGHT))}})

@@ -44,20 +44,21 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
         headline = f"worn, waves {headline}"
     elif headline == "no change shown":
         told = worn + ["flatter"] * any(changed(one.slope_ratio) == "reduced" for one in parts)
-        headline = " and ".join(told) + ", no change of the waves shown" if told else headline
+        headline = " and ".join(told) + ", no change of the amplitude of the waves shown" if told else headline
     if (areal == EXCHANGED or any(one.exchanged for one in parts)) and not worn:
         headline = f"{EXCHANGED}; as given: {headline}"
     elif areal == scans.OPEN:
-        headline = f"{areal}; {'no change of the waves shown' if headline == 'no change shown' else headline}"
+        headline = (f"{areal}; "
+                    f"{'no change of the amplitude of the waves shown' if headline == 'no change shown' else headline}")
     elif areal == ELSEWHERE or any(_elsewhere(one) for one in parts):
         headline = f"{ELSEWHERE}; {headline}"
     if any(_gain(one, "") and word != "no change shown" for one, word in zip(parts, words)):
-        headline += ", all heights by the same factor, as by an instrument's gain"
+        headline += ", all heights by the same factor, as an error in the instrument's gain would do"
     over = _over(parts) if parts[0].change is None else scans.over(parts[0].change)
     headline = f"{headline}; {over}" if over else headline
     out = [] if parts[0].change is None else scans.sentences(parts[0].change)
     if areal and identical(parts[0].before, parts[0].after):
-        out.insert(0, "The heights of both scans are the same, as of one file given twice.")
+        out.insert(0, "The heights of both scans are the same; was the same file given twice?")
     for one, word, name in zip(parts, words, names):
         if not isinstance(one.before, Areal):
             out += [*_variant(one, name), _worn(one, name), *_reference(one)]
@@ -101,7 +102,7 @@ def _range(ratio: Quantity) -> str:
 def _amplitude(ratio: Quantity, word: str, name: str) -> str:
     if ratio.value is None:
         return f"Amplitude{name}: {ratio.reason}."
-    start = f"The waves of the band{name} have {_range(ratio)} of their amplitude before wear: "
+    start = f"The waves of the band{name} have {_range(ratio)} times their amplitude before wear: "
     if word == "no change shown":
         return start + "the interval contains 1, so no change is shown."
     return start + f"{word}, at {sure(ratio)}."
@@ -113,15 +114,15 @@ def _slope(ratio: Quantity, name: str) -> str:
     word = changed(ratio)
     tail = "no change is shown" if word == "no change shown" else \
         f"{'flatter' if word == 'reduced' else 'steeper'}, at {sure(ratio)}"
-    return f"The slope{name} is {_range(ratio)} of the slope before wear: {tail}."
+    return f"The slope{name} is {_range(ratio)} times the slope before wear: {tail}."
 
 
 def _gain(one: Comparison, name: str) -> list:
     """That waves or slopes changed by one factor of all heights, as a sentence."""
     if one.gain is None or {changed(one.amplitude_ratio), changed(one.slope_ratio)} == {"no change shown"}:
         return []
-    return [f"All heights{name} after wear are {one.gain:.4g} times the heights before; the gain of an instrument "
-            "explains this, wear does not; calibrate z of both measurements."]
+    return [f"All heights{name} after wear are {one.gain:.4g} times the heights before; a difference in the gain of "
+            "the instrument explains this factor, but wear does not; calibrate z of both measurements."]
 
 
 def _sure(mean: Quantity) -> bool:
@@ -148,31 +149,31 @@ def _variant(one: Comparison, name: str) -> list:
     """What was turned for the comparison, as a sentence."""
     out = []
     if one.mirrored:
-        out.append(f"The second trace{name} was measured in the opposite direction; it was mirrored here, so its x "
-                   "counts from the other end.")
+        out.append(f"The second trace{name} was measured in the opposite direction; the trace was mirrored here, so "
+                   "its x counts from the other end.")
     if one.turned:
-        out.append(f"The heights of both traces{name} have opposite signs: one was inverted here, so that wear counts "
-                   "as missing material; check in which file heights point into the material.")
+        out.append(f"The heights of both traces{name} have opposite signs: one trace was inverted here, so that wear "
+                   "counts as missing material; check in which file the heights point into the material.")
     return out
 
 
 def _worn(one: Comparison, name: str) -> str:
     if identical(one.before, one.after):
-        return f"Worn depth{name}: none; the heights before and after are the same."
+        return f"Worn depth{name}: none; the heights before and after wear are the same."
     mean = one.worn.mean
     above = ""
     if one.worn.deposited > DEPOSITED * (one.worn.area.value or 0.0) and one.worn.deposited > 0:
-        above = (f" {1e12 * one.worn.deposited:.3g} um^2 of material lie above the first trace (before wear): "
-                 "deposits, or the two files are in the wrong order." if one.exchanged else
-                 f" {1e12 * one.worn.deposited:.3g} um^2 of material lie above the first trace (before wear): deposits "
-                 "or pile-up.")
+        above = (f" {1e12 * one.worn.deposited:.3g} um^2 of material lie above the first trace (before wear): there "
+                 "are deposits, or the two files are in the wrong order." if one.exchanged else
+                 f" {1e12 * one.worn.deposited:.3g} um^2 of material lie above the first trace (before wear): there "
+                 "are deposits or pile-up.")
     if one.reference == "place" and not one.carried.by:
         return f"Worn depth{name}: none shown.{above} {may_hide(one.registration, one.hidden)}"
     if mean.value is None:
         text = f"Worn depth{name}: not available; {mean.reason}."
         if one.abbott is not None and one.abbott.value is not None:
-            text += (f" The valley tails of the Abbott curves suggest {_length(one.abbott)}, if the surface is "
-                     "uniform and its valleys are unworn.")
+            text += (f" The valley tails of the Abbott curves suggest a mean worn depth of {_length(one.abbott)}, if "
+                     "the surface is uniform and its valleys are unworn.")
         return text
     if not _sure(mean):
         return f"Worn depth{name}: none shown; at most {say(mean.high)} on average.{above}"
@@ -183,7 +184,7 @@ def _worn(one: Comparison, name: str) -> str:
         before, after = (_span(*(end.value for end in ends)) for ends in one.worn.extent)
         text += f" Worn from x = {before} in the first trace (before wear), that is from {after} in the second"
         mean = one.worn.within
-        text += "." if mean is None else f", and between these places {_length(mean)} on average."
+        text += "." if mean is None else f", with a depth of {_length(mean)} on average between these places."
     return text
 
 
@@ -212,11 +213,11 @@ def _track(one: Comparison) -> str:
 def _apart(one: Comparison) -> list:
     """What stands beside the wear: edges that the ratios leave out, a valley that is new."""
     cut = one.tracks.spans or one.flanks is not None
-    out = ["Amplitude and slope leave out the edges of the track."] if cut else []
+    out = ["Amplitude and slope are computed without the edges of the track."] if cut else []
     if one.tracks.valley is not None:
         place, depth = one.tracks.valley
-        out.append(f"A valley {say(depth, 3)} deep at x = {say(place, 4)} is only in the second trace (after wear): a "
-                   "scratch or a pit; the worn depths include it too.")
+        out.append(f"A valley {say(depth, 3)} deep at x = {say(place, 4)} is only in the second trace (after wear), "
+                   "such as a scratch or a pit; the worn depths include this valley.")
     return out
 
 
@@ -234,6 +235,6 @@ def _direction(when: str, amplitude: Quantity, slope: Quantity) -> str:
         word = changed(one)
         shown = "no difference is shown" if word == "no change shown" else \
             f"{'smaller' if word == 'reduced' else 'larger'} along x, at {sure(one)}"
-        parts.append(f"{name} along x over along y {_range(one)}: {shown}")
+        parts.append(f"{name} along x divided by that along y = {_range(one)}: {shown}")
     whole = "anisotropic" if changed(amplitude) in ("reduced", "increased") else "no anisotropy shown"
     return f"{when[0].upper() + when[1:]}: {whole}; " + "; ".join(parts) + "."

@@ -37,8 +37,8 @@ def npy(raw: Raw, units: tuple | None) -> Profile | Areal:
     if table.ndim == 2 and table.shape[0] in (2, 3) and table.shape[1] > 3:
         table = table.T
     if table.ndim != 2 or table.shape[1] not in (2, 3):
-        raise PatchfemError(f"{path}: an array of shape {table.shape}; columns x, z or x, y, z are needed: {TABLE}; "
-                            f"for a matrix of heights {PIXEL}")
+        raise PatchfemError(f"{path}: contains an array of shape {table.shape}; columns x, z or x, y, z are needed, as "
+                            f"{TABLE} writes them; for a matrix of heights, {PIXEL}")
     return _table(path, table, factors)
 
 
@@ -113,12 +113,14 @@ def _npy(raw: Raw):
         raise PatchfemError(f"{path}: the header of the .npy file is damaged or holds an unsupported array; save it "
                             f"anew: {TABLE}") from None
     if kind.kind not in "fiu" or kind.itemsize > 8:
-        what = "Python objects, which are never loaded" if kind.hasobject else f"'{shown(kind.str)}'"
-        raise PatchfemError(f"{path}: holds {what}; save numbers: {TABLE}")
+        what = ("Python objects, which are not loaded because they may run "
+                "code") if kind.hasobject else f"'{shown(kind.str)}'"
+        raise PatchfemError(f"{path}: contains {what}; save plain numbers: {TABLE}")
     count, left = math.prod(shape), len(raw.data) - file.tell()
     if count > POINTS * 3:
-        raise PatchfemError(f"{path}: {count} numbers by its header, more than {POINTS:.0e} points; save a part of it")
+        raise PatchfemError(f"{path}: {count} numbers are announced in the header, more than the limit of {POINTS:.0e} "
+                            "points; save only a part of the array")
     if count * kind.itemsize != left:
-        raise PatchfemError(f"{path}: {left} bytes where {count} numbers of {kind.name} are needed; the file is cut "
-                            "off or damaged")
+        raise PatchfemError(f"{path}: {left} bytes of data are not the {count} numbers of type {kind.name} that the "
+                            "header announces; the file is cut off or damaged")
     return np.frombuffer(raw.data, kind, count, file.tell()).reshape(shape, order="F" if fortran else "C")

@@ -30,7 +30,7 @@ def dektak(raw: Raw) -> Profile:
     path, text = raw.path, text_of(raw)
     header = _HEADER.search(text)
     if header is None:
-        raise PatchfemError(f"{path}: a Dektak export without its columns `Lateral um,Raw Micrometer`; export the scan "
+        raise PatchfemError(f"{path}: a Dektak export without the columns `Lateral um,Raw Micrometer`; export the scan "
                             "data as CSV")
     number = text.count("\n", 0, header.start()) + 1
     factors = [_unit(f"{path}:{number}", word) for word in header.groups()]
@@ -98,7 +98,7 @@ def _stepped(path, x, length: float | None, factor: float) -> tuple:
         step = length / factor / count
         if np.abs(x - (x[0] + step * steps)).max() <= 0.6 * digit:  # half a digit, and the round-off of the printing
             return x[0] + step * steps, (
-                f"{path}: x is printed to {say(digit * factor)}; the step is {say(length)}/{count} = "
-                f"{say(step * factor)} by the header",)
+                f"{path}: x is printed only to {say(digit * factor)}; the step {say(length)}/{count} = "
+                f"{say(step * factor)} of the header is used",)
     return x, (f"{path}: the length of {say(length)} in the header does not fit {x.size} samples that end at "
                f"{say(x[-1] * factor)}: the printed x are used",)

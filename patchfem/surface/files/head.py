@@ -91,8 +91,9 @@ class Head(NamedTuple):
                     value = _VALUE.match(said["is"])
                     if _THOUSANDS.fullmatch(value[1] or "") and not _GERMAN.search(said[0]) \
                             and not any("," in cell for cell in self.row):
-                        raise PatchfemError(f"{path}:{at}: '{shown(line)}': {value[1]} may have a decimal comma or a "
-                                            "thousands separator; write it with a point, or without the comma")
+                        raise PatchfemError(f"{path}:{at}: '{shown(line)}': the comma in {value[1]} may be a decimal "
+                                            "comma or a thousands separator; write a decimal point, or leave out the "
+                                            "comma")
                     number = value[1] and float(value[1].replace(",", "."))
                     found[name] = number, said["of"] or value[2]
         return found
@@ -109,7 +110,7 @@ def head_of(path, text: str) -> Head:
         comment = line.startswith(COMMENT)
         if len(line) > WIDEST and not comment:
             if not _NUMERIC.fullmatch(line):
-                raise PatchfemError(f"{path}:{number}: a line of {len(line)} characters; two columns are needed, "
+                raise PatchfemError(f"{path}:{number}: a line is {len(line)} characters long; two columns are needed, "
                                     f"{EXAMPLE}")
         plain = line[:WIDEST].lstrip("#%/").strip() if comment else line
         names, cells, delimiter = ([], [], None) if len(plain) > WIDEST else names_of(plain, comment)
@@ -124,7 +125,7 @@ def head_of(path, text: str) -> Head:
         start = stop + 1
     if all(comment for *_, comment in lines):
         raise PatchfemError(f"{path}: no data, only comments")
-    raise PatchfemError(f"{path}: no row of numbers in its first {number} lines; {EXAMPLE} above rows of two numbers")
+    raise PatchfemError(f"{path}: no row of numbers in the first {number} lines; {EXAMPLE} above rows of two numbers")
 
 
 def named(cells: list) -> bool:

@@ -64,18 +64,19 @@ def _read(path, file) -> tuple:
         if ended == 0:  # it had just ended, idle
             found, arrays, ended = _asked(path, file)
     if ended == 3:
-        raise Missing(f"{path}: an instrument's own format; SurfaceTopography reads many of them: {REMEDY}, or export "
-                      "the surface as text with the header `x [um],z [um]`")
+        raise Missing(f"{path}: a file in an instrument's own format; the package SurfaceTopography can read many such "
+                      f"formats: {REMEDY}, or export the surface as text with the header `x [um],z [um]`")
     if ended == "late":
-        raise PatchfemError(f"{path}: SurfaceTopography did not finish reading it in {WAIT:g} s; {ELSE}")
+        raise PatchfemError(f"{path}: SurfaceTopography did not finish reading this file in {WAIT:g} s; {ELSE}")
     if ended == -24:  # SIGXCPU
-        raise PatchfemError(f"{path}: SurfaceTopography did not read it in {SECONDS:g} s of CPU time; {ELSE}")
+        raise PatchfemError(f"{path}: SurfaceTopography did not finish reading this file in {SECONDS:g} s of CPU time; "
+                            f"{ELSE}")
     if ended is not None:
-        raise PatchfemError(f"{path}: SurfaceTopography failed on it; {ELSE}")
+        raise PatchfemError(f"{path}: SurfaceTopography failed to read this file; {ELSE}")
     if "error" in found:
-        raise PatchfemError(f"{path}: SurfaceTopography cannot read it ({reason(found['error'])}); {ELSE}")
+        raise PatchfemError(f"{path}: SurfaceTopography cannot read this file ({reason(found['error'])}); {ELSE}")
     if len(arrays) not in (2, 3) or not all(one.size for one in arrays):
-        raise PatchfemError(f"{path}: SurfaceTopography found no heights in it; {ELSE}")
+        raise PatchfemError(f"{path}: SurfaceTopography found no heights in this file; {ELSE}")
     return found, arrays
 
 
@@ -84,7 +85,7 @@ def _asked(path, file) -> tuple:
     try:
         process = _process()
     except (OSError, ValueError) as error:
-        raise Missing(f"{path}: no process could be started to read it ({error})") from None
+        raise Missing(f"{path}: no process could be started to read this file ({error})") from None
     late = threading.Timer(WAIT, process.kill)
     late.start()
     try:

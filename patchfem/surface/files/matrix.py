@@ -35,11 +35,11 @@ def matrix(path, head: Head, facts: dict, given: tuple | None, body: str) -> Pro
     for name, axis, count in (("rows", "rows", table.shape[0]), ("columns", "numbers a row", table.shape[1])):
         stated = facts.get(name, (None,))[0]
         if stated is not None and stated != count:
-            raise PatchfemError(f"{path}: {count} {axis} where its header says {stated:g}; the file is cut off or "
+            raise PatchfemError(f"{path}: {count} {axis}, but the header says {stated:g}; the file is cut off or "
                                 "joined from parts: export the scan anew")
     if min(table.shape) > 3 and _even(table[0, 1:]) and _even(table[1:, 0]) and not _even(table[1, 1:]):
-        raise PatchfemError(f"{path}: the first row and the first column of its matrix grow evenly, like coordinates "
-                            "and not heights; leave them out")
+        raise PatchfemError(f"{path}: the first row and the first column of the matrix grow evenly, like coordinates "
+                            "and not heights; leave out this row and this column")
     steps, notes = [], ()
     for axis, count in zip(("x", "y"), table.shape[::-1]):
         if axis == "y" and count == 1:
@@ -72,10 +72,11 @@ def _height(path, facts: dict, given: tuple | None) -> tuple:
         told, scale = "nm", facts["bit2nm"][0]
     scale = 1.0 if scale is None else scale
     if not 0 < abs(scale) < np.inf:
-        raise PatchfemError(f"{path}: its heights have the factor {scale:g}; export the scan anew")
+        raise PatchfemError(f"{path}: the factor of the heights in the header is {scale:g}, which is not possible; "
+                            "export the scan anew")
     if told is not None and factor_of(told) is None and given is None:
-        raise PatchfemError(f"{path}: its values are in '{shown(told)}', which is not a length; export the channel of "
-                            f"the heights, or {GIVE}")
+        raise PatchfemError(f"{path}: the values are in '{shown(told)}', which is not a unit of length; export the "
+                            f"channel of the heights, or {GIVE}")
     if told is None and given is None:
         raise PatchfemError(f"{path}: a matrix of heights whose unit is not given; write `# Value units: um` above its "
                             f"rows, or {GIVE}")
@@ -87,21 +88,22 @@ def _step(path, axis: str, count: int, facts: dict, given: tuple | None) -> tupl
     """Step along x or y [m]; notes."""
     size, step = ("width", "step_x") if axis == "x" else ("height", "step_y")
     if given is not None and (pixel := pixel_of(given[0])) is not None:
-        told = f"{path}: its header gives its size along {axis}; the given pixel size, {given[0]}, is used"
+        told = (f"{path}: the header gives the size of the scan along {axis}, but the pixel size that you gave, "
+                f"{given[0]}, is used instead")
         return pixel, () if {size, step}.isdisjoint(facts) else (told,)
     if axis == "y" and step not in facts and size not in facts:
         step = "step_x"  # square pixels by a size of one number
     number, unit = facts.get(step, facts.get(size, (None, "")))
     if number is None or not 0 < number < np.inf:
         raise PatchfemError(f"{path}: the rows are a matrix of heights (a map, or more than three numbers in a row), "
-                            f"but its {'width' if axis == 'x' else 'height'} is not given; {ABOVE}")
+                            f"but the {'width' if axis == 'x' else 'height'} of the scan is not given; {ABOVE}")
     unit = unit or next((facts[name][1] for name in ("unit_y", "lateral") if axis == "y" or name == "lateral"
                          if name in facts), None)
     if not unit and facts.get("format", ("", ""))[1].lower() == "ascii":
         unit = "nm"  # SPIP writes places in nanometres
     if given is None and factor_of(unit or "") is None:
-        raise PatchfemError(f"{path}: the unit of its width and height, '{shown(unit or '')}', is not known; write "
-                            f"{SIZE}, or {GIVE}")
+        raise PatchfemError(f"{path}: the unit of the scan's width and height, '{shown(unit or '')}', is not known; "
+                            f"write {SIZE}, or {GIVE}")
     unit, notes = _overruled(path, f"places along {axis}", unit or None, given and given[0])
     return number * factor_of(unit) / (1 if step in facts else count), notes
 
@@ -110,7 +112,7 @@ def _overruled(path, what: str, told: str | None, asked: str | None) -> tuple:
     """The unit that counts, and a note where the one given overrules the one of the file."""
     if asked is None or told is None or factor_of(asked) == factor_of(told):
         return asked or told, ()
-    return asked, (f"{path}: its header gives {what} in {shown(told)}; {asked} is used, as given by --units",)
+    return asked, (f"{path}: the header gives {what} in {shown(told)}, but {asked} is used, as given by --units",)
 
 
 def _table(path, head: Head, body: str) -> np.ndarray:
@@ -138,13 +140,14 @@ def _row(at: str, line: str, delimiter: str | None, count: int) -> list:
         return []
     if line.startswith(COMMENT):
         if ":" in line or "=" in line:
-            raise PatchfemError(f"{at}: '{shown(line)}' begins another scan or ends this one; keep one scan in a file")
+            raise PatchfemError(f"{at}: '{shown(line)}' ends the scan or begins another one; keep only one scan per "
+                                "file")
         return []
     cells = [cell.strip() for cell in line.split(delimiter)]
     cells = cells if len(cells) == count else trimmed(cells)
     if len(cells) != count:
-        raise PatchfemError(f"{at}: {len(cells)} numbers where the first row of the matrix has {count}; write nan for "
-                            "a missing height, and one row of the scan per line")
+        raise PatchfemError(f"{at}: {len(cells)} numbers, but the first row of the matrix has {count}; write nan for a "
+                            "missing height, and one row of the scan per line")
     bad = next((cell for cell in cells if not is_number(cell, delimiter)), None)
     if bad is not None:
         raise PatchfemError(f"{at}: '{shown(bad)}' is not a height; write a missing height as nan")

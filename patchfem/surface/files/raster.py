@@ -25,8 +25,8 @@ def raster(path, columns: list, at, factors: tuple, stated: str = "") -> Profile
         return checked(path, y if xs.size == 1 else x, z, at, (factors[xs.size == 1], factors[2]), stated)
     cells = xs.size * ys.size
     if cells > max(SPARSE * z.size, 16) or cells > POINTS:
-        raise PatchfemError(f"{path}: {z.size} points with {xs.size} x and {ys.size} y do not lie on a grid; export "
-                            "the scan as a grid, or one trace of two columns")
+        raise PatchfemError(f"{path}: {z.size} points with {xs.size} different x and {ys.size} different y do not fill "
+                            "a grid; export the scan as a grid, or one trace of two columns")
     place = row * xs.size + column
     if np.unique(place).size < place.size:
         first = np.setdiff1d(np.arange(place.size), np.unique(place, return_index=True)[1])[0]
@@ -50,7 +50,7 @@ def areal(path, x, y, z, stated: str = "", notes: tuple = ()) -> Profile | Areal
     axes = []
     for axis, (name, values) in enumerate((("y", y), ("x", x))):
         if len(values) < 2:
-            raise PatchfemError(f"{path}: {len(values)} places along {name}; a scan needs at least two")
+            raise PatchfemError(f"{path}: {len(values)} positions along {name}; a scan needs at least two")
         bounded(path, (values,), (name,), None, (1.0,))
         if values[-1] < values[0]:
             values, z = values[::-1], np.flip(z, axis)

@@ -96,7 +96,7 @@ def _inner(path: Path, name: Path, data: bytes) -> Raw:
     """What was inside a packed file, as a file of its own."""
     kind = _kind(data[:HEAD])
     if kind == "gzip" or (kind == "zip" and path.suffix.lower() == ".zip"):
-        raise PatchfemError(f"{path}: packed twice; unpack it once")
+        raise PatchfemError(f"{path}: the file was compressed twice; unpack it once")
     _limited(path, kind, len(data))
     found = Raw(path, kind, name.suffix.lower(), data)
     return _unzipped(found, packed=True) if kind == "zip" else found
@@ -117,7 +117,7 @@ def _gunzipped(path, data: bytes) -> bytes:
         raise PatchfemError(f"{path}: the gzip file is damaged ({reason(error)}); pack it again") from None
     if size > most:
         _limited(path, _kind(head), size)
-        raise PatchfemError(f"{path}: unpacks to more than {RATIO} times its size; give the unpacked file")
+        raise PatchfemError(f"{path}: the file unpacks to more than {RATIO} times its size; give the unpacked file")
     return out
 
 
@@ -148,7 +148,8 @@ def opened(raw: Raw) -> zipfile.ZipFile:
         raise PatchfemError(f"{raw.path}: the zip file is damaged (it has no end); pack it again")
     size = struct.unpack_from("<I", raw.data, end + 12)[0]
     if size > DIRECTORY:
-        raise PatchfemError(f"{raw.path}: the zip file lists too many members; unpack it and give the one file")
+        raise PatchfemError(f"{raw.path}: the zip file lists too many members; unpack the zip file and give only the "
+                            "file of the profile")
     try:
         return zipfile.ZipFile(io.BytesIO(raw.data))
     except BROKEN as error:
@@ -170,7 +171,7 @@ def member(raw: Raw, archive: zipfile.ZipFile, name: str, most: int = LARGEST) -
         raise PatchfemError(f"{raw.path}: {shown(name)} inside it is damaged ({reason(error)}); export the surface anew"
                             ) from None
     if len(out) != info.file_size:
-        raise PatchfemError(f"{raw.path}: {shown(name)} inside it is damaged (its size is wrong); export it anew")
+        raise PatchfemError(f"{raw.path}: {shown(name)} inside it is damaged (wrong size); export the surface anew")
     return out
 
 

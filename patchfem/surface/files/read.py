@@ -44,8 +44,8 @@ def read_profile(path, units: tuple | None = None) -> Profile:
     """Read the one trace in a file (`read_surface`); PatchfemError for an areal scan."""
     found = read_surface(path, units)
     if isinstance(found, Areal):
-        raise PatchfemError(f"{path}: an areal scan of {found.z.shape[0]} x {found.z.shape[1]} heights where one trace "
-                            "is needed; write one of its rows to a file with the header `x [um],z [um]`")
+        raise PatchfemError(f"{path}: an areal scan of {found.z.shape[0]} x {found.z.shape[1]} heights, but a single "
+                            "trace is needed; write one row of the scan to a file with the header `x [um],z [um]`")
     return found
 
 

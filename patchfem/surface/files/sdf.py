@@ -31,7 +31,7 @@ def sdf(raw: Raw) -> Profile | Areal:
     z = np.reshape(data, (rows, count)) * header["Zscale"]
     notes = ()
     if header.get("CheckType"):
-        notes = (f"{raw.path}: its checksum of kind {header['CheckType']:g} is not verified",)
+        notes = (f"{raw.path}: the checksum of the file (kind {header['CheckType']:g}) is not verified",)
     return areal(raw.path, np.arange(count) * header["Xscale"], np.arange(rows) * header["Yscale"], z, METRES, notes)
 
 
@@ -52,7 +52,7 @@ def _checked(raw: Raw, header: dict) -> dict:
         if not 0 < header[name] < np.inf and not one_row:
             raise PatchfemError(f"{path}: {name} = {header[name]:g}; a length > 0 m is needed")
     if header.get("Compression"):
-        raise PatchfemError(f"{path}: compressed; export the scan uncompressed")
+        raise PatchfemError(f"{path}: the file is compressed; export the scan uncompressed")
     return header
 
 
@@ -61,12 +61,13 @@ def _binary(raw: Raw) -> tuple:
         raise PatchfemError(f"{raw.path}: the header ends too early; export the scan anew")
     header = _checked(raw, dict(zip(_NAMES, _BINARY.unpack_from(raw.data)[4:])))
     if header["DataType"] >= len(TYPES):
-        raise PatchfemError(f"{raw.path}: DataType = {header['DataType']}; 0 to {len(TYPES) - 1} are known")
+        raise PatchfemError(f"{raw.path}: DataType = {header['DataType']}; a number from 0 to {len(TYPES) - 1} is "
+                            "needed")
     kind = np.dtype(TYPES[header["DataType"]])
     count = header["NumPoints"] * header["NumProfiles"]
     if len(raw.data) - _BINARY.size < count * kind.itemsize:
-        raise PatchfemError(f"{raw.path}: {len(raw.data) - _BINARY.size} bytes of heights where {count} of {kind.name} "
-                            "are needed; export the scan anew")
+        raise PatchfemError(f"{raw.path}: {len(raw.data) - _BINARY.size} bytes of heights, but {count} heights of type "
+                            f"{kind.name} are needed; export the scan anew")
     data = np.frombuffer(raw.data, kind, count, _BINARY.size)
     z = data.astype(float)
     if kind.kind in "iu" and kind.itemsize > 1:
@@ -94,10 +95,10 @@ def _ascii(raw: Raw) -> tuple:
     count = header["NumPoints"] * header["NumProfiles"]
     words = rest.partition(b"*")[0].replace(b",", b" ").split(None, count)
     if len(words) != count:
-        raise PatchfemError(f"{raw.path}: {'more' if len(words) > count else len(words)} heights "
-                            f"{'than' if len(words) > count else 'where'} {count} are needed; export the scan anew")
+        raise PatchfemError(f"{raw.path}: {'too many' if len(words) > count else len(words)} heights, but {count} are "
+                            "needed; export the scan anew")
     try:
         z = np.array([np.nan if word.upper() == b"BAD" else float(word) for word in words])
     except ValueError as error:
-        raise PatchfemError(f"{raw.path}: {shown(str(error))}; heights are numbers or BAD") from None
+        raise PatchfemError(f"{raw.path}: {shown(str(error))}; each height must be a number or BAD") from None
     return header, z

@@ -48,21 +48,21 @@ def columns(raw: Raw, given: tuple | None = None) -> Profile | Areal:
     if not head.named and is_matrix(len(head.row), names, facts):
         return matrix(path, head, facts, given, text[head.start:])
     if pixel:
-        raise PatchfemError(f"{path}: '{shown(given[0])}' is the pixel size of a matrix of heights, but this file has "
-                            "columns; give the units of the columns")
+        raise PatchfemError(f"{path}: '{shown(given[0])}' is a pixel size, which is needed only for a matrix of "
+                            "heights, but this file has columns; give the units of the columns")
     if len(head.named or head.row) < 2:
-        raise PatchfemError(f"{path}:{head.number + 1}: one column, '{shown(head.row[0])}', where x and z are needed; "
-                            f"{EXAMPLE}")
+        raise PatchfemError(f"{path}:{head.number + 1}: only one column, '{shown(head.row[0])}', but x and z are "
+                            f"needed; {EXAMPLE}")
     if not (names or given or units or "lateral" in facts):
-        raise PatchfemError(f"{path}:{at}: no header, and units are never guessed; {EXAMPLE} above the first sample, "
-                            f"or {GIVE}")
+        raise PatchfemError(f"{path}:{at}: there is no header, and units are never guessed; {EXAMPLE} above the first "
+                            f"sample, or {GIVE}")
     place, notes = _roles(f"{path}:{at}", names or list("xz" if len(head.row) == 2 else "xyz"), given is not None)
     found, lines = values(path, text[head.start:], head.number, place, head.delimiter, len(names or head.row))
     if "valid" in place:
         found["z"] = np.where(found.pop("valid") == 0, np.nan, found["z"])
     if list(place) == ["x", "y", "z"] and not {"x", "y"} <= {role_of(cell)[0] for cell in names} and _counted(found):
         place, found = {"x": place["y"], "z": place["z"]}, {"x": found["y"], "z": found["z"]}
-        notes += (f"{path}: the first column counts the samples; x and z are taken from the others",)
+        notes += (f"{path}: the first column numbers the samples; x and z are taken from the other columns",)
     factors, more = _factors(f"{path}:{at}", place, (names, units), facts, given)
     said = GIVEN if given else ""
     if "y" not in place:
@@ -110,7 +110,7 @@ def _roles(at: str, cells: list, given: bool) -> tuple:
     data = {k: role for k, role in roles.items() if role not in ("valid", "index")}
     if not 1 < len(data) < 4:
         what = f"{len(cells)} columns" if len(data) == len(cells) else f"{', '.join(map(shown, cells))}"
-        raise PatchfemError(f"{at}: {what} where x and z, or x, y and z, are needed; keep one trace of two columns and "
+        raise PatchfemError(f"{at}: {what}, but x and z, or x, y and z, are needed; keep one trace of two columns and "
                             f"{EXAMPLE}")
     known, notes = ("x", "z") if len(data) == 2 else ("x", "y", "z"), ()
     if sorted(data.values()) == ["x", "y"]:
@@ -118,8 +118,8 @@ def _roles(at: str, cells: list, given: bool) -> tuple:
     strange = next((cells[k] for k, role in data.items() if role not in known), None)
     if strange is not None and not given:
         listed = " and ".join(filter(None, (", ".join(known[:-1]), known[-1])))
-        raise PatchfemError(f"{at}: column '{shown(strange.partition('[')[0].strip())}' is not known, {listed} are "
-                            f"needed; {EXAMPLE}")
+        raise PatchfemError(f"{at}: column '{shown(strange.partition('[')[0].strip())}' is not known; the columns "
+                            f"{listed} are needed; {EXAMPLE}")
     if strange is not None:
         names = ", ".join(f"'{shown(cells[k])}'" for k in data)
         data = dict(zip(data, known))
@@ -152,7 +152,7 @@ def _factors(at: str, place: dict, cells: tuple, facts: dict, given: tuple | Non
         if factor_of(unit) is None:
             raise PatchfemError(f"{at}: unknown unit '{shown(unit)}' of {name}; use one of {LISTED}")
         if told is not None and factor_of(told) != factor_of(unit):
-            notes += (f"{at}: the header gives {name} in {shown(told)}; {unit} is used, as given by --units",)
+            notes += (f"{at}: the header gives {name} in {shown(told)}, but {unit} is used, as given by --units",)
         factors.append(factor_of(unit))
     return tuple(factors), notes
 
@@ -228,7 +228,7 @@ def _row(at: str, line: str, columns: tuple, delimiter, comma: bool) -> list | N
         return None
     words = _COUNTS[width]
     if len(line) > WIDEST:
-        raise PatchfemError(f"{at}: a line of {len(line)} characters; {words} numbers are needed")
+        raise PatchfemError(f"{at}: the line is {len(line)} characters long; {words} numbers are needed")
     cells = [cell.strip() for cell in line.split(delimiter)]
     while len(cells) > width and not cells[-1]:
         cells.pop()
@@ -239,7 +239,7 @@ def _row(at: str, line: str, columns: tuple, delimiter, comma: bool) -> list | N
         raise PatchfemError(f"{at}: '{shown(line)}': {words} numbers are needed; write nan for a missing height")
     if comma and "." in line:
         raise PatchfemError(f"{at}: '{shown(line)}': the decimal sign is a comma elsewhere in the file and a point "
-                            "here; use only one")
+                            "here; use the same sign in the whole file")
     if comma:
         cells = [cell.replace(",", ".") if COMMA.fullmatch(cell) else cell for cell in cells]
     return [_value(at, name, cells[k]) for name, k in place.items()]
@@ -252,4 +252,4 @@ def _value(at: str, name: str, cell: str) -> float:
         return float(cell)
     if name == "z":
         raise PatchfemError(f"{at}: '{shown(cell)}' is not a height; write a missing height as nan")
-    raise PatchfemError(f"{at}: '{shown(cell)}' is not a number for {name}; correct the line or leave it out")
+    raise PatchfemError(f"{at}: '{shown(cell)}' is not a number for {name}; correct the line or delete it")

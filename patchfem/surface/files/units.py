@@ -10,10 +10,10 @@ _WORDS |= {f"{prefix}{end}": factor for prefix, factor in (
     ("", 1.0), ("milli", 1e-3), ("micro", 1e-6), ("mikro", 1e-6), ("nano", 1e-9))
     for end in ("meter", "meters", "metre", "metres")}
 LISTED = ", ".join(UNITS)
-GIVE = 'state the units of x and z, --units "mm,um" (in Python units=("mm", "um"))'
-PIXEL = 'give the pixel size in place of the unit of x, --units "0.8 um,um"'
+GIVE = 'state the units of x and z by --units "mm,um" (in Python, by units=("mm", "um"))'
+PIXEL = 'give the pixel size in place of the unit of x, as in --units "0.8 um,um"'
 
-ASIDE = "the file has its own units; the given ones are ignored"
+ASIDE = "the file states its own units; the units that you gave are ignored"
 
 
 def factor_of(word: str) -> float | None:

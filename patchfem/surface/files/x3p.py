@@ -32,7 +32,7 @@ def x3p(raw: Raw) -> Profile | Areal:
     path, archive = raw.path, opened(raw)
     main = [one.filename for one in archive.infolist() if posixpath.basename(one.filename) == "main.xml"]
     if len(main) != 1:
-        raise PatchfemError(f"{path}: {len(main)} main.xml inside it where one is needed")
+        raise PatchfemError(f"{path}: contains {len(main)} files main.xml, but exactly one is needed")
     text = member(raw, archive, main[0], XML)
     root = _parsed(path, text)
     axes = [_axis(path, root, name) for name in _AXES]
@@ -112,7 +112,8 @@ def _shape(path, root: Element) -> tuple:
     if len(sizes) == 1:
         return (1, sizes[0]), True
     if sizes[2] != 1:
-        raise PatchfemError(f"{path}: SizeZ is {sizes[2]}; a surface has one layer: export the layers one by one")
+        raise PatchfemError(f"{path}: SizeZ is {sizes[2]}; a surface must have one layer: export each layer to its own "
+                            "file")
     if sizes[0] * sizes[1] > POINTS:
         raise PatchfemError(f"{path}: {sizes[0]} x {sizes[1]} heights, more than {POINTS:.0e}; export a part of the "
                             "scan")
@@ -126,8 +127,8 @@ def _linked(raw: Raw, archive, link: tuple, axes: list, shape: tuple) -> list:
     record = np.dtype([(name, TYPES[axis[1]]) for name, axis in zip(_AXES, axes) if axis[0] == "A"])
     data = _file(raw, archive, node, folder, ("PointDataLink", "MD5ChecksumPointData", count * record.itemsize))
     if len(data) != count * record.itemsize:
-        raise PatchfemError(f"{path}: {len(data)} bytes of heights where {count} of type {axes[2][1]} are needed; "
-                            "export the surface anew")
+        raise PatchfemError(f"{path}: {len(data)} bytes of heights, but {count} heights of type {axes[2][1]} are "
+                            "needed; export the surface anew")
     points = np.frombuffer(data, record)
     columns = [points[name].astype(float) for name in record.names]
     for values in columns:
@@ -135,7 +136,7 @@ def _linked(raw: Raw, archive, link: tuple, axes: list, shape: tuple) -> list:
     if _text(node, "ValidPointsLink"):
         valid = _file(raw, archive, node, folder, ("ValidPointsLink", "MD5ChecksumValidPoints", count + 8))
         if len(valid) < (count + 7) // 8:
-            raise PatchfemError(f"{path}: {len(valid)} bytes of valid points where {(count + 7) // 8} are needed")
+            raise PatchfemError(f"{path}: {len(valid)} bytes of valid points, but {(count + 7) // 8} bytes are needed")
         bits = np.unpackbits(np.frombuffer(valid, np.uint8), bitorder="little")[:count]
         columns[-1][bits == 0] = np.nan
     return columns
@@ -146,7 +147,8 @@ def _file(raw: Raw, archive, node: Element, folder: str, asked: tuple) -> bytes:
     link, checksum, most = asked
     name = _text(node, link)
     if not name or name.startswith(("/", "\\")) or ".." in re.split(r"[/\\]", name):
-        raise PatchfemError(f"{raw.path}: {link} '{shown(name)}' leads out of the file; export the surface anew")
+        raise PatchfemError(f"{raw.path}: {link} '{shown(name)}' names a place outside the file; export the surface "
+                            "anew")
     data = member(raw, archive, posixpath.join(folder, name.removeprefix("./")), most)
     wanted = _text(node, checksum)
     if _MD5.fullmatch(wanted) and hashlib.md5(data, usedforsecurity=False).hexdigest() != wanted.lower():
@@ -165,7 +167,7 @@ def _main_checksum(raw: Raw, archive, root: Element, folder: str, text: bytes) -
         return ()
     if hashlib.md5(text, usedforsecurity=False).hexdigest() == said[0].lower():
         return ()
-    return (f"{raw.path}: main.xml does not match its checksum in {shown(name)}: it was changed after it was "
+    return (f"{raw.path}: main.xml does not match its checksum in {shown(name)}: main.xml was changed after it was "
             "written",)
 
 
@@ -175,7 +177,8 @@ def _listed(path, root: Element, axes: list, shape: tuple) -> list:
     datums = [] if listed is None else [(one.text or "").strip() for one in listed.findall("Datum")]
     count, wide = shape[0] * shape[1], sum(axis[0] == "A" for axis in axes)
     if len(datums) != count:
-        raise PatchfemError(f"{path}: {len(datums)} heights in main.xml where {count} are needed; export it anew")
+        raise PatchfemError(f"{path}: {len(datums)} heights in main.xml, but {count} are needed; export the surface "
+                            "anew")
     table = np.full((count, wide), np.nan)
     for k, text in enumerate(datums):
         cells = [cell.strip() for cell in text.split(";")]

@@ -143,7 +143,8 @@ def lacking(surface: Surface, name: str) -> str:
     if name == "Str":
         return f"along some direction the autocorrelation stays above 0.2 over {say(half)}, so Str is below " \
                f"{near / half:.2g}"
-    return f"no direction stands out: Str is {aspect(surface):.2g}" if name == "Std" else "the heights determine none"
+    return ("no direction stands out, because Str is "
+            f"{aspect(surface):.2g}") if name == "Std" else "the heights determine none"
 
 
 def cosine_taper(m: int, n: int) -> np.ndarray:

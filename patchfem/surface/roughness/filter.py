@@ -43,8 +43,8 @@ def filtered(profile: Profile, cutoff: float, ends: str = "trimmed", stages: int
 
 def _refuse_short(source: str, cutoff: float, step: float) -> None:
     if not np.isfinite(cutoff) or cutoff < FEWEST * step * (1 - 1e-9):
-        raise PatchfemError(f"{source}: a cut-off of {say(cutoff)} is shorter than {FEWEST} steps of "
-                            f"{say(step)}; the shortest here is {say(FEWEST * step)}")
+        raise PatchfemError(f"{source}: a cut-off of {say(cutoff)} is shorter than {FEWEST} steps of {say(step)}; for "
+                            f"this trace the cut-off must be at least {say(FEWEST * step)}")
 
 
 def filtered_scan(scan: Areal, cutoff: float) -> tuple:

@@ -81,10 +81,10 @@ def _named(found, off: float, size: float, scan: bool) -> str:
     curvature = float(found[3])
     name = CYLINDER if scan else "circle"
     if abs(curvature) <= 2 * off:  # its upper end tells nothing
-        return f"{name}, of a radius above {say(size / (abs(curvature) + off), 3)} (90 %)"
+        return f"{name}, of a radius above {say(size / (abs(curvature) + off), 3)} (90 % confidence)"
     error = size / (abs(curvature) - off) - size / abs(curvature)
     side = "crest" if curvature < 0 else "trough"
-    name += f" of radius {told(size / abs(curvature), error, unit='m')} (90 %), a {side}"
+    name += f" of radius {told(size / abs(curvature), error, unit='m')} (90 % confidence), a {side}"
     return name + (f" whose axis lies {np.degrees(found[4]) % 180:.3g} deg from x" if scan else "")
 
 

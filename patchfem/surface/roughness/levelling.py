@@ -37,7 +37,7 @@ def one_sided_line(x: np.ndarray, z: np.ndarray, side: str = "above", noise: flo
         raise PatchfemError(f"side '{side}' of a one-sided line is not known; use above or below")
     x, z = np.asarray(x, float), np.asarray(z, float) * SIDES[side]
     if x.size < 2 or np.ptp(x) == 0:
-        raise PatchfemError(f"a line through {x.size} heights; at least two places are needed")
+        raise PatchfemError(f"a line cannot be fitted to {x.size} heights; at least two heights are needed")
     scale, middle = np.ptp(x) / 2, (x.max() + x.min()) / 2
     t = (x - middle) / scale
     used = _lower(t, z)

@@ -45,9 +45,9 @@ def _bare(one: Quantity) -> Quantity:
 
 def _doubt(reports: list) -> str:
     if len({one.source for one in reports}) < len(reports):
-        return "a file is given twice and counts twice in the means"
+        return "one file is given twice, so this file counts twice in the means"
     parts = [name for name, sizes in (("lengths", [one.length for one in reports]),
                                       ("spacings", [one.step for one in reports]))
              if max(sizes) > (1 + ALIKE) * min(sizes)]
-    return (f"the {KINDS[reports[0].kind]} differ in their {' and '.join(parts)}, on which extremes and slopes "
-            "depend, so their means mix different quantities") if parts else ""
+    return (f"the {KINDS[reports[0].kind]} differ in their {' and '.join(parts)}, so the means of extremes and slopes "
+            "mix quantities that are defined differently") if parts else ""

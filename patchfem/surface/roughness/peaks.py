@@ -115,19 +115,20 @@ def _uneven(z, moments: Moments, length: float) -> str:
     count = max(moments.slope * length / (np.pi * moments.height), 1.0)
     if abs(skew) <= max(SKEWED, SURE * np.sqrt(6 / count)) and abs(excess) <= max(PEAKED, SURE * np.sqrt(24 / count)):
         return ""
-    return (f"the heights have skewness {skew:.2g} and kurtosis {excess + 3:.2g}, those of the theory are Gaussian "
-            "(0 and 3): " + ("tops cut by wear are stiffer than it says" if skew < -SKEWED else
-                          "single high peaks are softer than it says" if skew > SKEWED else
-                          "its stiffness is a guess"))
+    return (f"the heights have skewness {skew:.2g} and kurtosis {excess + 3:.2g}, but the theory assumes Gaussian "
+            "heights (0 and 3): " + ("tops that were cut off by wear are stiffer than the theory "
+                                     "predicts" if skew < -SKEWED else
+                          "single high peaks are softer than the theory predicts" if skew > SKEWED else
+                          "the stiffness from the theory is only a guess"))
 
 
 def peaks_of(moments: Moments) -> Peaks:
     """The Peaks of a surface whose traces have some Moments; PatchfemError where no surface alike in all directions has
     them."""
     if not moments.alpha >= NARROWEST * (1 - 1e-9):
-        raise PatchfemError(f"rms_height x rms_curvature/rms_slope^2 is {np.sqrt(moments.alpha):.3g}, but it is at "
-                            f"least {np.sqrt(NARROWEST):.3g} on an isotropic surface of Gaussian "
-                            "heights; take all three from one trace across the lay, or give radius, density and "
+        raise PatchfemError(f"rms_height x rms_curvature/rms_slope^2 is {np.sqrt(moments.alpha):.3g}, but on an "
+                            f"isotropic surface of Gaussian heights this number is at least {np.sqrt(NARROWEST):.3g}; "
+                            "take all three from one trace across the lay, or give radius, density and "
                             "height_deviation of the peaks")
     m0, m2, m4 = (one**2 for one in moments)
     return Peaks(3 / 8 * float(np.sqrt(np.pi / m4)), float(m4 / (6 * np.pi * np.sqrt(3) * m2)),

@@ -22,11 +22,13 @@ from .tip import Tip, tip_check
 
 FEWEST = 16  # samples of a trace with a report
 UNTOLD = "a single trace gives no interval for this parameter"
-UNEVEN = "the heights are not Gaussian, which intervals of one trace assume; use the scatter of several traces"
+UNEVEN = ("an interval from a single trace assumes Gaussian heights, but these heights are not Gaussian; use the "
+          "scatter of several traces")
 CUTOFFS = (25e-6, 80e-6, 250e-6, 800e-6, 2.5e-3, 8e-3, 25e-3)  # [m] of ISO 21920-3, and one more at each end
 SECTIONS = 6  # cut-offs in a trace: five that count and one that the filter takes
 ROUND = 1e-14  # of the largest height: what levelling leaves of a straight line
-LONG = "fewer than four of the strongest waves fit the trace, so a longer one would give another value"
+LONG = ("the trace is shorter than four wavelengths of its strongest wave, so a longer trace would give a different "
+        "value")
 PRINTED = {"Ra": "Pa", "Rq": "Pq", "Skew": "Psk", "RzDin": "RzDin", "MaxDev": "MaxDev", "ASH": "ASH",
            "Wa": "Pa", "Wq": "Pq", "WMaxDev": "MaxDev"}  # names of a Dektak, which filters nothing unless asked
 
@@ -205,7 +207,7 @@ def reread(profile: Profile) -> tuple:
 
 def _enough(trace: Profile) -> Profile:
     if trace.x.size < FEWEST:
-        raise PatchfemError(f"{trace.source}: {trace.x.size} samples; parameters need at least {FEWEST}")
+        raise PatchfemError(f"{trace.source}: {trace.x.size} samples; the parameters need at least {FEWEST}")
     return trace
 
 
@@ -268,9 +270,9 @@ def _spiky(surface: Profile | Areal) -> tuple:
         return ()
     *row, column = np.argwhere(found)[0]
     place = f"x = {say(surface.x[column])}" + "".join(f", y = {say(surface.y[k])}" for k in row)
-    what, counts = (f"is a spike (at {place})", "it counts") if found.sum() == 1 else \
-        (f"are spikes (the first at {place})", "they count")
-    return (f"{surface.source}: {found.sum()} of {found.size} heights {what}; {counts} in every parameter",)
+    what, counts = (f"is a spike (at {place}),", "which counts") if found.sum() == 1 else \
+        (f"are spikes (the first at {place}),", "which count")
+    return (f"{surface.source}: {found.sum()} of {found.size} heights {what} {counts} in every parameter",)
 
 
 def _of_scan(scan: Areal, cutoff: float | None, settings: Settings, window=None) -> RoughnessReport:
@@ -295,7 +297,7 @@ def _of_scan(scan: Areal, cutoff: float | None, settings: Settings, window=None)
     lost = int(np.isnan(flat.z).sum())
     notes = scan.notes + _spiky(scan)
     if lost:
-        notes += (f"{scan.source}: {lost} of {flat.z.size} heights are missing and do not count",)
+        notes += (f"{scan.source}: {lost} of {flat.z.size} heights are missing and are left out",)
     return RoughnessReport(scan.source, "areal", float(scan.x[-1] - scan.x[0]), scan.z.shape, steps[1], values, notes,
                            form, settings, cutoff, window, abbott=abbott(surface.heights), core=surface.heights.core,
                            scan=flat)

@@ -72,8 +72,9 @@ _BASE = (  # name without its letter
      lambda heights: moment(heights, 3), "shift"),
     ("ku", "1", "kurtosis: mean fourth power of the heights over the fourth power of their root mean square, 3 for a "
                 "Gaussian surface", lambda heights: moment(heights, 4), "ratio"),
-    ("Sm", "m", "mean length of a hill with its neighbouring dale; hills and dales lower than 10 % of the height from "
-                "valley to peak or, with a cut-off, narrower than 1 % of it do not count", mean_spacing, "ratio"),
+    ("Sm", "m", "mean length of a hill together with the neighbouring dale; hills and dales lower than 10 % of the "
+                "height from the deepest valley to the highest peak do not count; with a cut-off, neither do those "
+                "narrower than 1 % of the cut-off", mean_spacing, "ratio"),
     ("dq", "1", "root mean square of the slope between neighbouring samples (two points)", _slope, "slope"),
     ("k", "m", "core height: drop, from 0 to 100 %, of the straight line through the flattest 40 % of the Abbott curve",
      _core("core"), "ratio"),
@@ -82,14 +83,17 @@ _BASE = (  # name without its letter
     ("vk", "m", "reduced valley depth: height of a triangle on the base 1 - Mr2 with the area of the valleys below "
                 "the core",
      _core("valleys"), "ratio"),
-    ("Mr1", "1", "share of the length above the core", _core("first"), "share"),
-    ("Mr2", "1", "share of the length above the bottom of the core", _core("second"), "share"),
-    ("c", "m", "mean height from a hill to its neighbouring dale, for the hills and dales that count for the "
-               "spacing", mean_element,
+    ("Mr1", "1", "share of the trace's length where the surface lies above the core", _core("first"), "share"),
+    ("Mr2", "1", "share of the trace's length where the surface lies above the bottom of the "
+                 "core", _core("second"), "share"),
+    ("c", "m", "mean height difference between a hill and the neighbouring dale, for the hills and dales that count "
+               "for the mean spacing", mean_element,
      "ratio"),
-    ("mr", "1", "material ratio: share of the length above the height {level} over the mean line", material_ratio,
+    ("mr", "1", "material ratio: share of the trace's length where the surface lies above the level {level}, measured "
+                "from the mean line", material_ratio,
      "share"),
-    ("dc", "m", "height from the material ratio {second} up to the material ratio {first}", ratio_heights, "ratio"),
+    ("dc", "m", "height difference between the levels with material ratios {second} and "
+                "{first}", ratio_heights, "ratio"),
 )
 _WHOLE = {"p", "v"}  # of the primary profile: over the whole trace, so extremes
 PRIMARY = tuple(Parameter("P" + name, unit, text + ", of the levelled trace", of, "extreme" if name in _WHOLE else kind)
@@ -99,7 +103,12 @@ ROUGH = tuple(Parameter(name if name.startswith("Mr") else "R" + name, unit,
                         text + (", mean over the sections of one cut-off" if name in _MEAN else "")
                         + ", of the roughness profile", of, kind) for name, unit, text, of, kind in _BASE)
 TWO_STAGE = tuple(Parameter(f"{row.name}_13565", row.unit, row.text.replace("roughness profile", "profile of the "
-                            "two-stage filter of ISO 13565-1, which cuts the valleys off before its second mean line"),
+                                                                                                 "two-stage filter of "
+                                                                                                 "ISO 13565-1, which "
+                                                                                                 "cuts the valleys off "
+                                                                                                 "before the second "
+                                                                                                 "mean line is "
+                                                                                                 "computed"),
                             row.of, "") for row in ROUGH if row.name in ("Rk", "Rpk", "Rvk", "Mr1", "Mr2"))
 WAVES = (
     Parameter("dominant_wavelength", "m", "wavelength of the octave with the largest mean square height, of the "
@@ -112,7 +121,8 @@ WINDOW = (
               "window (DIN 4768), of the levelled trace", _five_parts, "ratio"),
     Parameter("MaxDev", "m", "largest distance from the mean line to either side, of the levelled trace",
               lambda heights: float(np.abs(heights.z).max()), "extreme"),
-    Parameter("ASH", "m", "average step height: height of the window's last sample over its first, before levelling",
+    Parameter("ASH", "m", "average step height: height of the last sample of the window minus the height of the first, "
+                          "before levelling",
               None, ""),
 )
 
@@ -136,10 +146,10 @@ AREAL = (
               _all(lambda heights: float(-heights.z.min())), ""),
     Parameter("Sz", "m", "height from the lowest to the highest point", _all(lambda heights: float(np.ptp(heights.z))),
               ""),
-    Parameter("Sdq", "1", "root mean square gradient, of the slopes between neighbours along x and along y (two "
-              "points)", gradient, ""),
-    Parameter("Sdr", "1", "developed area over that of the plane, less one; each cell of four points is the mean of "
-              "its two pairs of triangles", developed, ""),
+    Parameter("Sdq", "1", "root mean square gradient, from the slopes between neighbouring points along x and along "
+                          "y", gradient, ""),
+    Parameter("Sdr", "1", "developed area divided by projected area, minus one; the area of a cell of four points is "
+                          "the mean over the two ways to split the cell into triangles", developed, ""),
     Parameter("Sal", "m", "autocorrelation length: shortest distance at which the autocorrelation falls to 0.2",
               shortest, ""),
     Parameter("Str", "1", "texture aspect ratio: Sal divided by the longest distance at which the autocorrelation "
@@ -153,8 +163,9 @@ AREAL = (
               _all(_core("peaks")), ""),
     Parameter("Svk", "m", "reduced valley depth: height of a triangle on the base 1 - Smr2 with the volume of the "
               "valleys below the core", _all(_core("valleys")), ""),
-    Parameter("Smr1", "1", "share of the area above the core", _all(_core("first")), ""),
-    Parameter("Smr2", "1", "share of the area above the bottom of the core", _all(_core("second")), ""),
+    Parameter("Smr1", "1", "share of the area where the surface lies above the core", _all(_core("first")), ""),
+    Parameter("Smr2", "1", "share of the area where the surface lies above the bottom of the "
+                           "core", _all(_core("second")), ""),
     Parameter("Vmp", "m", "volume of the peaks per area: material above the material ratio 10 %",
               _all(volume, 0.1, True), ""),
     Parameter("Vmc", "m", "volume of the core's material per area: between the material ratios 10 % and 80 %",
@@ -163,11 +174,13 @@ AREAL = (
               _all(lambda heights: volume(heights, 0.1, False) - volume(heights, 0.8, False)), ""),
     Parameter("Vvv", "m", "volume of the valleys' void per area: below the material ratio 80 %",
               _all(volume, 0.8, False), ""),
-    Parameter("Smr", "1", "material ratio: share of the area above the height {level} over the reference surface",
+    Parameter("Smr", "1", "material ratio: share of the area where the surface lies above the level {level}, measured "
+                          "from the reference surface",
               _all(material_ratio), ""),
-    Parameter("Sxp", "m", "peak extreme height: from the material ratio 50 % up to the material ratio 2.5 %",
+    Parameter("Sxp", "m", "peak extreme height: height difference between the levels with material ratios 50 % and 2.5 "
+                          "%",
               _all(lambda heights: height_at(heights, 0.025) - height_at(heights, 0.5)), ""),
-    Parameter("Sdc", "m", "height from the material ratio {second} up to the material ratio {first}",
+    Parameter("Sdc", "m", "height difference between the levels with material ratios {second} and {first}",
               _all(ratio_heights), ""),
 )
 TABLE = {row.name: row for row in (*PRIMARY, *ROUGH, *TWO_STAGE, *WAVES, *WINDOW, *AREAL)}

@@ -134,8 +134,8 @@ def amplitude_of(found: Spectrum, low: float, high: float) -> float:
 def refuse_band(source: str, low: float, high: float, length: float, step: float) -> None:
     """PatchfemError where a trace cannot show waves from `low` to `high` [m]."""
     if not 0 < low < high:
-        raise PatchfemError(f"{source}: a band from {say(low)} to {say(high)}; a band must run from a shorter to a "
-                            "longer wavelength")
+        raise PatchfemError(f"{source}: a band from {say(low)} to {say(high)}; a band must be given from the shorter "
+                            "to the longer wavelength")
     if 2 * high > length or low < 2 * step:
-        raise PatchfemError(f"{source}: the trace of {say(length)} with a step of {say(step)} shows waves of "
-                            f"{say(2 * step)} to {say(length / 2)}, not the band {say(low)} to {say(high)}")
+        raise PatchfemError(f"{source}: the trace, {say(length)} long with a step of {say(step)}, can show waves of "
+                            f"{say(2 * step)} to {say(length / 2)}, but not the whole band {say(low)} to {say(high)}")

@@ -29,8 +29,8 @@ class Tip(NamedTuple):
         sharp = f"the sharpest sixth of the valleys has a radius of {say(self.valleys)} or less"
         if self.reaches:
             return f"the tip of radius {say(self.radius)} reaches the bottom of nearly every valley ({sharp})"
-        return f"the tip of radius {say(self.radius)} does not reach the bottom of {100 * self.share:.0f} % of the " \
-               f"valleys ({sharp}): Rv, Rz, Rvk and the slopes are those of the tip's path"
+        return (f"the tip of radius {say(self.radius)} does not reach the bottom of {100 * self.share:.0f} % of the "
+                f"valleys ({sharp}): Rv, Rz, Rvk and the slopes describe the path of the tip, not the surface")
 
 
 def tip_check(heights: Heights, radius: float) -> Tip | None:

@@ -13,8 +13,8 @@ from .search import CLEAR, variant
 from .track import ScanTrack, track_of
 from .volumes import Volumes, measured, nothing
 
-SHIFT = ("shift along {}: position in the second scan (after wear) minus position in the first, after rotation about "
-         "the middle of the first")
+SHIFT = ("shift along {}: position of a point in the second scan (after wear) minus its position in the first, after "
+         "rotation about the middle of the first scan")
 ROTATION = "rotation of the second scan (after wear) relative to the first, anticlockwise"
 ALIKE = 0.95  # correlation of the unworn heights of both scans, from which on they show the same place
 LIKELY = 0.98  # the same where the search is no clearer than chance, as on a lay that repeats itself
@@ -24,9 +24,9 @@ DIGITS = 4
 WORN, NONE = "worn", "no wear shown"
 GREW = "material grew, or the files are in the wrong order"
 ELSEWHERE = "not comparable place by place"
-HIDDEN = "mean depth of uniform or wedge-shaped wear that the scans cannot show"
-OPEN = "changed: worn on one part or grown on another"
-EITHER = "two parts of the scans each agree up to a plane, and either may be unworn"
+HIDDEN = "mean depth of uniform or wedge-shaped wear that may have remained hidden"
+OPEN = "changed: either one part is worn, or another part has grown"
+EITHER = "in each of two parts the scans agree up to a plane, and either part may be the unworn one"
 UNSURE = "the scans agree up to a plane: uniform or wedge-shaped wear would look the same"
 GROWN = "apart from what grew, the scans agree up to a plane: uniform or wedge-shaped wear would look the same"
 
@@ -89,9 +89,9 @@ def _laid(before: Areal, after: Areal, keep_spikes: bool) -> tuple:
     found = laid(before, after)
     least = ALIKE if found.guess.clear > CLEAR else LIKELY
     if found.like <= least:
-        raise PatchfemError("no common place was found in the scans: the heights that agree up to a plane have a "
-                            f"correlation of {found.like:.3f}, and only above {least:g} is it significant; scan the "
-                            "same place, including unworn parts beside the rubbed one")
+        raise PatchfemError("the two scans show no common area: the heights that agree up to a plane have a "
+                            f"correlation of {found.like:.3f}, but only values above {least:g} are significant; scan "
+                            "the same area both times, including unworn parts beside the rubbed part")
     found, specks = (found, 0) if keep_spikes else without_specks(found)
     return found, measured(found, before.x, before.y), specks
 
@@ -171,24 +171,24 @@ def sentences(one: Change) -> list:
                    f"{_length(values['worn_depth_max'])} at the deepest place.")
         out += _unseen(one)
     elif one.volumes.open:
-        out.append(f"It is not known which part is unworn: {EITHER}. If the first is unworn, up to {_most(worn)} wore "
-                   f"off the second; if the second is unworn, up to {_most(grown)} grew on the first. To find out, "
-                   "scan farther beyond the rubbed part.")
+        out.append(f"It is not known which part is unworn: {EITHER}. If the first part is unworn, up to {_most(worn)} "
+                   f"wore off the second part; if the second part is unworn, up to {_most(grown)} grew on the first "
+                   "part. To find out, scan farther beyond the rubbed part.")
     else:
-        out.append("Worn volume: none shown. Uniform wear of any depth, and wedge-shaped wear that the mounting "
-                   "levelled out, would look the same; to find out, scan an unworn part beside the rubbed one both "
-                   "times.")
+        out.append("Worn volume: none shown. Uniform wear of any depth would give the same two scans; so would "
+                   "wedge-shaped wear, if the worn part was then mounted level. To find out, scan an unworn part "
+                   "beside the rubbed part both times.")
     out += [] if one.track is None or one.track.why else [_track(one.track)]
     if grown.low > 0:
         out.append(f"{_volume(grown)} of material lie above the first scan (before wear): pile-up or deposits"
                    + (", or the two files are in the wrong order." if headline(one) == GREW else "."))
     share = 100 * float(one.found.used.sum()) / max(float(np.isfinite(one.found.depth).sum()), 1.0)
     out.append(f"Depths are measured from the {share:.0f} % of the heights that agree up to a plane within "
-               f"{say(REACH * one.found.noise, 3)}; if these wore uniformly or as a wedge too, all depths are larger "
-               "by that wear.")
+               f"{say(REACH * one.found.noise, 3)}; if these heights wore uniformly or as a wedge too, all depths are "
+               "larger by that wear.")
     if one.found.other is not None and not one.volumes.open:
-        out.append("Another part of the scans may be unworn instead, as where two planes meet in an edge; the "
-                   "intervals cover both.")
+        out.append("Another part of the scans may be unworn instead, for example where two planes meet in an edge; the "
+                   "intervals cover both cases.")
     return out
 
 
@@ -196,8 +196,8 @@ def _unseen(one: Change) -> list:
     """How much of the worn part has no heights, as a sentence."""
     worn = one.volumes.worn
     share = float((worn & ~np.isfinite(one.found.depth)).sum()) / max(float(worn.sum()), 1.0)
-    return [f"{100 * share:.0f} % of the worn part has no heights in one scan or lies next to a hole: its depth "
-            "there is taken from the nearest heights, so a deeper place may be missed."] if share > SEEN else []
+    return [f"{100 * share:.0f} % of the worn part has no heights in one scan or lies next to a hole: the depth there "
+            "is taken from the nearest heights, so a deeper place may be missed."] if share > SEEN else []
 
 
 def _track(one: ScanTrack) -> str:
@@ -218,8 +218,8 @@ def _ways(one: Change) -> list:
     if abs(abs(one.registration["rotation"].value) - np.pi) < 0.2:
         out.append("The second scan (after wear) is rotated by 180 degrees.")
     if guess.turned:
-        out.append("The heights of both scans have opposite signs: one was inverted so that more wears than "
-                   "grows; check in which file heights point into the material.")
+        out.append("The heights of both scans have opposite signs: one scan was inverted here, so that more material "
+                   "is lost than gained; check in which file the heights point into the material.")
     return out
 
 

@@ -22,21 +22,22 @@ GROUPS, LEAST = 16, 6  # of neighbouring sections, whose means are measured one 
 TOGETHER = 3.0  # neighbouring depths of a section that err alike, as between samples they are interpolated
 ENDS = 0.5  # of the median lost area, where a track ends along its direction
 TEXTS = {  # name: (unit, definition)
-    "direction": ("rad", "of the track, measured anticlockwise from x, by the gradients of the depths"),
-    "from": ("m", "position across the track at which the track begins, measured from the middle of the first scan, "
-                  "positive to larger x or y"),
-    "to": ("m", "position across the track at which the track ends"),
+    "direction": ("rad", "direction of the track, measured anticlockwise from x, found from the gradients of the "
+                         "depth"),
+    "from": ("m", "position of the track's first edge, measured across the track from the middle of the first scan, "
+                  "positive towards larger x or y"),
+    "to": ("m", "position of the track's second edge, measured in the same way"),
     "width": ("m", "width of the track"),
     "depth_mean": ("m", "area lost in a section divided by the width"),
     "depth_floor": ("m", "floor: bottom of the parabola through the deepest fifth of a section"),
-    "step": ("m", "step: mean depth over the middle third of the width, as of a groove in ISO 5436-1, type A1"),
+    "step": ("m", "step: mean depth over the middle third of the width, as ISO 5436-1 defines for a groove of type A1"),
     "area_net": ("m2", "lost area less pile-up"),
     "area_gross": ("m2", "area lost in a section"),
-    "pile_up": ("m2", "pile-up: area above the first scan (before wear), within one track width of the track, both "
-                      "sides together"),
-    "pile_up_left": ("m2", "pile-up at the side of smaller x or y"),
-    "pile_up_right": ("m2", "pile-up at the side of larger x or y"),
-    "length": ("m", "length of the track, between the places at which the lost area is half of its median"),
+    "pile_up": ("m2", "pile-up: area above the first scan (before wear), up to one track width from the track, sum of "
+                      "both sides"),
+    "pile_up_left": ("m2", "pile-up on the side of smaller x or y"),
+    "pile_up_right": ("m2", "pile-up on the side of larger x or y"),
+    "length": ("m", "length of the track between its two ends, where the lost area is half of the median lost area"),
     "volume": ("m3", "area lost in the mean section times the length of the track")}
 
 
@@ -102,7 +103,7 @@ def track_of(found: Laid, depth, worn, axes: tuple, error: float) -> ScanTrack:
     measured = [_measured(turned, one, span, found.noise) for one in groups if one.size]
     measured = [one for one in measured if one is not None]
     if len(measured) < LEAST:
-        return _none(f"{len(measured)} groups of complete sections cross the worn part; {LEAST} are needed")
+        return _none(f"{len(measured)} groups of complete sections cross the worn part; at least {LEAST} are needed")
     middles = measured, [float(turned.along[one].mean()) for one in groups if one.size]
     values, scatter = _values(measured, error, turned.step)
     inner, section = turned.depth[rows], _mean(turned.depth[rows], KNOWN)
@@ -265,7 +266,8 @@ def _direction(angle: float, measured: list, along: list, cell: float) -> Quanti
 def _volume(area: Quantity, length: tuple, open_ended: bool) -> dict:
     """Length and volume of the track, refused where it runs over the edge of the scans."""
     if open_ended:
-        why = "the track leaves the region that both scans show; its volume is its lost area times the stroke"
+        why = ("the track leaves the region that both scans show, so its volume must be computed as lost area times "
+               "stroke")
         return {name: refused(*TEXTS[name], why) for name in ("length", "volume")}
     off = float(np.hypot((area.high - area.value) / area.value, (length[2] - length[1]) / 2 / length[0]))
     volume = area.value * length[0]

@@ -22,11 +22,11 @@ WALL = 0.5  # of the depth of a worn part beside it, how well a missing height a
 UNDER = 0.7  # of the slow errors of the scans beside a worn part, what they are in its mean
 TOGETHER = 3.0  # the noise of a volume over that of independent heights
 FEW = 0.25  # of a square, at least, is known
-WORN = {"worn_volume": "volume lost, over the region that both scans show",
-        "grown_volume": "volume that stands above the first scan (before wear): pile-up, deposits",
-        "worn_share": "share of the common region that wore",
-        "worn_depth_mean": "worn volume divided by the area of the common region",
-        "worn_depth_max": "largest worn depth, as the median of 3 x 3 measured heights"}
+WORN = {"worn_volume": "volume of material lost in the region that both scans show",
+        "grown_volume": "volume of material above the first scan (before wear), such as pile-up or deposits",
+        "worn_share": "worn area divided by the area of the region that both scans show",
+        "worn_depth_mean": "worn volume divided by the area of the region that both scans show",
+        "worn_depth_max": "largest worn depth, after taking the median of every 3 x 3 measured heights"}
 BOTH = "worn_volume", "grown_volume"
 
 

@@ -122,7 +122,7 @@ def test_refuses_what_the_law_cannot_do():
         assert f"friction.{key}: missing" in only(bare)
     assert "friction.chi" in only(scene, "friction.chi=0.1") and "friction.chi" in only(scene, "friction.chi=-1")
     assert "5e6 N/m" in only(scene, "friction.stiffness=3")
-    assert "static > 0 is needed" in only(scene, "friction.static=0")
+    assert "static: must be > 0" in only(scene, "friction.static=0")
     assert "laws with a kinetic coefficient are coulomb" in only(scene, "friction.kinetic=0.2")
     sliding = '[slide]\nkind = "sine"\namplitude = "1 um"\nfrequency = "1 Hz"\n'
     held = '[friction]\n' + LAW + sliding

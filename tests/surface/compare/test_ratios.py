@@ -111,5 +111,5 @@ def test_always_a_coarser_trace_is_compared_at_its_own_step():
 def test_refuses_a_trace_too_short_for_the_band():
     p = pair(1)
     short = Profile(p.before.x[:150], p.before.z[:150], "short")
-    with pytest.raises(PatchfemError, match="not the band"):
+    with pytest.raises(PatchfemError, match="not the whole band"):
         compared(short, short)

@@ -71,7 +71,7 @@ def test_exact_a_trace_on_itself_shows_no_change():
     assert (found.amplitude_ratio.value, found.slope_ratio.value) == pytest.approx((1.0, 1.0), rel=1e-14)
     assert verdicts([found])[0] == "no change shown"
     assert found.shift.value == found.tilt.value == 0
-    assert verdicts([found])[1][0] == "Worn depth: none; the heights before and after are the same."
+    assert verdicts([found])[1][0] == "Worn depth: none; the heights before and after wear are the same."
 
 
 def test_always_levelling_both_traces_takes_the_wear_away():
@@ -92,7 +92,7 @@ def test_always_traces_of_two_places_have_no_depth_but_a_guess(count):
     for seed in range(count):
         found = compared(pair(seed + 40000, share=0.0).before, pair(seed + 50000, share=0.0).after)
         assert found.reference == "" and found.worn.mean.value is found.shift.value is None
-        assert "no common place" in found.worn.mean.reason and "unworn flanks" in found.worn.mean.reason
+        assert "no common part" in found.worn.mean.reason and "unworn flanks" in found.worn.mean.reason
         held.append(found.abbott.low <= 0 <= found.abbott.high)
         guesses.append(found.abbott.value)
     assert sum(held) >= count * 5 // 6
@@ -144,7 +144,7 @@ def test_always_a_stretched_x_is_found_and_taken_out():
     assert found.stretch.value == pytest.approx(1.004, abs=3e-5)
     assert found.stretch.low < 1.004 < found.stretch.high
     assert found.worn.mean.value == pytest.approx(compared(p.before, p.after).worn.mean.value, abs=0.005 * UM)
-    assert any("the difference is corrected" in text for text in found.notes)
+    assert any("this difference in length is corrected" in text for text in found.notes)
 
 
 def test_always_deposits_do_not_count_as_less_wear():

@@ -104,7 +104,7 @@ def test_always_a_changed_description_is_told(tmp_path):
     assert read(tmp_path, data).notes == ()
     found = read(tmp_path, write.x3p(xml, raw, checksum="0" * 32))
     assert found.notes == (f"{tmp_path / 'scan.x3p'}: main.xml does not match its checksum in md5checksum.hex: "
-                           "it was changed after it was written",)
+                           "main.xml was changed after it was written",)
 
 
 X3P_FAULTS = {
@@ -113,13 +113,14 @@ X3P_FAULTS = {
         HOLES.tobytes()), "the checksum of bindata/data.bin is wrong: the heights were changed"),
     "two layers": (lambda: write.x3p(write.main_xml(write.axis("CX") + write.axis("CY") + write.axis("CZ", "A"),
                                                     write.matrix(6, 2, 2) + write.link(Z.tobytes())), Z.tobytes()),
-                   "SizeZ is 2; a surface has one layer"),
+                   "SizeZ is 2; a surface must have one layer"),
     "too few bytes": (lambda: write.x3p(write.main_xml(write.axis("CX") + write.axis("CY") + write.axis("CZ", "A"),
                                                        write.matrix(7, 4) + write.link(Z.tobytes())), Z.tobytes()),
-                      "192 bytes of heights where 28 of type D are needed"),
+                      "192 bytes of heights, but 28 heights of type D are needed"),
     "sixteen bits called 64": (lambda: write.x3p(write.main_xml(
         write.axis("CX") + write.axis("CY") + write.axis("CZ", "A", "D"),
-        write.matrix(6, 4) + write.link(bytes(48))), bytes(48)), "48 bytes of heights where 24 of type D are needed"),
+        write.matrix(6, 4) + write.link(bytes(48))), bytes(48)), "48 bytes of heights, but 24 heights of type D are "
+                                                                 "needed"),
     "an unknown type": (lambda: write.x3p(write.main_xml(write.axis("CX") + write.axis("CY") + write.axis(
         "CZ", "A", "Q"), write.matrix(6, 4))), "DataType of CZ is 'Q'; one of I, L, F, D is needed"),
     "sizes of a bomb": (lambda: write.x3p(write.main_xml(write.axis("CX") + write.axis("CY") + write.axis("CZ", "A"),
@@ -127,7 +128,7 @@ X3P_FAULTS = {
                         r"SizeX is '2000000000'; a whole number from 1 to 5e\+07 is needed"),
     "heights that climb": (lambda: write.x3p(write.main_xml(write.axis("CX") + write.axis("CY") + write.axis("CZ", "I"),
                                                             write.matrix(6, 4) + "<DataList/>")),
-                           "0 heights in main.xml where 24 are needed"),
+                           "0 heights in main.xml, but 24 are needed"),
     "no axes": (lambda: write.x3p(write.main_xml("", write.matrix(6, 4))), "main.xml lacks Record1/Axes/CX"),
     "no heights": (lambda: write.x3p(write.main_xml(write.axis("CX") + write.axis("CY") + write.axis("CZ", "A"),
                                                     write.matrix(6, 4) + write.link(b"", name="other.bin"))),
@@ -176,8 +177,8 @@ def test_exact_sdf_of_one_profile_is_a_trace(tmp_path):
 
 
 @pytest.mark.parametrize("old, new, said", [
-    (b"NumPoints = 6", b"NumPoints = 7", "24 heights where 28 are needed"),
-    (b"NumPoints = 6", b"NumPoints = 5", "more heights than 20 are needed"),
+    (b"NumPoints = 6", b"NumPoints = 7", "24 heights, but 28 are needed"),
+    (b"NumPoints = 6", b"NumPoints = 5", "too many heights, but 20 are needed"),
     (b"NumPoints = 6", b"NumPoints = 999999999", r"NumPoints = 1e\+09; a whole number >= 1"),
     (b"NumPoints = 6", b"NumPoints = 40000000", r"40000000 x 4 heights, more than 5e\+07"),
     (b"NumPoints = 6", b"NumPoints = 1e400", "NumPoints = inf; a whole number >= 1"),
@@ -186,8 +187,8 @@ def test_exact_sdf_of_one_profile_is_a_trace(tmp_path):
     (b"Zscale = 1e-06", b"Zscale = 0", r"Zscale = 0; a length > 0 m is needed"),
     (b"Compression = 0", b"Compression = 1", "compressed; export the scan uncompressed"),
     (b"*", b"", "the header does not end with"),
-    (b"*\n", b"*\nnil ", "more heights than 24 are needed"),
-    (b"CheckType = 0\n*\n0", b"CheckType = 0\n*\nO", "heights are numbers or BAD"),
+    (b"*\n", b"*\nnil ", "too many heights, but 24 are needed"),
+    (b"CheckType = 0\n*\n0", b"CheckType = 0\n*\nO", "each height must be a number or BAD"),
 ])
 def test_refuses_a_faulty_sdf_by_name(tmp_path, old, new, said):
     data = write.sdf_ascii(Z)
@@ -233,10 +234,10 @@ def test_exact_text_of_three_columns_is_a_scan(tmp_path):
 
 
 @pytest.mark.parametrize("content, said", [
-    ("x [um],y [um],z [um]\n0,0,1\n1,1,1\n2,3,1\n3,2,1\n4,5,1\n9,8,1\n7,7,1\n", "7 points with 7 x and 7 y do not"),
+    ("x [um],y [um],z [um]\n0,0,1\n1,1,1\n2,3,1\n3,2,1\n4,5,1\n9,8,1\n7,7,1\n", "7 different x and 7 different y do"),
     ("x [um],y [um],z [um]\n0,0,1\n1,0,1\n0,1,1\n1,1,1\n1,0,2\n", ":6: a second height at x = 1 um, y = 0 um"),
     ("x [um],y [um],z [um]\n0,0,1\n1,0,1\n0,1\n", ":4: '0,1': three numbers are needed"),
-    ("x [um],y [um],w [um]\n0,0,1\n", "column 'w' is not known, x, y and z are needed"),
+    ("x [um],y [um],w [um]\n0,0,1\n", "column 'w' is not known; the columns x, y and z are needed"),
     ("x [um],y [um],z [mm]\n0,0,1\n1,0,1\n0,1,1\n1,1,9\n", "heights span 8 mm over a length of 1 um; is the unit"),
 ])
 def test_refuses_points_that_are_no_scan(tmp_path, content, said):
@@ -258,8 +259,8 @@ def test_refuses_units_that_are_absent_or_unknown(tmp_path):
 
 @pytest.mark.parametrize("data, name, said", [
     (lambda: write.npy(np.zeros((4, 6))), "a.npy", r"an array of shape \(4, 6\); columns x, z or x, y, z are needed"),
-    (lambda: write.npy(TRACE.astype(complex)), "a.npy", "holds '<c16'; save numbers"),
-    (lambda: write.npy(TRACE)[:-8], "a.npy", "376 bytes where 48 numbers of float64 are needed; the file is cut off"),
+    (lambda: write.npy(TRACE.astype(complex)), "a.npy", "contains '<c16'; save plain numbers"),
+    (lambda: write.npy(TRACE)[:-8], "a.npy", "376 bytes of data are not the 48 numbers of type float64"),
     (lambda: write.npy(TRACE).replace(b"(24, 2)", b"(24,-2)"), "a.npy", "header of the .npy file is damaged"),
     (lambda: write.mat(a=TRACE, b=TRACE), "a.mat", r"holds a \(24, 2\), b \(24, 2\); variables x, z or x, y"),
     (lambda: write.mat(x=np.arange(6.0), y=np.arange(3.0), z=Z), "a.mat", r"of shapes .* do not fit"),
@@ -289,7 +290,7 @@ def test_always_a_dektak_export_that_was_cut_keeps_its_printed_places(tmp_path):
     found = read(tmp_path, b"\n".join(write.dektak(z).split(b"\n")[:200]), "scan.csv")
     assert "the length of 50 um in the header does not fit" in found.notes[0]
     assert found.x == pytest.approx(np.arange(found.x.size) * 0.15625e-6, abs=0.06e-6)
-    with pytest.raises(PatchfemError, match="without its columns `Lateral um,Raw Micrometer`"):
+    with pytest.raises(PatchfemError, match="without the columns `Lateral um,Raw Micrometer`"):
         read(tmp_path, write.dektak(z).replace(b"Lateral", b"Time"), "scan.csv")
     with pytest.raises(PatchfemError, match=r":13: unknown unit 'Volt'; export the scan in Micrometer or Angstrom"):
         read(tmp_path, write.dektak(z).replace(b"Raw Micrometer", b"Raw Volt"), "scan.csv")
@@ -297,7 +298,7 @@ def test_always_a_dektak_export_that_was_cut_keeps_its_printed_places(tmp_path):
 
 def test_exact_one_trace_of_any_format_and_no_scan(tmp_path):
     (tmp_path / "a.sdf").write_bytes(write.sdf_ascii(Z))
-    with pytest.raises(PatchfemError, match="an areal scan of 4 x 6 heights where one trace is needed; write one of"):
+    with pytest.raises(PatchfemError, match="scan of 4 x 6 heights, but a single trace is needed; write one row of"):
         read_profile(tmp_path / "a.sdf")
     (tmp_path / "a.zip").write_bytes(write.zipped({"one/a.sdf": write.sdf_binary(Z.reshape(1, 24))}))
     assert read_profile(tmp_path / "a.zip").z == pytest.approx(Z.ravel(), rel=1e-15)
@@ -320,9 +321,9 @@ def test_exact_other_instruments_through_surface_topography(tmp_path, monkeypatc
     found = read_surface(tmp_path / "scan.nc")
     same(found, Z, 1e-18)
     assert "read as NC by SurfaceTopography 1." in found.notes[0]
-    assert read_surface(tmp_path / "scan.nc", ("mm", "mm")).notes[1].endswith("the given ones are ignored")
+    assert read_surface(tmp_path / "scan.nc", ("mm", "mm")).notes[1].endswith("the units that you gave are ignored")
     (tmp_path / "scan.opdx").write_bytes(b"\x00\x01junk" * 50)
-    with pytest.raises(PatchfemError, match="SurfaceTopography cannot read it"):
+    with pytest.raises(PatchfemError, match="SurfaceTopography cannot read this file"):
         read_surface(tmp_path / "scan.opdx")
 
 
@@ -336,9 +337,10 @@ def test_refuses_instruments_without_the_library_with_the_remedy(tmp_path, monke
 
 
 @pytest.mark.parametrize("answer, said", [
-    ('{"error": "CorruptFile: bad", "sizes": []}', r"cannot read it \(CorruptFile: bad\); export the surface as text"),
-    ("", "failed on it; export"), ("{}", "failed on it; export"), ('{"sizes": [7]}', "failed on it; export"),
-    ('{"sizes": []}', "found no heights in it; export the surface as text or X3P")])
+    ('{"error": "CorruptFile: bad", "sizes": []}', r"cannot read this file \(CorruptFile: bad\); export the surface"),
+    ("", "failed to read this file; export"), ("{}", "failed to read this file; export"),
+    ('{"sizes": [7]}', "failed to read this file; export"),
+    ('{"sizes": []}', "found no heights in this file; export the surface as text or X3P")])
 def test_refuses_what_the_other_process_could_not_read(tmp_path, monkeypatch, answer, said):
     (tmp_path / "python").write_text(f"#!/bin/sh\nread path\ncat <<'END'\n{answer}\nEND\n")
     (tmp_path / "python").chmod(0o755)
@@ -390,16 +392,16 @@ def test_always_one_process_reads_all_files_and_its_limit_is_cpu_time(tmp_path, 
 
     first = worker()
     assert worker() == first
-    for name, said, same in (("fails.opdx", r"cannot read it \(ValueError: bad\)", True),
-                             ("fills.opdx", r"cannot read it \(MemoryError", True),
-                             ("ends.opdx", "failed on it; export the surface as text or X3P", False),
-                             ("works.opdx", r"did not read it in 1 s of CPU time; export the surface as text", False)):
+    for name, said, same in (("fails.opdx", r"cannot read this file \(ValueError: bad\)", True),
+                             ("fills.opdx", r"cannot read this file \(MemoryError", True),
+                             ("ends.opdx", "failed to read this file; export the surface as text or X3P", False),
+                             ("works.opdx", r"did not finish reading this file in 1 s of CPU time; export", False)):
         with pytest.raises(PatchfemError, match=said):
             read(tmp_path, data, name)
         assert (worker() == first) == same
         first = worker()
     monkeypatch.setattr(instruments, "WAIT", 0.5)
-    with pytest.raises(PatchfemError, match=r"did not finish reading it in 0\.5 s; export the surface as text or X3P"):
+    with pytest.raises(PatchfemError, match=r"did not finish reading this file in 0\.5 s; export the surface as text"):
         read(tmp_path, data, "sleeps.opdx")
     monkeypatch.setattr(instruments, "WAIT", 60.0)
     assert worker() != first

@@ -159,17 +159,17 @@ def test_exact_units_that_are_given_overrule_the_header_and_it_is_told(tmp_path)
     found = read(tmp_path, f"x [um]\tz [um]\n{PAIRS}", ("mm", "um"))
     assert found.x == pytest.approx(X * 1e-3) and found.z == pytest.approx(H * 1e-6)
     path = tmp_path / "scan.txt"
-    assert found.notes == (f"{path}:1: the header gives x in um; mm is used, as given by --units",)
+    assert found.notes == (f"{path}:1: the header gives x in um, but mm is used, as given by --units",)
     scan = read(tmp_path, f"# Width: 4 um\n# Height: 3 um\n# Value units: V\n{ROWS}", ("mm", "um"))
     is_scan(scan, (1e-3, 1e-3), Z * 1e-6)
-    assert scan.notes == (f"{path}: its header gives places along x in um; mm is used, as given by --units",
-                          f"{path}: its header gives places along y in um; mm is used, as given by --units",
-                          f"{path}: its header gives the heights in V; um is used, as given by --units")
+    assert scan.notes == (f"{path}: the header gives places along x in um, but mm is used, as given by --units",
+                          f"{path}: the header gives places along y in um, but mm is used, as given by --units",
+                          f"{path}: the header gives the heights in V, but um is used, as given by --units")
     named = read(tmp_path, f"Kanal A\tKanal B\n{PAIRS}", ("mm", "um"))
     assert named.notes == (f"{path}:1: columns 'Kanal A', 'Kanal B' are taken as x, z in this order",)
     sdf = read(tmp_path, "aISO-1.0\nNumPoints = 3\nNumProfiles = 1\nXscale = 1e-6\nYscale = 1e-6\nZscale = 1e-9\n*\n"
                "1 2 4\n*\n", ("mm", "um"))
-    assert sdf.notes == (f"{path}: the file has its own units; the given ones are ignored",)
+    assert sdf.notes == (f"{path}: the file states its own units; the units that you gave are ignored",)
     assert sdf.x == pytest.approx(np.arange(3) * 1e-6)
 
 
@@ -183,60 +183,67 @@ def test_exact_a_matrix_of_which_only_the_pixel_is_known(tmp_path):
     is_scan(found, (0.8e-6, 0.8e-6), z * 1e-9)
     sized = read(tmp_path, f"# Width: 4 um\n# Height: 3 um\n{rows}", ("0.8 um", "nm"))
     is_scan(sized, (0.8e-6, 0.8e-6), z * 1e-9)
-    assert len(sized.notes) == 2 and "the given pixel size, 0.8 um, is used" in sized.notes[0]
-    for text, units, said in ((PAIRS, ("0.8 um", "nm"), "is the pixel size of a matrix"),
+    assert len(sized.notes) == 2 and "the pixel size that you gave, 0.8 um, is used" in sized.notes[0]
+    for text, units, said in ((PAIRS, ("0.8 um", "nm"), "is a pixel size, which is needed only for a matrix"),
                               (rows, ("-1 um", "nm"), "unknown unit '-1 um'"), (rows, ("0.8 um", "2 nm"), "unknown")):
         with pytest.raises(PatchfemError, match=said):
             read(tmp_path, text, units)
 
 
 CURES = {  # what is refused, what is said, the same text after the remedy, the units given
-    "a bare matrix": (ROWS, "its width is not given; write the scan's `# Width: 1.2 mm` and `# Height: 0.8 mm` "
-                      "and `# Value units: um` above its rows",
+    "a bare matrix": (ROWS, "the width of the scan is not given; write the scan's `# Width: 1.2 mm` and `# Height: 0.8 "
+                            "mm` and `# Value units: um` above its rows",
                       "# Width: 1.2 mm\n# Height: 0.8 mm\n# Value units: um\n" + ROWS, None),
-    "no height": ("# Width: 4 um\n# Value units: um\n" + ROWS, "its height is not given; write",
+    "no height": ("# Width: 4 um\n# Value units: um\n" + ROWS, "the height of the scan is not given; write",
                   "# Width: 4 um\n# Height: 0.8 mm\n# Value units: um\n" + ROWS, None),
     "no unit of the heights": ("# Width: 4 um\n# Height: 3 um\n" + ROWS, "whose unit is not given; write `# Value",
                                "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS, None),
-    "no unit, but given": ("# Width: 4\n# Height: 3\n" + ROWS, 'or state the units of x and z, --units "mm,um"',
+    "no unit, but given": ("# Width: 4\n# Height: 3\n" + ROWS, 'or state the units of x and z by --units "mm,um"',
                            "# Width: 4\n# Height: 3\n" + ROWS, ("mm", "um")),
-    "a width without unit": ("# Width: 4\n# Height: 3\n# Value units: um\n" + ROWS, "the unit of its width and height, "
-                             "'', is not known; write", "# Width: 1.2 mm\n# Height: 0.8 mm\n# Value units: um\n" + ROWS,
-                             None),
-    "volts": ("# Width: 4 um\n# Height: 3 um\n# Value units: V\n" + ROWS, "in 'V', which is not a length; export the",
+    "a width without unit": ("# Width: 4\n# Height: 3\n# Value units: um\n" + ROWS, "the unit of the scan's "
+                             "width and height, '', is not known; write", "# Width: 1.2 mm\n# Height: 0.8 mm\n"
+                             "# Value units: um\n" + ROWS, None),
+    "volts": ("# Width: 4 um\n# Height: 3 um\n# Value units: V\n" + ROWS, "in 'V', which is not a unit of length; "
+                                                                          "export the",
               "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS, None),
-    "a row cut off": ("# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS[:-6], ":6: 2 numbers where the first "
-                      "row of the matrix has 4; write nan for a missing height",
+    "a row cut off": ("# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS[:-6], ":6: 2 numbers, but the first "
+                                                                                        "row of the matrix has 4; "
+                                                                                        "write nan for a missing "
+                                                                                        "height",
                       "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS[:-6] + " nan nan\n", None),
-    "rows cut off": ("# w = 4, h = 4\n# pixel size = 1 um\n# Value units: nm\n" + ROWS, "3 rows where its header says",
+    "rows cut off": ("# w = 4, h = 4\n# pixel size = 1 um\n# Value units: nm\n" + ROWS, "3 rows, but the header says",
                      "# w = 4, h = 3\n# pixel size = 1 um\n# Value units: nm\n" + ROWS, None),
     "a word": ("# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS.replace("7", "lost"), ":5: 'lost' is not a "
                "height; write a missing height as nan",
                "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS.replace("7", "nan"), None),
-    "thousands": ("# Width: 4,000 um\n# Height: 3,000 um\n# Value units: nm\n" + ROWS, ":1: 'Width: 4,000 um': 4,000 "
-                  "may have a decimal comma or a thousands separator; write it with a point, or without the comma",
+    "thousands": ("# Width: 4,000 um\n# Height: 3,000 um\n# Value units: nm\n" + ROWS, ":1: 'Width: 4,000 um': the "
+                                                                                       "comma in 4,000 may be a "
+                                                                                       "decimal comma or a thousands "
+                                                                                       "separator; write a decimal "
+                                                                                       "point, or leave out the comma",
                   "# Width: 4000 um\n# Height: 3000 um\n# Value units: nm\n" + ROWS, None),
     "axes": ("# Width: 4 um\n# Height: 4 um\n# Value units: nm\n0 0 1 2 3\n0 3 1 4 1\n1 5 9 2 6\n2 5 3 5 8\n"
-             "3 9 7 9 3\n", "the first row and the first column of its matrix grow evenly, like coordinates and not "
-             "heights; leave them out",
+             "3 9 7 9 3\n", "the first row and the first column of the matrix grow evenly, like coordinates and not "
+                            "heights; leave out this row",
              "# Width: 4 um\n# Height: 4 um\n# Value units: nm\n3 1 4 1\n5 9 2 6\n5 3 5 8\n9 7 9 3\n", None),
     "two scans": ("# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS + "# Channel: Phase\n" + ROWS,
-                  ":7: '# Channel: Phase' begins another scan or ends this one; keep one scan in a file",
+                  ":7: '# Channel: Phase' ends the scan or begins another one; keep only one scan per file",
                   "# Width: 4 um\n# Height: 3 um\n# Value units: nm\n" + ROWS, None),
     "names without units": (f"Distance\tProfile\n{PAIRS}", "column 'Distance' has no unit, and units are never guessed",
                             f"Distance\tProfile\n{PAIRS}", ("um", "um")),
     "one unit for two columns": (f"µm\n{PAIRS}", "no header, and units are never guessed",
                                  f"µm\n{PAIRS}", ("um", "um")),
-    "one column": ("1\n2\n3\n", "one column, '1', where x and z are needed; write the header as `x [um],z [um]`",
+    "one column": ("1\n2\n3\n", "only one column, '1', but x and z are needed; write the header as `x [um],z [um]`",
                    "x [um],z [um]\n0,1\n1,2\n4,3\n", None),
-    "an index for x": (f"Index\tz [um]\n{PAIRS}", "Index, z [um] where x and z, or x, y and z, are needed; keep one",
+    "an index for x": (f"Index\tz [um]\n{PAIRS}", "Index, z [um], but x and z, or x, y and z, are needed; keep one",
                        f"x [um]\tz [um]\n{PAIRS}", None),
-    "an unknown name": (f"Kanal A [um]\tKanal B [um]\n{PAIRS}", "column 'Kanal A' is not known, x and z are needed; "
-                        "write the header as", f"x [um]\tz [um]\n{PAIRS}", None),
-    "only words": ("Operator: me\nnothing\n", "no row of numbers in its first 2 lines; write the header as `x [um],z "
+    "an unknown name": (f"Kanal A [um]\tKanal B [um]\n{PAIRS}", "column 'Kanal A' is not known; the columns x and z "
+                                                                "are needed; write the header "
+                                                                "as", f"x [um]\tz [um]\n{PAIRS}", None),
+    "only words": ("Operator: me\nnothing\n", "no row of numbers in the first 2 lines; write the header as `x [um],z "
                    "[um]` above rows of two numbers", f"x [um]\tz [um]\n{PAIRS}", None),
-    "too steep": (f"x [um]\tz [mm]\n{PAIRS}", "is the unit of z right? write a missing height as nan; --units "
-                  "of profile and compare overrides the header", f"x [um]\tz [mm]\n{PAIRS}", ("um", "mm")),
+    "too steep": (f"x [um]\tz [mm]\n{PAIRS}", "is the unit of z right? If not, correct the header or give --units to "
+                                              "profile and compare", f"x [um]\tz [mm]\n{PAIRS}", ("um", "mm")),
 }
 
 
@@ -263,8 +270,8 @@ def test_exact_a_spike_as_tall_as_the_scan_is_long_is_told_and_kept(tmp_path):
 
 def test_always_heights_below_an_atom_are_told(tmp_path):
     found = read(tmp_path, "x [um],z [m]\n0,0\n1,1e-13\n2,0\n")
-    assert found.notes[0].endswith("less than an atom is wide; is their unit right?")
+    assert found.notes[0].endswith("atom; is the unit of the heights right?")
     (tmp_path / "logo.x3p").write_bytes(write.x3p_of(write.scan() * 1e-7))
-    assert read_surface(tmp_path / "logo.x3p").notes[0].endswith("less than an atom is wide; is their unit right?")
+    assert read_surface(tmp_path / "logo.x3p").notes[0].endswith("atom; is the unit of the heights right?")
     assert read(tmp_path, "x [um],z [nm]\n0,0\n1,0.2\n2,0\n").notes == ()
     assert read(tmp_path, "x [um],z [nm]\n0,0\n1,0\n2,0\n").notes == ()

@@ -94,7 +94,8 @@ def test_exact_samples_at_one_place_become_their_mean(tmp_path):
     assert profile.x == pytest.approx(np.array([0, 1, 4, 9]) * UM) and profile.z == pytest.approx(
         np.array([1, 1.5, 3, 3]) * UM)
     path = tmp_path / "before.csv"
-    assert profile.notes == (f"{path}: 3 samples have the same x as another (the first in line 5); the mean is used",)
+    assert profile.notes == (f"{path}: 3 samples have the same x as another sample (the first in line 5); the mean of "
+                             "their heights is used",)
 
 
 @pytest.mark.parametrize("step", [0.15625, 0.052, 0.0999, 0.1003, 0.37137, 7.3])
@@ -105,60 +106,61 @@ def test_exact_rounded_x_is_evened(tmp_path, step):
     if step < 7:
         assert np.ptp(np.diff(profile.x)) < 1e-9 * step * UM
         assert profile.length == pytest.approx(x[-1] * UM, abs=0.1 * UM)
-        assert "x is printed to 100 nm; it is read as evenly spaced at" in profile.notes[0]
+        assert "x is printed only to 100 nm; the samples are taken as evenly spaced by" in profile.notes[0]
     else:
         assert profile.notes == ()
 
 
-GIVE = 'or state the units of x and z, --units "mm,um" (in Python units=("mm", "um"))'
+GIVE = 'or state the units of x and z by --units "mm,um" (in Python, by units=("mm", "um"))'
 REFUSED = {
     "": "{path}: the profile is empty",
     "\ufeff \n\n": "{path}: the profile is empty",
     "# only words\n% more\n": "{path}: no data, only comments",
-    "0,1\n1,2\n": "{path}:1: no header, and units are never guessed; write the header as `x [um],z [um]` above the "
-                  f"first sample, {GIVE}",
+    "0,1\n1,2\n": "{path}:1: there is no header, and units are never guessed; write the header as `x [um],z [um]` "
+                  f"above the first sample, {GIVE}",
     "x,z\n0,1\n": "{path}:1: column 'x' has no unit, and units are never guessed; write the header as `x [um],z [um]`, "
                    f"{GIVE}",
     "\nx [um],z []\n0,1\n": "{path}:2: unknown unit '' of z; use one of m, km, cm, mm, um, nm, in, ft, mil",
     "x [um],z [furlong]\n0,1\n": "{path}:1: unknown unit 'furlong' of z; use one of m, km, cm, mm, um, nm, in, ft, mil",
-    "x [um]\n0\n": "{path}:2: one column, '0', where x and z are needed; write the header as `x [um],z [um]`",
-    "x [um],y [um],z [um],w [um]\n0,0,1,1\n": "{path}:1: 4 columns where x and z, or x, y and z, are needed; keep one "
+    "x [um]\n0\n": "{path}:2: only one column, '0', but x and z are needed; write the header as `x [um],z [um]`",
+    "x [um],y [um],z [um],w [um]\n0,0,1,1\n": "{path}:1: 4 columns, but x and z, or x, y and z, are needed; keep one "
                                                "trace of two columns and write the header as `x [um],z [um]`",
     "x [um],x [um]\n0,1\n": "{path}:1: two columns are named x; write the header as `x [um],z [um]`",
-    "t [s],z [um]\n0,1\n": "{path}:1: column 't' is not known, x and z are needed; write the header as `x [um],z [um]`",
+    "t [s],z [um]\n0,1\n": "{path}:1: column 't' is not known; the columns x and z are needed; write the header as `x "
+                           "[um],z [um]`",
     "x [um],z [um]\n": "{path}: 0 heights; a trace needs at least two",
     "x [um],z [um]\n0,1\n1,\n2,nan\n": "{path}: 1 heights; a trace needs at least two",
     "x [um],z [um]\n0,1\n1,2\n1.5\n": "{path}:4: '1.5': two numbers are needed; write nan for a missing height",
     "x [um],z [um]\n0,1\n1,2,3\n": "{path}:3: '1,2,3': two numbers are needed; write nan for a missing height",
     "x [um] z [um]\n0 1\n# c\n1\n": "{path}:4: '1': two numbers are needed; write nan for a missing height",
     "x [um];z [um]\n0;1\n1;2,5\n1.5;3\n": "{path}:4: '1.5;3': the decimal sign is a comma elsewhere in the file and a "
-                                            "point here; use only one",
+                                          "point here; use the same sign in the whole file",
     "x [um];z [um]\n0;1\n1;1.234,5\n": "{path}:3: '1;1.234,5': the decimal sign is a comma elsewhere in the file and "
-                                         "a point here; use only one",
+                                         "a point here; use the same sign in the whole file",
     "x [um];z [um]\n999,5;1\n1,000;2\n1500,5;2\n": "{path}:3: x reverses: 999.5 um and then 1 um; x of a trace "
-                                                  "must only rise or only fall, so keep one trace per file",
+                                                  "must only rise or only fall, so keep only one trace per file",
     "x [um],z [um]\n0,0,1,5\n": "{path}:2: '0,0,1,5': two numbers are needed; with a decimal comma, separate the "
                                  "columns by semicolons or tabs",
-    "x [um],z [um]\n0,1\n,2\n": "{path}:3: '' is not a number for x; correct the line or leave it out",
+    "x [um],z [um]\n0,1\n,2\n": "{path}:3: '' is not a number for x; correct the line or delete it",
     "x [um],z [um]\n0,1\n1,bad\n": "{path}:3: 'bad' is not a height; write a missing height as nan",
     "x [um],z [um]\n0,1\n1,1_0\n": "{path}:3: '1_0' is not a height; write a missing height as nan",
     "x [um],z [um]\n0,1\n1,\u0663\n": "{path}:3: '\u0663' is not a height; write a missing height as nan",
     "x [um],z [um]\n0,1\nnan,2\n3,1\n": "{path}:3: x is nan; finite numbers are needed",
     "x [um],z [um]\n0,1\n1,2\n2,-inf\n": "{path}:4: z is -inf; finite numbers are needed",
     "x [um],z [um]\n0,1\n1,2\n2,1e999\n": "{path}:4: z is inf; finite numbers are needed",
-    "x [m],z [um]\n0,1\n12700,2\n": "{path}:3: x is 1.27e+04 m; is its unit right? write a missing height as nan",
-    "x [mm],z [mm]\n0,1\n1,2\n2,99999\n": "{path}:4: z is 100 m; is its unit right? write a missing height as nan",
-    "x [um],z [mm]\n0,1\n5,2\n10,1\n": "{path}: heights span 1 mm over a length of 10 um; is the unit of z right? "
-                                       "write a missing height as nan; --units of profile and compare overrides the "
-                                       "header",
+    "x [m],z [um]\n0,1\n12700,2\n": "{path}:3: x is 1.27e+04 m; is the unit right? write a missing height as nan",
+    "x [mm],z [mm]\n0,1\n1,2\n2,99999\n": "{path}:4: z is 100 m; is the unit right? write a missing height as nan",
+    "x [um],z [mm]\n0,1\n5,2\n10,1\n": "{path}: heights span 1 mm over a length of 10 um; is the unit of z right? If "
+                                       "not, correct the header or give --units to profile and compare; write a "
+                                       "missing height as nan",
     "x [nm],z [nm]\n0,0\n0.1,0\n": "{path}: the profile is 0.1 nm long; is the unit of x right?",
     "x [um],z [um]\n0,1\n1,2\n3,1\n2,2\n4,1\n": "{path}:5: x reverses: 3 um and then 2 um; x of a trace must "
-                                                  "only rise or only fall, so keep one trace per file",
+                                                  "only rise or only fall, so keep only one trace per file",
     "x [um],z [um]\n4,1\n1,2\n2,1\n0,2\n": "{path}:4: x reverses: 1 um and then 2 um; x of a trace must only rise or "
-                                           "only fall, so keep one trace per file",
-    "x [um],z [um]\n5,1\n5,2\n": "{path}: every sample lies at x = 5 um; a trace needs at least two places",
-    "x [um],z [um]\n" + "1" * 2000: "{path}:2: a line of 2000 characters; two numbers are needed",
-    "a" * 2000: "{path}:1: a line of 2000 characters; two columns are needed, write the header as `x [um],z [um]`",
+                                           "only fall, so keep only one trace per file",
+    "x [um],z [um]\n5,1\n5,2\n": "{path}: every sample lies at x = 5 um; a trace needs at least two different x",
+    "x [um],z [um]\n" + "1" * 2000: "{path}:2: the line is 2000 characters long; two numbers are needed",
+    "a" * 2000: "{path}:1: a line is 2000 characters long; two columns are needed, write the header as `x [um],z [um]`",
     "x [um],z [um]\n0,\x00\n": "{path}: not a text file; export the profile as text with two columns and write the "
                                "header as `x [um],z [um]`",
 }  # fmt: skip
@@ -195,7 +197,7 @@ def test_always_hostile_files_are_refused_in_little_memory(tmp_path, monkeypatch
     for content, megabytes in ((gzip.compress(b" " * (1 << 25)), 8), (columns, 8)):
         (tmp_path / "before.csv").write_bytes(content)
         tracemalloc.start()
-        with pytest.raises(PatchfemError, match=r"more than 1 MiB|a line of 1000001 characters"):
+        with pytest.raises(PatchfemError, match=r"more than 1 MiB|the line is 1000001 characters"):
             read_profile(tmp_path / "before.csv")
         peak = tracemalloc.get_traced_memory()[1]
         tracemalloc.stop()

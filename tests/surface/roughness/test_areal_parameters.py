@@ -135,7 +135,7 @@ def test_always_what_has_no_value_says_why():
     rng = np.random.default_rng(0)
     for z, name, says in ((rng.normal(size=(60, 60)), "Sal", "within two steps"),
                           (plane_wave(120, 120, 20.0, 0.0), "Str", "stays above 0.2 over 60 um, so Str is below 0.07"),
-                          (gaussian(200, 200, 5.0, 5.0), "Std", "no direction stands out: Str is 0."),
+                          (gaussian(200, 200, 5.0, 5.0), "Std", "no direction stands out, because Str is 0."),
                           (np.zeros((30, 30)), "Sk", "the scan is flat")):
         found = report_of(scan(z * UM))[name]
         assert found.value is None and says in found.reason

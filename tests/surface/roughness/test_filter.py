@@ -86,9 +86,10 @@ def test_exact_uneven_and_missing_samples_of_a_straight_flank():
     found = even(Profile(x, z, "flank.csv"))
     assert np.ptp(np.diff(found.x)) < 1e-12 and found.x[[0, -1]] == pytest.approx([0, 12 * UM])
     assert found.z == pytest.approx(0.1 * found.x, abs=1e-18)
-    assert found.notes == ("flank.csv: 1 of 10 heights are missing; straight lines replace them, the longest "
-                           "over 3 um", "flank.csv: samples lie 1 um to 2 um apart; the trace is resampled every 1 um "
-                           "by straight lines")
+    assert found.notes == ("flank.csv: 1 of 10 heights are missing; the gaps are bridged by straight lines, of which "
+                           "the longest spans 3 "
+                           "um", "flank.csv: samples lie 1 um to 2 um apart; the trace is resampled at every 1 um by "
+                                 "linear interpolation")
 
 
 def test_always_a_finer_reading_of_an_uneven_sine_gives_its_roughness():
@@ -99,7 +100,8 @@ def test_always_a_finer_reading_of_an_uneven_sine_gives_its_roughness():
 
 
 @pytest.mark.parametrize("cutoff, says", [
-    (3 * UM, "1 sines: a cut-off of 3 um is shorter than 4 steps of 1 um; the shortest here is 4 um"),
+    (3 * UM, "1 sines: a cut-off of 3 um is shorter than 4 steps of 1 um; for this trace the cut-off must be at least "
+             "4 um"),
     (1000 * UM, "1 sines: the trace is 999 um long; half a cut-off of 1 mm is trimmed at each end, so the cut-off "
      "must be shorter than the trace"),
     (np.nan, "a cut-off of"),

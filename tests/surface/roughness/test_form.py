@@ -55,7 +55,7 @@ def test_exact_a_circle_under_a_trace(sign):
     x = np.arange(4001) * UM
     flat, name = without_form(trace(sign * circle(x, 5 * MM, 1.6 * MM, -4 * MM)), "cylinder")
     assert np.abs(flat.z).max() < 1e-10
-    assert name == f"circle of radius 5 mm (90 %), a {'crest' if sign > 0 else 'trough'}"
+    assert name == f"circle of radius 5 mm (90 % confidence), a {'crest' if sign > 0 else 'trough'}"
 
 
 @pytest.mark.parametrize("degrees, tilt", [(0.0, 0.0), (25.0, 0.01), (140.0, 0.05)])
@@ -72,8 +72,8 @@ def test_exact_a_cylinder_under_a_scan(degrees, tilt):
     z[rng.random(z.shape) < 0.05] = np.nan
     flat, name = without_form(Areal(x[0], y[:, 0], z, "scan"), "cylinder")
     assert np.sqrt(np.nanmean((flat.z - rough) ** 2)) < 0.005 * UM
-    radius, error, axis = re.fullmatch(r"cylinder of radius ([\d.]+) ± ([\d.]+) mm \(90 %\), a crest whose axis lies "
-                                       r"([\d.]+) deg from x", name).groups()
+    radius, error, axis = re.fullmatch(r"cylinder of radius ([\d.]+) ± ([\d.]+) mm \(90 % confidence\), a crest whose "
+                                       r"axis lies ([\d.]+) deg from x", name).groups()
     assert abs(float(radius) - 8) < 3 * float(error) < 0.03
     assert abs((float(axis) - degrees + 90) % 180 - 90) < 0.1
 
@@ -92,7 +92,7 @@ def test_always_the_error_of_a_radius_holds(count):
 
 def test_exact_a_flat_trace_tells_a_least_radius():
     z = np.random.default_rng(0).normal(size=2000) * UM
-    assert re.fullmatch(r"circle, of a radius above [\d.]+ (mm|m) \(90 %\)", without_form(trace(z), "cylinder")[1])
+    assert re.fullmatch(r"circle, of a radius above [\d.]+ m+ \(90 % conf.*\)", without_form(trace(z), "cylinder")[1])
 
 
 @pytest.mark.parametrize("text", ["0", "10", "-1", "ball", "2.5", ""])

@@ -102,7 +102,7 @@ def test_exact_areal_parameters_of_three_codes(data, truth, name):
 def test_exact_a_digitised_uneven_trace(data):
     x, z = np.loadtxt(data / "xy-1.txt").T * UM
     report = report_of(Profile(x, z, "xy-1.txt"))
-    assert "the trace is resampled every" in report.notes[0]
+    assert "the trace is resampled at every" in report.notes[0]
     dense = np.linspace(x[0], x[-1], 100_001)
     flat = np.interp(dense, x, z)
     flat -= np.polyval(np.polyfit(dense, flat, 1), dense)

@@ -156,10 +156,10 @@ def test_exact_the_other_theory_is_the_exponential_law():
 
 
 @pytest.mark.parametrize("keys, said", [
-    ("", "or give from, or rms_height, rms_slope and rms_curvature"),
+    ("", "you can give `from`, or rms_height, rms_slope and rms_curvature"),
     ('radius = "1 um"\n', "contact.asperities.density: missing"),
     ('rms_height = "1 um"\nrms_slope = 0.1\n', "contact.asperities.rms_curvature: missing"),
-    (RMS + 'radius = "1 um"\n', "keep one"), (RMS.replace("0.05", "0.5"), "at least 1.22"),
+    (RMS + 'radius = "1 um"\n', "keep only one"), (RMS.replace("0.05", "0.5"), "at least 1.22"),
     (RMS.replace("0.02 1/um", "0.02"), "1/um"), ('from = "nowhere.csv"\n', "there is no file")])
 def test_refuses_peaks_that_are_not_whole(keys, said, tmp_path):
     (tmp_path / "scene.toml").write_text(PATCH + keys)
@@ -262,7 +262,7 @@ def test_heights_that_are_not_gaussian_are_told():
         assert word in doubt and "(0 and 3)" in doubt
 
 
-@pytest.mark.parametrize("cutoff, said", [("13 mm", "no wave is left to the profile"), ("1 um", "shortest here")])
+@pytest.mark.parametrize("cutoff, said", [("13 mm", "no wave would remain"), ("1 um", "must be at least")])
 def test_refuses_a_cutoff_that_does_not_split(tmp_path, cutoff, said):
     *_, text = split(tmp_path, [(1e-6, 1e-3), (1e-7, 1e-4), (1e-8, 2e-5)])
     with pytest.raises(PatchfemError, match=said) as wrong:

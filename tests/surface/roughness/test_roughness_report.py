@@ -39,7 +39,7 @@ def test_exact_a_window_of_a_scan_and_its_spikes():
     z = np.array(one.z)
     z[[30, 50], [40, 70]] += 40 * UM
     notes = report_of(replace(one, z=z)).notes
-    assert notes == ("scan.txt: 2 of 9600 heights are spikes (the first at x = 40 um, y = 30 um); they count in every "
+    assert notes == ("scan.txt: 2 of 9600 heights are spikes (the first at x = 40 um, y = 30 um), which count in every "
                      "parameter",) and report_of(one).notes == ()
 
 
@@ -66,7 +66,8 @@ def test_exact_a_trace_shorter_than_a_section_or_the_band_says_so():
     assert report["Rz"].value is None and report["Rz"].reason == "the trace is shorter than one cut-off"
     assert report["Ra"].value > 0
     short = report_of(made(200))["band_amplitude"]
-    assert short.value is None and "shows waves of 2 um to 100 um, not the band 60 um to 110 um" in short.reason
+    assert short.value is None and ("can show waves of 2 um to 100 um, but not the whole band 60 um to 110 "
+                                    "um") in short.reason
 
 
 def test_exact_spikes_are_told_and_count():
@@ -74,7 +75,7 @@ def test_exact_spikes_are_told_and_count():
     z = trace.z.copy()
     z[1000] += 50 * UM
     report = report_of(Profile(trace.x, z, "made.csv"))
-    assert report.notes[0] == ("made.csv: 1 of 4001 heights is a spike (at x = 1 mm); it counts in every parameter")
+    assert report.notes[0] == ("made.csv: 1 of 4001 heights is a spike (at x = 1 mm), which counts in every parameter")
     z[1000] += 950 * UM  # its interval was 4 nm to 68 um on a step of 1 um
     wave = report_of(Profile(trace.x, z, "made.csv"))["dominant_wavelength"]
     assert wave.value > 0 and wave.low is wave.high is None and "gives no interval" in wave.reason
@@ -91,7 +92,8 @@ def test_exact_heights_that_are_not_gaussian_have_no_interval_and_say_so():
         report = report_of(Profile(x, z, "worn.csv"), 250 * UM)
         told = {one.name for one in report.values if one.low is not None}
         assert told <= {"dominant_wavelength", "band_amplitude"} and "band_amplitude" in told
-        assert report["Rku"].reason.startswith("the heights are not Gaussian") and report["Rku"].value > 0
+        assert report["Rku"].reason.startswith("an interval from a single trace assumes "
+                                               "Gaussian") and report["Rku"].value > 0
     for z in (gauss, 6 * UM * np.sin(2 * np.pi * x / 80e-6), 6 * UM * np.sin(2 * np.pi * x / 80e-6) ** 3):
         assert report_of(Profile(x, z, "new.csv"))["Pku"].low is not None
 
@@ -102,7 +104,7 @@ def test_exact_a_trace_as_long_as_its_waves_has_no_interval_of_heights():
     numbers = np.random.default_rng(3).standard_normal((2, 16_000))
     z = np.fft.irfft(np.concatenate([[0], frequency**-1.3 * (numbers[0] + 1j * numbers[1])]))[:2000]
     report = report_of(Profile(np.arange(2000) * UM, z / z.std() * UM, "fractal.csv"))
-    assert report["Pq"].low is None and report["Pq"].reason.startswith("fewer than four of the strongest waves")
+    assert report["Pq"].low is None and report["Pq"].reason.startswith("the trace is shorter than four wavelengths")
     assert report["Pdq"].low is not None and report["Psk"].low is not None
 
 
@@ -145,7 +147,7 @@ def test_exact_areal_parameters_of_white_noise(lost):
 
 
 @pytest.mark.parametrize("surface, more, says", [
-    (made(10), {}, "made.csv: 10 samples; parameters need at least 16"),
+    (made(10), {}, "made.csv: 10 samples; the parameters need at least 16"),
     (made(), {"window": (20 * UM, 10 * UM)}, "the window runs from 20 "
                                              "um to 10 um, but the trace runs from 0 um to 4 mm"),
     (made(), {"window": (20 * UM, 5e-3)}, "the window runs from 20 um to 5 mm"),

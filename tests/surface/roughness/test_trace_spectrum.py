@@ -67,9 +67,9 @@ def test_exact_a_flat_trace_has_no_dominant_wave():
 
 
 @pytest.mark.parametrize("low, high, says", [
-    (110e-6, 60e-6, "a band from 110 um to 60 um; a band must run from a shorter to a longer wavelength"),
-    (1e-6, 60e-6, "shows waves of 2 um to 150 um, not the band 1 um to 60 um"),
-    (60e-6, 200e-6, "shows waves of 2 um to 150 um, not the band 60 um to 200 um"),
+    (110e-6, 60e-6, "a band from 110 um to 60 um; a band must be given from the shorter to the longer wavelength"),
+    (1e-6, 60e-6, "can show waves of 2 um to 150 um, but not the whole band 1 um to 60 um"),
+    (60e-6, 200e-6, "can show waves of 2 um to 150 um, but not the whole band 60 um to 200 um"),
 ])
 def test_refuses_a_band_that_the_trace_does_not_show(low, high, says):
     with pytest.raises(PatchfemError, match=says):

@@ -145,7 +145,7 @@ def test_always_a_part_as_large_as_the_rest_leaves_open_whether_it_wore_or_the_r
         return 0.8e-6 * (np.abs(x - SIDE / 2) < half * SIDE)
     found = change.changed(*scans(wide)[::sign])
     assert change.headline(found) == change.OPEN
-    assert all(one.value is None and "either may be unworn" in one.reason for one in found.values.values())
+    assert all(one.value is None and "either part may be the unworn" in one.reason for one in found.values.values())
     volume = found.volumes.values["worn_volume" if sign > 0 else "grown_volume"]
     assert volume.low <= common(0.03, (12e-6, -18e-6), wide) <= volume.high
 
@@ -226,7 +226,7 @@ def test_always_a_refused_place_names_the_likeness_that_it_wants(grooved, worn, 
     found = replace(worn.found, like=least - 0.004, guess=worn.found.guess._replace(clear=clear))
     monkeypatch.setattr(change, "laid", lambda before, after: found)
     why = change.changed(*grooved).why
-    assert f"of {least - 0.004:.3f}, and only above {least:g} " in why
+    assert f"of {least - 0.004:.3f}, but only values above {least:g} " in why
 
 
 @cache
