@@ -67,7 +67,7 @@ def test_refuses_what_holds_no_decay():
     rng, t = np.random.default_rng(0), np.arange(500) / 1000
     with pytest.raises(PatchfemError, match=r"rise above the noise|samples per cycle"):
         half_swings(t, rng.normal(size=t.size))
-    with pytest.raises(PatchfemError, match="rows of a free decay"):
+    with pytest.raises(PatchfemError, match="the free decay has 9 samples"):
         half_swings(t[:9], t[:9])
     with pytest.raises(PatchfemError, match="the record contains no oscillation"):
         half_swings(t, 0 * t)
