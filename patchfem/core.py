@@ -132,7 +132,8 @@ class ModalBasis:
     interface `slide`. normal (away from the contact, 1), pitch [rad/m], lateral [1], yaw [rad/m]: (n,) motion of the
     patch per coordinate, None where no mode has any. gauge: (n,) motion that the displacement is measured of, where it
     is not that of `output`, which the acceleration is measured of; None where they are one. shapes: (p, n) the modes or
-    masses of the scene, which `names` are of, per coordinate; None: they are the coordinates.
+    masses of the scene, which `names` are of, per coordinate; None: they are the coordinates. lateral_faces: (i, n)
+    slide of every interface in its second direction, 0 of one without; None where none has one.
     """
 
     names: tuple
@@ -150,6 +151,7 @@ class ModalBasis:
     yaw: np.ndarray | None = None
     shapes: np.ndarray | None = None
     gauge: np.ndarray | None = None
+    lateral_faces: np.ndarray | None = None
 
     @property
     def interfaces(self) -> np.ndarray:

@@ -9,9 +9,10 @@ A law is carried by the bench, by a rig of one interface under a constant load (
 record names: "shear" of pieces that give way, "joints" (several interfaces, springs that bend, strips that yaw),
 "varying-load" in a rig, "harmonic" balance, "two-directions" of a bench, "comparison" methods, "exact" events,
 "pieces" of it (elements that stick or slip, exact from yield to yield), "grooves" whose flanks the load
-climbs. Traits: "set-valued" (it holds without a stretch), "bonds" (the sum 2.17 with its readings and orders),
-"averaged" (over the pressure behind a point), "timeless" (no rate of the slide changes its force), "memoryless" (of
-the last motion alone), "creeps" (it never holds), "cells" (a density cut into elements).
+climbs, a "plane" in which an interface of a rig slides. Traits: "set-valued" (it holds without a stretch), "bonds" (the
+sum 2.17 with its readings and orders), "averaged" (over the pressure behind a point), "timeless" (no rate of the slide
+changes its force), "memoryless" (of the last motion alone), "creeps" (it never holds), "cells" (a density cut into
+elements).
 
 A shape of the gap is an effect, its table in `scene.keys.contact` and a function of `contact.gaps`. A waveform of the
 drive is an effect with its keys, and a row of `structure.drives.MADE`. Traits: "steady" (harmonic balance finds its
@@ -85,7 +86,8 @@ EFFECTS = {
                               "joints varying-load harmonic comparison grooves", "memoryless creeps"),
     "friction.law=elastic-plastic": _law("laws.elastic_plastic", "F' = k v, |F| <= mu N (3.12, corrected for "
                                          "reversals), k = stiffness or mu N/bond_length", ("bond_length|stiffness", ""),
-                                         "shear joints varying-load harmonic comparison pieces grooves", "timeless"),
+                                         "shear joints varying-load harmonic comparison pieces grooves plane",
+                                         "timeless"),
     "friction.law=nonlocal": _law("bonds.quadrature", "tau = -mu_s int phi(R/eps) sigma_n u/|u| dL1/eps_0 (2.17)",
                                   ("bond_length", "kinetic reading order rest_growth slip_growth rest_speed "
                                    "initial_bonds breakaway spread temperature"),

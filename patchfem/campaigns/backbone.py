@@ -25,7 +25,7 @@ from ..dynamics.harmonic.harmonic import pack as harmonics_packed
 from ..dynamics.harmonic.laws import Jenkins, synthesis
 from ..dynamics.harmonic.point import balance_of
 from ..dynamics.march import models
-from ..effects import has
+from ..effects import has, unbuilt
 from ..friction.record import loop_from
 from ..model.model import Model
 from ..model.slide import SlidePath
@@ -200,6 +200,9 @@ def _joint(model: Model, name: str) -> Joint:
     if model.rig is None:
         raise PatchfemError("a backbone needs a rig: give the scene [structure] and [drive]", "structure")
     modes, number = model.rig.modes, _number(model.rig, name)
+    if modes.lateral_faces is not None:
+        flat = next(one.key for one in model.rig.interfaces if one.lateral)
+        raise PatchfemError(unbuilt("a backbone with interfaces that slide in a plane", "out"), f"{flat}.lateral")
     patch, apart = None, (None,)
     if model.patch is not None:
         patch, *apart = *patch_result.solve_all(model.patch, model.accuracy.tolerance), None

@@ -80,11 +80,13 @@ def _between(result: Result) -> dict:
     r = result.response
     columns = {"relative_displacement": ("slides", r.slide), "relative_velocity": ("slide_rates", r.slide_rate),
                "friction_force": ("forces", r.force)}
+    second = {f"lateral_{name}": np.ascontiguousarray(r.extra[f"lateral_{many}"].T) for name, many in (
+        ("displacement", "slides"), ("velocity", "slide_rates"), ("force", "forces")) if f"lateral_{many}" in r.extra}
     loads = np.array([one.load for one in result.plan.model.rig.interfaces])
     return {"output_displacement": r.output, "output_velocity": r.output_rate,
             "normal_load": np.repeat(loads[:, None], r.time.size, axis=1),
             **{name: np.ascontiguousarray(r.extra[many].T) if many in r.extra else one[None, :]
-               for name, (many, one) in columns.items()}}
+               for name, (many, one) in columns.items()}, **second}
 
 
 def _levels(levels) -> dict:

@@ -25,6 +25,7 @@ LONG = {
     "base_acceleration": ("m s-2", "acceleration of the base"),
     "friction_force": ("N", "resultant friction force, positive when it opposes positive slip"),
     "lateral_displacement": ("m", "displacement of the upper piece across the sliding direction"),
+    "lateral_velocity": ("m s-1", "velocity of the upper piece across the sliding direction"),
     "lateral_force": ("N", "resultant friction force across the sliding direction, positive when it opposes positive "
                            "slip"),
     "yaw_moment": ("N m", "moment about +z of the friction on the upper piece, sum of y f_x - x f_y"),
@@ -49,7 +50,10 @@ LONG = {
 BETWEEN = {"relative_displacement": "displacement of the first mass of an interface relative to the second",
            "relative_velocity": "velocity of the first mass of an interface relative to the second",
            "friction_force": "friction force of an interface, positive when it opposes positive slip",
-           "normal_load": "normal load on an interface"}
+           "normal_load": "normal load on an interface",
+           "lateral_displacement": "motion of the first of the lateral pair of an interface relative to the second",
+           "lateral_velocity": "velocity of the first of the lateral pair of an interface relative to the second",
+           "lateral_force": "friction force on the lateral pair of an interface, positive when it opposes slip there"}
 
 
 @dataclass(frozen=True, eq=False, slots=True)

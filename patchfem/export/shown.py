@@ -61,6 +61,10 @@ def report_data(result: Result) -> dict:
             data["loop"] |= {"period": result.extra["period"]}
             if model.rig.names and "slides" in w.extra:
                 data["loop"]["each"] = list(zip(model.rig.names, w.extra["slides"].T, w.extra["forces"].T))
+                data["loop"]["each"] += [(f"{name}, across: {one.lateral}", w.extra["lateral_slides"][:, k],
+                                          w.extra["lateral_forces"][:, k])
+                                         for k, (name, one) in enumerate(zip(model.rig.names, model.rig.interfaces))
+                                         if one.lateral]
     if model.measured is not None:
         path, gains, kind, cutoff = model.measured
         rig = model.rig

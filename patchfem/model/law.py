@@ -21,13 +21,15 @@ class InterfaceLaw:
     """One interface that rubs, with its law.
 
     key: of its table, for messages; numbers: keys of the law as they act; load: normal load [N] of an interface between
-    masses, None where the patch or the point of the model carries it; patch: that bears this load, None of a point.
+    masses, None where the patch or the point of the model carries it; patch: that bears this load, None of a point;
+    lateral: name of the pair of its second direction where it slides in a plane, "" where it does not.
     """
 
     key: str
     numbers: object
     load: float | None
     patch: PatchModel | None = None
+    lateral: str = ""
 
     @property
     def soft(self) -> str:
@@ -93,7 +95,8 @@ def interface_laws_of(scene) -> tuple:
     """
     if scene.structure.interface:
         return tuple(InterfaceLaw(f"structure.interface.{k}", acting(one, None, scene.where, one.pressing),
-                                  one.pressing, _patch_of(scene, k, one))
+                                  one.pressing, _patch_of(scene, k, one),
+                                  "-".join(map(str, one.lateral or ())))
                      for k, one in enumerate(scene.structure.interface))
     if scene.friction is None:
         return ()

@@ -114,10 +114,11 @@ def _as_given(scene) -> ModalBasis:
     if structure.mode:
         return _of_modes(structure, forced)
     if structure.masses:
-        return masses.basis(structure.masses, [(s.between, s.stiffness) for s in structure.spring],
-                            [(d.between, d.coefficient) for d in structure.damper],
-                            [i.between for i in structure.interface], structure.output_mass or 1,
-                            pushed_mass(structure, drive) if forced else None)
+        pairs, laterals = structure_reduced.pairs_of(structure)
+        return masses.in_planes(masses.basis(
+            structure.masses, [(s.between, s.stiffness) for s in structure.spring],
+            [(d.between, d.coefficient) for d in structure.damper], pairs, structure.output_mass or 1,
+            pushed_mass(structure, drive) if forced else None), laterals)
     if structure.reduced is not None:
         return structure_reduced.found(scene)[0]
     return _read(scene)[0]

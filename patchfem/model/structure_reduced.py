@@ -7,7 +7,7 @@ import numpy as np
 
 from ..core import ModalBasis, PatchfemError
 from ..inputs import matrices
-from ..structure import reduced
+from ..structure import masses, reduced
 from ..structure.places import AXES
 
 TOLD = 1e-5  # of a frequency, an uncertainty that is told
@@ -25,15 +25,24 @@ def found(scene) -> tuple:
         files = {key: scene.beside(name) for key in FILES if isinstance(name := getattr(table, key), str)}
         made, notes = _reduction(tuple((key, path, *_stamp(path, key)) for key, path in files.items()), table.boundary,
                                  table.modes, table.method, table.moved, table.unit, drive.kind == "base")
-        pairs = [one.between for one in structure.interface] or [table.slide] * (table.slide is not None)
+        pairs, laterals = pairs_of(structure)
         pushed = None if drive.kind == "base" else drive.mass or structure.output_mass or 1
         ratio = 0.0 if table.damping is None or isinstance(table.damping, str) else table.damping
         names = [str(one) for one in table.boundary]
-        basis, more = (reduced.basis(made, count, pairs, structure.output_mass or 1, pushed, ratio, names)
-                       for count in (table.modes, made.omega.size))
+        basis, more = (masses.in_planes(reduced.basis(made, count, pairs, structure.output_mass or 1, pushed, ratio,
+                                                      names), laterals) for count in (table.modes, made.omega.size))
     except PatchfemError as error:
         raise type(error)(f"{scene.where(error.key or 'structure.reduced')}: {error}") from None
     return basis, None if made.whole and table.modes >= made.omega.size else more, [*notes, _kept(made, basis, table)]
+
+
+def pairs_of(structure) -> tuple:
+    """(pairs of coordinates that slide, the second directions behind the first; second pair of each interface, None of
+    one without) of [structure]."""
+    laterals, pairs = [one.lateral for one in structure.interface], [one.between for one in structure.interface]
+    if not pairs and structure.reduced is not None and structure.reduced.slide is not None:
+        pairs = [structure.reduced.slide]
+    return pairs + [pair for pair in laterals if pair is not None], laterals
 
 
 def _kept(made, basis: ModalBasis, table) -> str:

@@ -21,6 +21,10 @@ def end_error(window: Response, period: float, offset: float) -> dict:
     cycles, (slips, slides) = span / period, slips_of(window)
     forces = window.extra.get("forces", window.force[:, None])
     parts = (forces[1:] + forces[:-1]) / 2 * np.diff(slides, axis=0)
+    if "lateral_slides" in window.extra:
+        pull, place = (window.extra[f"lateral_{name}"] for name in ("forces", "slides"))
+        parts = parts + (pull[1:] + pull[:-1]) / 2 * np.diff(place, axis=0)
+        forces = np.hypot(forces, pull)
     out = {"relative_displacement_amplitude": _edge(window.output) / 2 + _edge(-window.output) / 2,
            "absolute_acceleration_peak": _edge(np.abs(window.acceleration)),
            "drift_per_cycle": _of_drift(slides[:, 0], cycles), "friction_work": abs(float(parts[-1].sum()))}

@@ -42,21 +42,55 @@ def step_harmonic(time, means, omega) -> complex:
     return complex(2 / (time[-1] - time[0]) * np.sum(means * np.diff(turn)) / (-1j * omega))
 
 
-def slip_measures(window: Response, drive, steps_per_cycle: int) -> dict:
+def lateral(window: Response, name: str, number: int = 0):
+    """What moves in the second direction (k,) of an interface of this number that slides in a plane: its "slides",
+    "slide_rates", "forces" or "slips"; None where it does not."""
+    found = window.extra.get(f"lateral_{name}")
+    return None if found is None or not found[:, number].any() else found[:, number]
+
+
+def widest(x, y=None) -> float:
+    """Largest distance between two places x (k,) [m], or (x, y) of a path in a plane."""
+    if y is None:
+        return float(x.max() - x.min())
+    best, angle, turns, way = 0.0, 0.0, np.pi * np.arange(180) / 180, 0
+    while way < 200:  # the width in each direction, then in that of the widest pair until there is no wider one
+        turn = turns[way] if way < turns.size else angle
+        along = x * np.cos(turn) + y * np.sin(turn)
+        i, j = np.argmax(along), np.argmin(along)
+        apart = float(np.hypot(x[i] - x[j], y[i] - y[j]))
+        if apart > best:
+            best, angle = apart, np.arctan2(y[i] - y[j], x[i] - x[j])
+        elif way >= turns.size:
+            break
+        way += 1
+    return best
+
+
+def moved(x, y=None) -> np.ndarray:
+    """Distances (k - 1,) between successive places, as of `widest`."""
+    return np.abs(np.diff(x)) if y is None else np.hypot(np.diff(x), np.diff(y))
+
+
+def slip_measures(window: Response, drive, steps_per_cycle: int, second=(None, None)) -> dict:
     """Slip amplitude [m], stick fraction [1] and phase of the first slip after a stick [rad, modulo pi].
 
     From uniform samples. The interface sticks while less than SHARE of its slide is irreversible, or it does not slide
-    at all; where that share passes SHARE is found between the middles of the steps.
+    at all; where that share passes SHARE is found between the middles of the steps. second: slide and slip (k,) [m]
+    in a second direction, None without one.
     """
-    if np.ptp(window.slide) <= REST:  # a law without a stiffness swings its traction, and so its slip, at a rest
+    across, beside = second
+    if widest(window.slide, across) <= REST:
+        # a law without a stiffness swings its traction, and so its slip, at a rest
         return {"slip_amplitude": 0.0, "stick_fraction": 1.0}
     slip = window.slip
-    out = {"slip_amplitude": float(slip.max() - slip.min()) / 2}
-    if slip.size < 2 or np.ptp(slip) <= slip_noise(window):  # it ended where it began, or never slipped
+    out = {"slip_amplitude": widest(slip, beside) / 2}
+    if slip.size < 2 or 2 * out["slip_amplitude"] <= slip_noise(window):  # it ended where it began, or never slipped
         return out | {"stick_fraction": 1.0}
     cycles = max(1, (slip.size - 1) // steps_per_cycle)
     kept = slice(-cycles * steps_per_cycle - 1, None) if slip.size > steps_per_cycle else slice(None)
-    slid, slide, time = np.abs(np.diff(slip[kept])), np.abs(np.diff(window.slide[kept])), window.time[kept]
+    across, beside = (None if one is None else one[kept] for one in second)
+    slid, slide, time = moved(slip[kept], beside), moved(window.slide[kept], across), window.time[kept]
     still = slide <= ROUND * np.abs(window.slide).max(initial=0.0)
     above = np.where(still, 0.0, slid / np.where(still, 1.0, slide)) - SHARE
     before, after = above[:-1], above[1:]

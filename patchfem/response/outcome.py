@@ -146,7 +146,8 @@ def still_loads(window, period: float, tolerance: float) -> bool:
     By the mean of the last cycle against that of the first, more than the tolerance of the largest force; in a window
     of one cycle where it rises all the way. window: Response; period [s] of the drive.
     """
-    time, forces = window.time, window.extra.get("forces", window.force[:, None])
+    time, forces = window.time, np.column_stack([window.extra.get("forces", window.force), window.extra.get(
+        "lateral_forces", np.zeros((window.time.size, 0)))])
     largest_force = np.abs(forces).max(axis=0)
     if time[-1] - time[0] < 1.5 * period:
         size = np.abs(forces)

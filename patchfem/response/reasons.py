@@ -7,10 +7,12 @@ import numpy as np
 from ..core import Measure
 from ..scales import plain
 from ..structure.drive_sizes import sinusoidal, whole
+from .measures import lateral
 from .rows import TABLE
 
 ACCELERATIONS = ("absolute_acceleration_fundamental", "acceleration_distortion")
 SHARED = 0.05  # of the slide, carried by another mode, from which no damping ratio is one of the first
+IN_PLANE = "the interface slides in a plane, and this belongs to one direction"
 CYCLIC = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", *ACCELERATIONS)
 HOLDS = "the whole interface sticks throughout the last cycles"
 UNBOUNDED = "no bounded motion exists at this drive"
@@ -82,6 +84,8 @@ def _of_cycles(name: str, values, window, drive, beside: float) -> str:
         return STILL
     if name in ACCELERATIONS:
         return "the output has no acceleration"
+    if lateral(window, "slides") is not None:
+        return IN_PLANE
     if "equivalent_stiffness" not in values:
         return f"{HOLDS}, so its loop has no width"
     if name == "equivalent_damping":

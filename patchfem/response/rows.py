@@ -16,7 +16,15 @@ from ..dynamics.integrated import Integrated
 from ..structure import drive_sizes
 from . import stationary
 from .loops import Turn, drift, half_range, interface_loop, secant_stiffness, turns_of
-from .measures import REST, acceleration_peak, circular_mean, energy_balance, ledger_measures, slip_measures
+from .measures import (
+    REST,
+    acceleration_peak,
+    circular_mean,
+    energy_balance,
+    lateral,
+    ledger_measures,
+    slip_measures,
+)
 from .spectrum import FLOOR, odd_harmonics, wave_measures
 
 SAMPLED = Integrated()  # of an engine that knows no more than its samples
@@ -33,7 +41,7 @@ class Seen:
     window holds no whole cycle; ledger (4, k) [J] or None; known: name -> value that the engine has itself, None where
     it has none. by: how the force is read where the slide turns, as `loops.turns_of` takes it; still: half range of the
     slide [m] up to which it is round-off; even: equally spaced samples of the window, None where they are its own;
-    together: the interfaces are parts of one, which has no others beside it.
+    together: the interfaces are parts of one, which has no others beside it; number: of the interface, from 0.
     """
 
     window: Response
@@ -51,6 +59,7 @@ class Seen:
     still: float = 0.0
     even: Response | None = None
     together: bool = False
+    number: int = 0
 
     @cached_property
     def span(self) -> float:
@@ -71,7 +80,8 @@ class Seen:
         if first is None or first.stuck is None:
             window = self.even or self.window
             steps = max(1, round((window.time.size - 1) * self.drive.period / self.span))
-            found = slip_measures(window, self.drive, steps)
+            found = slip_measures(window, self.drive, steps, [lateral(window, one, self.number) for one in (
+                "slides", "slips")])
         else:
             starts = self.own.starts
             found = {"stick_fraction": stuck_share(first.stuck, self.span)} | (
@@ -104,7 +114,7 @@ class Seen:
         """
         if self.harmonics is None or self.load is None:
             return {}
-        moves = self.sine and np.ptp(self.window.slide) > max(2 * self.still, REST)
+        moves = self.sine and self.lateral("slides") is None and np.ptp(self.window.slide) > max(2 * self.still, REST)
         found = interface_loop(half_range(self.turns) if moves else 0.0, *self.harmonics, self.stiffness)
         return found | {"secant_stiffness": secant_stiffness(self.turns)} if moves else found
 
@@ -146,9 +156,15 @@ class Seen:
                              force=extra["forces"][:, k], slip=slips[:, k])
             loops = self.own.loops[k:k + 1]
             work = loops[0].work if loops else float(np.trapezoid(window.force, window.slide))
-            out.append(replace(self, window=window, own=Integrated(loops=loops), sine=False, known={},
+            if not loops:
+                work += lateral_work(self.window, k)
+            out.append(replace(self, window=window, own=Integrated(loops=loops), sine=False, known={}, number=k,
                                loop=(0j, 0j, work * self.drive.period / max(self.span, 1e-300))))
         return out
+
+    def lateral(self, name: str):
+        """`measures.lateral` of the interface in the window."""
+        return lateral(self.window, name, self.number)
 
     def of_load(self, value: Callable) -> float | None:
         """A number of the load history (k,) [N] in the window; None where the load does not change with the motion.
@@ -157,6 +173,27 @@ class Seen:
         """
         load = self.window.extra.get("normal_load")
         return None if load is None or self.load is None else float(value(load))
+
+
+def lateral_work(window, number: int) -> float:
+    """Friction work [J] of an interface in its second direction over a window, by the trapezoidal rule; 0 without
+    one."""
+    force, slide = (lateral(window, name, number) for name in ("forces", "slides"))
+    return 0.0 if force is None or slide is None else float(np.trapezoid(force, slide))
+
+
+def resultant_peak(force, across) -> float:
+    """Largest size [N] of a force (k,), of the resultant with that across it where there is one."""
+    return float((np.abs(force) if across is None else np.hypot(force, across)).max())
+
+
+def drift_of(s: Seen) -> float:
+    """Drift of the slide of an interface per cycle [m], in a plane the length of the drifts in both directions."""
+    w, across = s.window, s.lateral("slides")
+    own = drift(w.time, w.slide, w.slide_rate, s.drive.period)
+    if across is None:
+        return own
+    return float(np.hypot(own, drift(w.time, across, w.extra["lateral_slide_rates"][:, s.number], s.drive.period)))
 
 
 def first_harmonic(values: dict):
@@ -190,9 +227,10 @@ ROWS = (
         lambda s: float(s.extremes[:, 1].max() - s.extremes[:, 0].min()) / 2 if s.own.swing is None else s.own.swing),
     Row("absolute_acceleration_peak", "m s-2", 1e-4, "largest acceleration at the output, base motion included",
         lambda s: acceleration_peak(s.window) if s.own.acceleration is None else s.own.acceleration),
-    Row("friction_force_peak", "N", 1e-6, "largest friction force on the whole interface",
+    Row("friction_force_peak", "N", 1e-6, "largest friction force on the whole interface; if the interface slides in a "
+                                     "plane, the largest resultant of both directions",
         lambda s: None if s.load is None else s.own.loops[0].force if s.own.loops else
-        float(np.abs(s.window.force).max()), group="friction"),
+        resultant_peak(s.window.force, s.lateral("forces")), group="friction"),
     Row("energy_balance", "1", 1e-8,
         "error of the energy balance over the run: work minus stored energy minus dissipated energy, divided by the "
         "sum of the exchanged energy and the largest stored energy",
@@ -206,13 +244,14 @@ ROWS = (
         lambda s: s.waves.get("acceleration_distortion")),
     Row("drift_per_cycle", "m", 1e-11,
         "drift of the slide per cycle: (mean slide over the last cycle of the window - mean slide over its first "
-        "cycle)/(number of cycles between these two cycles)",
-        lambda s: drift(s.window.time, s.window.slide, s.window.slide_rate, s.drive.period) if s.own.drift is None
-        else s.own.drift,
+        "cycle)/(number of cycles between these two cycles); if the interface slides in a plane, the length of this "
+        "vector",
+        lambda s: drift_of(s) if s.own.drift is None else s.own.drift,
         term=("slip amplitude (without slip: amplitude of the motion)", _moved), halves=FOURTH),
     Row("slip_amplitude", "m", 1e-10,
         "half the peak-to-peak value of the irreversible part of the slide; for a patch, the mean over its points, "
-        "weighted by the pressure; for law 'iwan', the mean over the sliders, weighted by their slip forces",
+        "weighted by the pressure; for law 'iwan', the mean over the sliders, weighted by their slip forces; if the "
+        "interface slides in a plane, half the largest distance between two points of the path of irreversible slide",
         lambda s: s.slip.get("slip_amplitude"), group="friction"),
     Row("stick_fraction", "1", 1e-3,
         "share of the time of the last cycles in which the interface as a whole sticks, which means that more than "
@@ -228,8 +267,9 @@ ROWS = (
     Row("normal_load", "N", 0.0, "normal load on the interface, sum over all pairs", lambda s: s.load,
         group="friction"),
     Row("loop_area", "J", 1e-10,
-        "energy dissipated per cycle in this interface alone; null if the drive is not a sine and the friction loop "
-        "does not close, because the interface then stores or returns more energy than it dissipates",
+        "energy dissipated per cycle in this interface alone, in both directions if the interface slides in a plane; "
+        "null if the drive is not a sine and the friction loop does not close, because the interface then stores or "
+        "returns more energy than it dissipates",
         lambda s: s.cycle.get("loop_area"), group="energy"),
     Row("equivalent_stiffness", "N m-1", 1.0,
         "first harmonic of the friction force (only the part in phase with the slide) divided by the first harmonic of "

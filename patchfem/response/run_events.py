@@ -7,7 +7,7 @@ import numpy as np
 from ..dynamics.events import event_list as listed
 from . import ringing
 from .events import BORDER, MOST, RELEASE_UP, REVERSAL_UP, STOP, Events, detected, states, sticks, table
-from .measures import slip_noise
+from .measures import lateral, moved, slip_noise
 
 OF_LOG = {0: STOP, 1: RELEASE_UP, -1: RELEASE_UP + 1, 2: REVERSAL_UP, -2: REVERSAL_UP + 1, 9: BORDER}
 LEAST = -min(OF_LOG)
@@ -17,8 +17,15 @@ SOURCE = "located by the event engine"
 
 
 def slips_of(response) -> tuple:
-    """Irreversible and whole motion, (k, i) [m] each, of every interface at the samples of a Response."""
+    """Irreversible and whole motion, (k, i) [m] each, of every interface at the samples of a Response; of one that
+    slides in a plane the path of its irreversible motion, which only grows, and its slide in the first direction."""
     extra = response.extra
+    if "lateral_slips" in extra:
+        slips = extra["slips"].copy()
+        for k in range(slips.shape[1]):
+            if (second := lateral(response, "slips", k)) is not None:
+                slips[1:, k] = slips[0, k] + np.cumsum(moved(slips[:, k], second))
+        return slips, extra["slides"]
     if "slides" in extra:
         return extra.get("slips", extra["slides"]), extra["slides"]
     return response.slip[:, None], response.slide[:, None]
@@ -99,7 +106,8 @@ def with_own(measures: dict, own: dict | None) -> dict:
 def all_stick(window, held: float) -> bool:
     """Whether no interface and no strip slips in the window by more than `held` [m] to either side, or the last
     digit."""
-    slips = np.column_stack([window.slip, slips_of(window)[0]])
+    slips = slips_of(window)[0]
+    slips = np.column_stack([*([] if "lateral_slips" in window.extra else [window.slip]), slips])
     return bool(np.ptp(slips, axis=0).max() / 2 <= max(held, slip_noise(window)))
 
 

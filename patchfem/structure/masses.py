@@ -1,8 +1,10 @@
 """Masses in a row or a net, joined by springs and dampers, 0 being the base (report, section 3 and figure 16)."""
 
+from dataclasses import replace
+
 import numpy as np
 
-from ..core import ModalBasis
+from ..core import ModalBasis, frozen_array
 from . import matrices
 
 
@@ -33,3 +35,15 @@ def basis(masses, springs, dampers, interfaces, output: int, pushed: int | None 
     return matrices.basis(np.diag(np.asarray(masses, float)), faces=rows(interfaces, n) if interfaces else None,
                           output=unit[output - 1], force=None if pushed is None else unit[pushed - 1], stretch=stretch,
                           dash=dash if len(dash) else None)
+
+
+def in_planes(found: ModalBasis, laterals) -> ModalBasis:
+    """The basis whose faces after the first len(laterals) are second directions of those interfaces whose entry is not
+    None."""
+    count, second = len(laterals), [k for k, pair in enumerate(laterals) if pair is not None]
+    if not second:
+        return found
+    rows = np.zeros((count, found.omega.size))
+    rows[second] = found.faces[count:]
+    return replace(found, faces=None if count == 1 else frozen_array(found.faces[:count]),
+                   lateral_faces=frozen_array(rows))

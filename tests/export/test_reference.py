@@ -79,7 +79,7 @@ def test_exact_rows_say_kind_limits_default_and_what_needs_the_key():
     rows = {key: rest for key, *rest in section("`[drive]`")}
     assert rows["`levels`"][0] == "list of accelerations, >= 0" and rows["`from`"][2] == "with waveform `sweep`"
     assert section("`[[structure.spring]]`")[0][:2] == ["`between`", "pair of whole numbers, >= 0, <= 1000000"]
-    assert {key for key, *_ in section("`[[structure.interface]]`")} == {"`between`", "`load`"}
+    assert {key for key, *_ in section("`[[structure.interface]]`")} == {"`between`", "`lateral`", "`load`"}
 
 
 def test_always_a_table_has_as_many_cells_as_its_head():

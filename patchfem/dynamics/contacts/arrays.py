@@ -171,7 +171,8 @@ class Faces(NamedTuple):
     """Elements (e,) on ports (p,) beside a contact on port 0, or in its place; rows are named in `march.stops_kernels`.
 
     rows (p, n): slide of every port per coordinate; gives (2, p, p): what port forces take from the slides [m/N] and
-    rates [m/(s N)] of ports over a step; of (2, e): port, and 1 for friction, 0 for springs; num, mem (e, ...) as the
+    rates [m/(s N)] of ports over a step; of (3, e): port, 1 for friction, 0 for springs, and the element of the other
+    direction where both slide in a plane, else its own number; num, mem (e, ...) as the
     laws have them, num[e, 0] which law; each (10, e): force [N], slide, speed, bond length and slide increment of the
     step, residual, largest force [N], infinite where nothing bounds it, goal [N], last two slide increments; own (5,):
     of the contact its force, last increment, force at the sample and goal, and 1 where the stops of the step are known;

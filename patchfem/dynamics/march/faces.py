@@ -22,6 +22,7 @@ def faces_of(model, prop, plant, mass: float):
         num[k, 0] = numbers[one.kernels or COULOMB]
     there, scale = getattr(model, "patch", None) is not None, getattr(model, "scale", 0.0)
     ports = np.array([one.port for one in model.joints], np.int64)
+    mates = [k + one.mate for k, one in enumerate(model.joints)]
     holds = np.array([k for k, one in enumerate(elements) if (one.kernels or COULOMB) == COULOMB], np.int64)
     quick = prop.rows * prop.push[1] if not prop.dense.size else prop.rows @ prop.dense[n:, 2 * n:]
     gamma, m, at = quick @ prop.rows.T / mass, holds.size, ports[holds]
@@ -35,6 +36,6 @@ def faces_of(model, prop, plant, mass: float):
     modal[0] = plant.push[0] / mass
     return arrays.Faces(
         np.ascontiguousarray(prop.rows, float), np.array([prop.beta, gamma]),
-        np.array([ports, [one.potential is None for one in model.joints]], np.int64), num, mem, each,
+        np.array([ports, [one.potential is None for one in model.joints], mates], np.int64), num, mem, each,
         np.array([0.0, 0.0, 0.0, GOAL * (model.patch.limit if there else model.limit), 0.0]), np.zeros((2, p)), modal,
         np.zeros((e, e)), np.zeros((n, n)), stops)

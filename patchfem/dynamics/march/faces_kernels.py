@@ -12,6 +12,7 @@ import numpy as np
 from ...compiled.inner import njit
 from ...friction.flags_kernels import INNER
 from ...friction.laws import elastic_plastic_kernels as law
+from ...friction.laws import plane_kernels as plane
 from ...friction.laws.coulomb_kernels import stick
 from ..contacts import element_kernels as contact
 from ..contacts import element_solve_kernels as solver
@@ -34,6 +35,7 @@ from .stops_kernels import (
     GAMMA,
     HOLDS,
     KNOWN,
+    MATE,
     MEAN,
     MOST,
     NOW_OWN,
@@ -54,6 +56,7 @@ from .stops_kernels import (
 )
 
 STOPS, SMOOTH, THERE, SEVERAL = parts.STOPS, parts.SMOOTH, parts.THERE, parts.SEVERAL  # by which branches are left out
+PLANE = parts.PLANE
 TURNS, FEW = 1000, 60  # of all elements in a step before it counts as failed; with stops and releases inside it
 ROUND = 4e-15  # of a slide over its give, and of a force: no residual is smaller
 EACH = 5  # columns of an element in a row: slide, speed, force, slip, mean force of the step that follows
@@ -137,8 +140,11 @@ def elsewhere(mine, port, j):
 def turned(e, turn, j, dt):
     """Solve element e with all others held: (change of its force over its goal [1], iterations).
 
-    turn: from 0; the change is inf where the solve failed.
+    turn: from 0; the change is inf where the solve failed. The first direction of an element in a plane has both.
     """
+    if PLANE:
+        if j.of[MATE, e] != e:
+            return turned_in_plane(e, turn, j) if j.of[MATE, e] > e else (0.0, 0)
     p = j.of[PORT, e]
     beta, dq, tries = j.gives[BETA, p, p], j.each[STEP, e], 1
     mine = j.port[FREE, p] - elsewhere(e, p, j)
@@ -153,6 +159,25 @@ def turned(e, turn, j, dt):
     used = (mine - dq) / beta
     change = abs(used - j.each[PULL, e]) / (j.each[CLOSE, e] + ROUND * (abs(mine) / beta + abs(used)))
     j.each[STEP, e], j.each[PULL, e] = dq, used
+    return change if tries >= 0 else np.inf, abs(tries)
+
+
+@njit(error_model="numpy", **INNER)
+def turned_in_plane(e, turn, j):
+    """`turned` of both directions of the element whose first one is e."""
+    f = j.of[MATE, e]
+    p, r = j.of[PORT, e], j.of[PORT, f]
+    xx, xy, yy = j.gives[BETA, p, p], j.gives[BETA, p, r], j.gives[BETA, r, r]
+    x = j.port[FREE, p] - elsewhere(e, p, j) + xy * j.each[PULL, f]
+    y = j.port[FREE, r] - elsewhere(f, r, j) + xy * j.each[PULL, e]
+    dx, dy = j.each[STEP, e], j.each[STEP, f]
+    if turn == 0:
+        dx, dy = 2 * j.each[WENT, e] - j.each[WENT_BEFORE, e], 2 * j.each[WENT, f] - j.each[WENT_BEFORE, f]
+    dx, dy, pull, across, tries = plane.solve(x, y, xx, xy, yy, j.num[e, 2], j.num[e, 3], j.mem[e, 3], j.mem[f, 3], dx,
+                                              dy, 0.1 * j.each[CLOSE, e])
+    change = max(abs(pull - j.each[PULL, e]) / (j.each[CLOSE, e] + ROUND * (abs(x) / xx + abs(pull))),
+                 abs(across - j.each[PULL, f]) / (j.each[CLOSE, e] + ROUND * (abs(y) / yy + abs(across))))
+    j.each[STEP, e], j.each[STEP, f], j.each[PULL, e], j.each[PULL, f] = dx, dy, pull, across
     return change if tries >= 0 else np.inf, abs(tries)
 
 
@@ -200,7 +225,9 @@ def together_now(turn, worst, last_worst, plant, j):
     if THERE:
         return 0
     elif SMOOTH:
-        if j.stops.names.size == 0 and plant.dense.size == 0:
+        if PLANE:  # its force has no potential
+            pass
+        elif j.stops.names.size == 0 and plant.dense.size == 0:
             return abs(together.solve_smooth(j, plant.dt))
     if turn > 4 and worst > 0.2 * last_worst:
         together.newton_turn(j, plant.dt, False)
@@ -377,8 +404,15 @@ def committed(q, v, dq, motion, plant, c, j):
         speed = 0.0
         for k in range(plant.slide.size):
             speed += j.rows[j.of[PORT, e], k] * motion[1, k]
-        lost += law.commit(j.num, j.mem, e, j.each[STEP, e], j.each[PULL, e], j.each[PACE, e], speed, plant.dt,
-                           j.each[EPS, e])
+        if PLANE:
+            if j.of[MATE, e] == e:
+                lost += law.commit(j.num, j.mem, e, j.each[STEP, e], j.each[PULL, e], j.each[PACE, e], speed, plant.dt,
+                                   j.each[EPS, e])
+            elif j.of[MATE, e] > e:
+                lost += plane.commit(j.num, j.mem, e, j.of[MATE, e], j.each[STEP, e], j.each[STEP, j.of[MATE, e]])
+        else:
+            lost += law.commit(j.num, j.mem, e, j.each[STEP, e], j.each[PULL, e], j.each[PACE, e], speed, plant.dt,
+                               j.each[EPS, e])
         j.each[WENT_BEFORE, e] = j.each[WENT, e]
         j.each[WENT, e] = j.each[STEP, e]
     return lost, ok

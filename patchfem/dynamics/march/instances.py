@@ -32,12 +32,14 @@ def contact_of(kind: tuple):
 
 
 @cache
-def loop_of(kind: tuple, laws: tuple = (), load: str = STEADY, there: bool = True, several: bool = False):
+def loop_of(kind: tuple, laws: tuple = (), load: str = STEADY, there: bool = True, several: bool = False,
+            plane: bool = False):
     """The loop of a rig: its `march` and `follow`. kind: of the contact; laws: modules of the elements beside it or in
-    its place; load: STEADY, WHOLE or POINTS; there: whether the contact is; several: whether more than one rub."""
+    its place; load: STEADY, WHOLE or POINTS; there: whether the contact is; several: whether more than one rub; plane:
+    whether any slides in a plane."""
     contact, named = contact_of(kind), {}
     flags = {"MANY": bool(laws), "STOPS": COULOMB in laws, "SMOOTH": {*laws} > {COULOMB} or COULOMB not in laws,
-             "THERE": there, "SEVERAL": several, "PRESSED": load != STEADY, "POINTED": load == POINTS,
+             "THERE": there, "SEVERAL": several, "PLANE": plane, "PRESSED": load != STEADY, "POINTED": load == POINTS,
              "LISTED": kind[0] == SHEARED_LISTS}
     text = '"""Parts of a loop, written by patchfem.dynamics.march.instances."""\n\n' + "".join(
         f"{name} = {value}\n" for name, value in flags.items())
@@ -47,7 +49,7 @@ def loop_of(kind: tuple, laws: tuple = (), load: str = STEADY, there: bool = Tru
         named["faces"] = compiled.instance(f"{HERE}.faces_kernels", {
             "law": law, "contact": contact, "parts": parts,
             "solver": compiled.instance("dynamics.contacts.element_solve_kernels", {"law": law}),
-            "together": compiled.instance(f"{HERE}.together_kernels", {"law": law})})
+            "together": compiled.instance(f"{HERE}.together_kernels", {"law": law, "parts": parts})})
     if load != STEADY:
         named["pressing"] = compiled.instance(f"{HERE}.pressing_kernels",
                                               {"contact": contact, "parts": parts} | named)
@@ -58,7 +60,8 @@ def march(model, *arguments) -> tuple:
     """`loop_kernels.march` with the faces of a model: (steps done, status)."""
     there = not model.joints or getattr(model, "patch", None) is not None
     several = len(model.joints) + there > 1 or len(model.laws) > 1  # a loop of several laws is one text
-    return loop_of(model.kind, model.laws, model.loading, there, several).march(*arguments)
+    plane = any(one.mate for one in model.joints)
+    return loop_of(model.kind, model.laws, model.loading, there, several, plane).march(*arguments)
 
 
 def follow_path(path, dt, kind, contact, goal, energies, forces) -> int:

@@ -1,6 +1,6 @@
 """Several interfaces and springs that are not linear beside, or instead of, the patch: the march of many elements."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,6 +29,17 @@ def _spring(port: int, numbers, potential) -> Joint:
     return Joint(port, Element(law, np.array(numbers), np.zeros(0), 0.0, 0.0, False), potential)
 
 
+def in_planes(joints, planes) -> list:
+    """Joints of interfaces (i,) on ports of their numbers with those behind them that are second directions of the ones
+    where planes (i,) is true, on ports from i on."""
+    count, second = len(joints), [k for k, plane in enumerate(planes) if plane]
+    out = list(joints)
+    for at, k in enumerate(second, count):
+        out[k] = replace(joints[k], mate=at - k)
+        out.append(replace(joints[k], port=at, mate=k - at))
+    return out
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class JointsModel:
     """A patch (ContactModel on port 0, or None) and joints; rows (p, n): slide of every port per coordinate.
@@ -53,7 +64,8 @@ class JointsModel:
     @property
     def limit(self) -> float:
         """Friction limit [N] of patch and joints together."""
-        return (self.patch.limit if self.patch is not None else 0.0) + sum(one.element.limit for one in self.joints)
+        return (self.patch.limit if self.patch is not None else 0.0) + sum(one.element.limit for one in self.joints
+                                                                           if one.mate >= 0)
 
     @property
     def length(self) -> float:

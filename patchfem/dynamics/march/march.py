@@ -338,17 +338,21 @@ class Run:
 
     def _beside(self, out, rows) -> Response:
         """Histories with the elements beside the first: `extra` has slides, slide_rates, forces, slips (k, i) of the
-        interfaces and spring_forces (k, s)."""
+        interfaces and spring_forces (k, s), and lateral_slides and so on (k, i) of those in a plane, 0 of others."""
         modes, faces = self.modes, self.faces
-        parts, (ports, rubs) = self._elements(rows), faces.of
-        rubs = rubs == 1
+        parts, (ports, rubs, mates) = self._elements(rows), faces.of
+        second = mates < np.arange(mates.size)
+        rubs = (rubs == 1) & ~second
         push = -np.einsum("ke,en->kn", parts[:, :, 2], faces.rows[ports]) / modes.mass
         if self.model.patch is None:
             push += np.outer(out.force, modes.slide) / modes.mass  # of the first element, counted already
-        extra = out.extra | {"spring_forces": parts[:, ~rubs, 2]}
+        extra, names = out.extra | {"spring_forces": parts[:, ~(rubs | second), 2]}, ("slides", "slide_rates", "forces",
+                                                                                     "slips")
         if rubs.any():
-            names = ("slides", "slide_rates", "forces", "slips")
             extra |= {name: parts[:, rubs, k] for k, name in enumerate(names)}
+        for k, name in enumerate(names if second.any() else ()):
+            column = extra[f"lateral_{name}"] = np.zeros((len(rows), rubs.sum()))
+            column[:, mates[second]] = parts[:, second, k]
         return replace(out, acceleration=out.acceleration + push @ modes.output, extra=extra)
 
     def _elements(self, rows) -> np.ndarray:

@@ -34,12 +34,14 @@ class Joint:
     """A law on one port.
 
     port: row of slides; element: the law under its load; potential: energy [J] of a slide [m] of a spring, None for
-    friction.
+    friction; mate: of one that slides in a plane, how far behind it in the list the joint of its second direction
+    stands, below 0 of that one how far before it the first; 0 of all others.
     """
 
     port: int
     element: Element
     potential: Callable | None = None
+    mate: int = 0
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -21,7 +21,7 @@ from ..modal_kernels import accelerations
 
 HOLDS = 0  # of num: the law that holds without a stretch
 # of arrays.Faces: rows of `of` and of `modal`, places of `own`, rows of `each`
-PORT, RUBS = range(2)
+PORT, RUBS, MATE = range(3)
 GIVE, BESIDE, ROOM = range(3)
 FORCE_OWN, STEP_OWN, NOW_OWN, AIM, KNOWN = range(5)
 PULL, PLACE, PACE, EPS, STEP, LACK, MOST, CLOSE, WENT, WENT_BEFORE = range(10)

@@ -11,8 +11,12 @@ import numpy as np
 from ...compiled.inner import njit
 from ...friction.flags_kernels import INNER
 from ...friction.laws import elastic_plastic_kernels as law
+from ...friction.laws import plane_kernels as plane
 from ..dense_kernels import eliminate, factor, solve
-from .stops_kernels import BETA, CLOSE, EPS, FREE, GIVE, HOLDS, LACK, PLACE, PORT, PULL, ROOM, SLIDE, SLIDES
+from . import parts_kernels as parts
+from .stops_kernels import BETA, CLOSE, EPS, FREE, GIVE, HOLDS, LACK, MATE, PLACE, PORT, PULL, ROOM, SLIDE, SLIDES
+
+PLANE = parts.PLANE
 
 
 @njit(error_model="numpy", **INNER)
@@ -122,11 +126,32 @@ def equations(j, dt, known):
                 j.system[e, k] = beta[p, j.of[PORT, k]] / own if holds else 0.0
             j.system[e, e] += 1e-9 if holds else 1.0
             continue
+        if PLANE:
+            if j.of[MATE, e] != e:
+                if j.of[MATE, e] > e:
+                    in_plane(e, j.of[MATE, e], dq, j)
+                continue
         force, slope = law.mean(j.num, j.mem, e, j.each[PLACE, e], dq, j.each[EPS, e], dt)
         j.each[LACK, e] = force - j.each[PULL, e]
         for k in range(count):
             j.system[e, k] = slope * beta[p, j.of[PORT, k]]
         j.system[e, e] += 1.0
+
+
+@njit(error_model="numpy", **INNER)
+def in_plane(e, f, dx, j):
+    """The two of Newton's equations of an element whose directions are e and f; dx [m]: slide of e."""
+    beta, p, r = j.gives[BETA], j.of[PORT, e], j.of[PORT, f]
+    dy = j.port[FREE, r]
+    for k in range(j.of.shape[1]):
+        dy -= beta[r, j.of[PORT, k]] * j.each[PULL, k]
+    x, y, xx, xy, yx, yy, _, _, _ = plane.along(j.num[e, 2], j.num[e, 3], j.mem[e, 3], j.mem[f, 3], dx, dy)
+    j.each[LACK, e], j.each[LACK, f] = x - j.each[PULL, e], y - j.each[PULL, f]
+    for k in range(j.of.shape[1]):
+        one, other = beta[p, j.of[PORT, k]], beta[r, j.of[PORT, k]]
+        j.system[e, k], j.system[f, k] = xx * one + xy * other, yx * one + yy * other
+    j.system[e, e] += 1.0
+    j.system[f, f] += 1.0
 
 
 @njit(error_model="numpy", **INNER)

@@ -123,7 +123,7 @@ def _met(model: Model, steady: bool = False) -> methods.Motion:
     waveform = "" if steady or rig.kind == "free" else rig.waveform
     return methods.Motion([one.numbers for one in rig.interfaces], [model.soft or one.soft for one in rig.interfaces],
                           "under a load that changes" if rig.load_varies else "", rig.strips_slide_apart, spring,
-                          waveform)
+                          waveform, plane=rig.modes.lateral_faces is not None)
 
 
 class Finder(NamedTuple):

@@ -33,7 +33,8 @@ def contact_of(model: Model, numerics: Numerics, patch):
 
     patch: the solved Patch or None under [normal]. PatchfemError for a law that cannot stand beside others.
     """
-    rig, many = model.rig, len(model.rig.modes.interfaces) > 1
+    rig, second = model.rig, model.rig.modes.lateral_faces
+    many = len(rig.modes.interfaces) > 1 or second is not None
     if model.grooves is not None:
         return _climbing(model, patch, numerics.shear_modes)
     alone = None if many else contact_model(model, numerics, patch)
@@ -43,6 +44,9 @@ def contact_of(model: Model, numerics: Numerics, patch):
     rows, found = [*rig.modes.interfaces], []
     if many:
         found += [joints.Joint(k, one) for k, one in enumerate(_side_by_side(model, numerics, patch))]
+    if second is not None:
+        found = joints.in_planes(found, [bool(one.lateral) for one in rig.interfaces])
+        rows += [row for row, one in zip(second, rig.interfaces) if one.lateral]
     if rig.interlock is not None:
         found.append(joints.interlock(0, *rig.interlock))
     if rig.cubic is not None:

@@ -9,6 +9,7 @@ from ...dynamics.march import march as engine
 from ...effects import has
 from ...response.ends import end_error
 from ...response.measures import peaks_between, step_harmonic
+from ...response.rows import lateral_work
 from ...response.spectrum import friction_harmonic, motion_harmonic
 from ...structure.drive_sizes import omega_of, peak_speed, sinusoidal, whole
 from . import levels as rig_levels
@@ -109,10 +110,11 @@ class MarchReader(Reader):
         work = part.work if work is None else work
         together = self.contact.set_valued and not rig.strips_slide_apart  # the yaw of strips works besides
         if len(rig.names) > 1 or together:  # of this interface, without the blows of stops
-            work = float(part.step_force @ np.diff(w.slide))
+            work = float(part.step_force @ np.diff(w.slide)) + lateral_work(w, 0)
         span = w.time[-1] - w.time[0]
         work *= drive.period / span if span > 0 else 0.0
-        alone = len(rig.modes.interfaces) == 1 and not (rig.load_varies or rig.strips_slide_apart or rig.bends)
+        alone = len(rig.modes.interfaces) == 1 and not (rig.load_varies or rig.strips_slide_apart or rig.bends
+                                                           or rig.modes.lateral_faces is not None)
         if alone and sinusoidal(drive) and whole(span, drive):
             return motion_harmonic(w.time, w.slide, w.slide_rate, omega_of(drive)), friction_harmonic(
                 w, rig.modes, drive), work

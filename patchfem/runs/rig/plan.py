@@ -62,6 +62,8 @@ def modes_of(rig, chain: dict) -> list:
     """Name, free and stuck frequency [Hz] of each mode: without the contact, and with it held by the links of a chain;
     None where nothing gives way, and without friction."""
     modes, rows, stiffness = rig.modes, rig.modes.interfaces, held_by(rig, chain)
+    if modes.lateral_faces is not None:
+        rows, stiffness = np.concatenate([rows, modes.lateral_faces]), np.tile(stiffness, 2)
     named = rig.by_modes and modes.shapes is None
     out = []
     for k, omega in enumerate(modes.omega):

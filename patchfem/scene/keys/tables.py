@@ -193,6 +193,9 @@ class Interface(Friction):
 
     between: key(Between, "numbers of the two masses that rub, counted from 1; 0 is the base; the slide is the motion "
                  "of the first mass minus the motion of the second")
+    lateral: key(Between | None, "for an interface that slides in a plane: numbers of a second pair of masses or "
+                 "boundary coordinates; the motion of the first minus the motion of the second is the slide across "
+                 "`between`; the friction force, the resultant of both directions, is at most static times load") = None
     load: key(Force | None, "normal force on the interface; a patch, [structure.interface.contact], may be given in "
               "place of this key", "unless [structure.interface.contact] is given") = None
     contact: Contact | None = None

@@ -73,8 +73,20 @@ def _interfaces(draft: Draft, interfaces: tuple) -> None:
             draft.say(f"{at}.spread", unbuilt("with masses, where an interface has no width", "out"))
         if len(interfaces) > 1 and one.law is not None and not carries(one, "joints"):
             draft.say(f"{at}.law", unbuilt(f"{named(one)} with other interfaces", refusal("joints", odd=one)))
+        if one.lateral is not None:
+            _in_plane(draft, at, one)
     for own in of_interfaces(draft):
         _of_patch(own, own.tables.contact, own.tables.friction, len(interfaces) == 1)
+
+
+def _in_plane(draft: Draft, at: str, one: Interface) -> None:
+    """An interface that slides in a plane is a point, with a law that has a form in two directions."""
+    if one.contact is not None:
+        draft.say(f"{at}.lateral", unbuilt("with [structure.interface.contact]", "give the interface a load, or leave "
+                                           "lateral out"))
+    if one.law is not None and not carries(one, "plane"):
+        draft.say(f"{at}.lateral", unbuilt(f"with {named(one)}", "stiff" if has(one.law, "set-valued") else
+                                           f"{refusal('plane')}, or leave lateral out"))
 
 
 def _of_patch(draft: OfInterface, contact: Contact, law: Interface, alone: bool) -> None:

@@ -15,7 +15,7 @@ class Motion(NamedTuple):
     """What a method meets: tables of the laws of all interfaces; give: what lets the patch of each slip part by part;
     varies: how the load changes; yaws: strips slide each by themselves; spring that bends, or grooves; waveform of the
     drive, none of a release and of the sine of a curve; drive as its table; lower: the key that puts the pressure on
-    the lower piece. Texts are empty where there is nothing."""
+    the lower piece; plane: whether an interface slides in one. Texts are empty where there is nothing."""
 
     laws: list
     give: list
@@ -25,6 +25,7 @@ class Motion(NamedTuple):
     waveform: str
     drive: Any = None
     lower: str = ""
+    plane: bool = False
 
     @property
     def soft(self) -> str:
@@ -48,6 +49,7 @@ BESIDE = {  # word -> what a Motion has of it, as words behind an engine; "" whe
     "parts": lambda m: f"with {m.soft}" if m.laws and m.soft else "",
     "grooves": lambda m: f"with {m.spring}" if m.spring.endswith("grooves]") else "",
     "spring": lambda m: f"with {m.spring}" if m.spring and not m.spring.endswith("grooves]") else "",
+    "plane": lambda m: "with structure.interface.lateral" if m.plane else "",
     "faces": lambda m: "with several interfaces" if len(m.laws) > 1 else "",
     "levels": lambda m: "with waveform 'levels'" if m.waveform == "levels" else ""}
 TAKES = {  # engine -> what it takes; the records of `runs.rig.engines` refer to it by name
@@ -117,7 +119,8 @@ def motion(tables: Tables, kind: str) -> Motion:
     return Motion(laws, give, beside_load(cause), apart,
                   bending(structure) or (climbed(tables) if rubs else ""),
                   drive.waveform or "" if drive is not None and drive.kind != "free" else "", drive,
-                  lower[0] if rubs and lower else "")
+                  lower[0] if rubs and lower else "",
+                  any(getattr(one, "lateral", None) is not None for one in laws))
 
 
 def bending(structure) -> str:

@@ -144,6 +144,8 @@ def _masses(draft: Draft, structure: Any) -> None:
     for name in ("spring", "damper", "interface"):
         for index, item in enumerate(getattr(structure, name) or ()):
             _between(draft, f"structure.{name}.{index}.between", item.between, count)
+    for index, item in enumerate(structure.interface or ()):
+        _lateral(draft, f"structure.interface.{index}.lateral", item, count)
     _known(draft, "structure.output_mass", structure.output_mass, count)
 
 
@@ -165,12 +167,29 @@ def _between(draft: Draft, key: str, pair: Any, count: int | None) -> None:
         _known(draft, key, one, count)
 
 
+def _lateral(draft: Draft, key: str, interface: Any, count: int | None) -> None:
+    """A second direction is a pair of its own, of coordinates that the first has not."""
+    pair, first = interface.lateral, interface.between
+    _between(draft, key, pair, count)
+    if pair is None:
+        return
+    if first is not None and (both := sorted({*pair} & {*first} - {0})):
+        what = "mass" if draft.tables.structure.reduced is None else "boundary coordinate"
+        draft.say(key, f"{what} {both[0]} is already in `between`; the second direction needs coordinates of its own, "
+                       "which move across those of `between`")
+    if draft.given("structure.file"):
+        draft.say(key, unbuilt("with structure.file", "use structure.masses or [structure.reduced], or leave it out"))
+    if draft.given("structure.bonded"):
+        draft.say(key, unbuilt("with [structure.bonded]", "write a [[structure.spring]] between the same places"
+                               if draft.given("structure.masses") else "either"))
+
+
 def _known(draft: Draft, key: str, mass: int | None, count: int | None) -> None:
     if count is not None and mass is not None and mass > count:
         what, where = ("mass", "structure.masses") if draft.tables.structure.reduced is None else \
             ("boundary coordinate", "structure.reduced.boundary")
         draft.say(key, f"there is no {what} {mass}: {where} has {count}, numbered from 1" +
-                  ("; 0 stands for the base" if key.endswith(("between", "slide")) else ""))
+                  ("; 0 stands for the base" if key.endswith(("between", "lateral", "slide")) else ""))
 
 
 def drives_mass(draft: Draft) -> None:

@@ -75,6 +75,9 @@ does not wear. If the friction of a point falls while the point slides (bonds th
 several states can be in equilibrium. The run then considers only the equilibrium states in the direction of its last
 time steps, and takes the state with the lower energy. The energy difference counts as dissipated.
 
+**Directions.** An interface that slides in a plane (`structure.interface.lateral`) has the same stiffness and the same
+coefficient of friction in every direction. The interface does not turn about its normal, and its load is constant.
+
 **Modes.** The rig is linear except for its joints, `[structure.stiffening]` and an interlocking spring of
 `[structure.bonded]`. Damping is viscous; hysteretic damping in a file is treated as viscous. A complex mode is replaced
 by its real part.

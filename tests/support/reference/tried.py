@@ -86,6 +86,7 @@ MORE = (Beside("`[normal.grooves]`", POINT + GROOVES.format("normal") + RIG),
         Beside("several interfaces", MASSES),
         Beside("a patch at each interface", MASSES + "# each presses a patch\n"),
         Beside("a patch with shear at each interface", MASSES + "# each presses a patch that gives way\n"),
+        Beside("slides in a plane", MASSES + "# each slides in a plane\n"),
         Beside("`[wear]`", PATCH + RIG + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n'))
 BENCHES = (Beside("one point", POINT + BENCH), Beside("a patch", PATCH + BENCH),
            Beside("`[contact.shear]`", PATCH + "[contact.shear]\n" + BENCH),
@@ -116,7 +117,9 @@ def refused(keys: str, beside: Beside, method: str = "") -> tuple:
         if "patch" in beside.text:
             own = (PATCH + "[contact.shear]\n" * ("gives" in beside.text)).replace("[contact",
                                                                                     "[structure.interface.contact")
-        text = beside.text + "".join(f"[[structure.interface]]\nbetween = [{k}, 0]\n{keys}{own}" for k in (1, 2))
+        plane = {k: f"lateral = [{3 - k}, 0]\n" * ("plane" in beside.text) for k in (1, 2)}
+        text = beside.text + "".join(f"[[structure.interface]]\nbetween = [{k}, 0]\n{plane[k]}{keys}{own}"
+                                     for k in plane)
     else:
         text = beside.text + f"[friction]\n{keys}"
     sets = (*beside.sets, *([f"accuracy.method={method}"] if method else ()))

@@ -1,0 +1,87 @@
+"""The elastic-plastic element in a plane: its closed form along a straight slide against its rate equations."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from patchfem.friction.laws import elastic_plastic_kernels as line
+from patchfem.friction.laws import plane_kernels as plane
+
+K, MOST = 3e6, 2e-6
+
+
+def by_rates(stretch, move) -> tuple:
+    """(path-mean force (2,), stretch at the end (2,), energy dissipated) of a straight slide, by DOP853."""
+    def rate(slips):
+        def of(t, y):
+            held = move - y[:2] * (y[:2] @ move) / (y[:2] @ y[:2]) if slips else move
+            return np.concatenate([held, K * y[:2], [K * y[:2] @ (move - held)]])
+        return of
+
+    def edge(t, y):
+        return (y[0]**2 + y[1]**2) / MOST**2 - 1
+    edge.terminal, edge.direction = True, 1
+    how = {"rtol": 1e-12, "atol": 1e-18, "method": "DOP853"}
+    y = np.array([*stretch, 0.0, 0.0, 0.0])
+    begins = abs(edge(0, y)) < 1e-9 and stretch @ move > 0
+    first = None if begins else solve_ivp(rate(False), (0, 1), y, events=edge, **how)
+    y, t = (y, 0.0) if begins else (first.y[:, -1], first.t[-1])
+    y = solve_ivp(rate(True), (t, 1), y, **how).y[:, -1] if t < 1 else y
+    return y[2:4], y[:2], y[4]
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_exact_a_straight_slide_has_the_force_and_loss_of_the_rate_equations(seed):
+    draw = np.random.default_rng(seed)
+    (turn, way), far = draw.uniform(0, 2 * np.pi, 2), MOST * 10**draw.uniform(-1.5, 1)
+    stretch = MOST * (1.0 if seed % 3 == 0 else draw.uniform()) * np.array([np.cos(turn), np.sin(turn)])
+    move = far * np.array([np.cos(way), np.sin(way)])
+    found = np.array(plane.along(K, MOST, *stretch, *move))
+    mean, end, lost = by_rates(stretch, move)
+    np.testing.assert_allclose(found[:2], mean, rtol=0, atol=1e-9 * K * MOST)
+    np.testing.assert_allclose(found[6:8], end, rtol=0, atol=1e-9 * MOST)
+    assert found[8] == pytest.approx(lost, rel=1e-9, abs=1e-10 * K * MOST * far)
+    gained = 0.5 * K * (np.square(found[6:8]).sum() - stretch @ stretch)
+    assert mean @ move == pytest.approx(gained + lost, rel=1e-8, abs=1e-9 * K * MOST**2)
+    assert found[:2] @ move == pytest.approx(gained + found[8], rel=1e-12, abs=1e-13 * K * MOST**2)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_exact_slopes_are_those_of_the_mean_force(seed):
+    draw = np.random.default_rng(seed)
+    stretch, move = MOST * draw.uniform(-0.7, 0.7, 2), MOST * draw.uniform(-3, 3, 2)
+    slopes = np.reshape(plane.along(K, MOST, *stretch, *move)[2:6], (2, 2))
+    h = 1e-5 * MOST
+    for k, step in enumerate(h * np.eye(2)):
+        up, down = (plane.along(K, MOST, *stretch, *(move + way * step))[:2] for way in (1, -1))
+        np.testing.assert_allclose(slopes[:, k], np.subtract(up, down) / (2 * h), rtol=0, atol=1e-7 * K)
+
+
+def test_exact_along_one_line_it_is_the_element_of_one_direction():
+    draw = np.random.default_rng(1)
+    unit = np.array([np.cos(0.5236), np.sin(0.5236)])
+    num, mem = np.array([[0.0, 1.0, K, MOST]] * 2), np.zeros((2, 4))
+    flat, past = np.array([[0.0, 1.0, K, MOST]]), np.zeros((1, 4))
+    for step in draw.uniform(-3, 3, 200) * MOST:
+        mean = plane.along(K, MOST, mem[0, 3], mem[1, 3], *(step * unit))[:2]
+        force = line.mean(flat, past, 0, 0.0, step, 0.0, 1.0)[0]
+        assert mean @ unit == pytest.approx(force, rel=1e-12, abs=1e-12 * K * MOST)
+        lost = plane.commit(num, mem, 0, 1, *(step * unit))
+        own = line.commit(flat, past, 0, step, force, 0.0, 0.0, 1.0, 0.0)
+        assert lost == pytest.approx(own, abs=1e-12 * K * MOST**2)
+        assert np.hypot(*mem[:, 3]) <= MOST * (1 + 1e-14)
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_always_a_step_finds_the_slide_that_its_give_and_its_law_agree_on(seed):
+    draw = np.random.default_rng(seed)
+    half = draw.normal(size=(2, 2)) * 10**draw.uniform(-2, 2)
+    give = half @ half.T / K
+    turn, free = draw.uniform(0, 2 * np.pi), MOST * draw.normal(size=2) * 10**draw.uniform(-1, 2)
+    stretch = MOST * draw.choice([draw.uniform(), 1.0]) * np.array([np.cos(turn), np.sin(turn)])
+    *slide, x, y, count = plane.solve(*free, give[0, 0], give[0, 1], give[1, 1], K, MOST, *stretch, 0.0, 0.0,
+                                      1e-12 * K * MOST)
+    assert 0 < count < 40
+    np.testing.assert_allclose(slide, free - give @ [x, y], rtol=0, atol=1e-13 * np.abs(free).max())
+    mean = plane.along(K, MOST, *stretch, *slide)[:2]
+    np.testing.assert_allclose([x, y], mean, rtol=0, atol=1e-8 * K * MOST)

@@ -1,0 +1,223 @@
+"""Interfaces that slide in a plane, `lateral`: turned motions, one direction, an independent integration, energies."""
+
+import json
+
+import numpy as np
+import pytest
+import xarray as xr
+from command_line import cli
+from motion_bars import held
+from plane_bars import chain, compared, widest
+from plane_bars import text as text_of
+
+import patchfem as pf
+
+NODES = """\
+[structure]
+[structure.reduced]
+stiffness = "{name}.npz"
+mass = "{name}.npz"
+damping = "{name}.npz"
+boundary = [1, 2, 3, 4]
+modes = 0
+[[structure.interface]]
+between = [3, 0]
+{lateral}law = "elastic-plastic"
+static = 0.4
+stiffness = "60 kN/m"
+load = "50 N"
+[drive]
+kind = "force"
+mass = 1
+force = "40 N"
+frequency = "31 Hz"
+cycles = 20
+[accuracy]
+method = "march"
+steps_per_cycle = 400
+"""
+LATERAL = "lateral = [4, 0]\n"
+TURN = np.pi / 6
+
+
+def matrices(folder, name: str, turn: float, soft: float = 1.0) -> None:
+    """Two nodes with x and y each, of which the second's directions are turned; soft: stiffness along y over that along
+    x."""
+    ground, link = np.diag([5e4, 5e4 * soft]), np.diag([8e4, 8e4 * soft])
+    c, s = np.cos(turn), np.sin(turn)
+    R = np.eye(4)
+    R[2:, 2:] = [[c, s], [-s, c]]  # directions of the second node in terms of x and y
+    K = R @ np.block([[ground + link, -link], [-link, link]]) @ R.T
+    K = (K + K.T) / 2
+    np.savez(folder / f"{name}.npz", K=K, M=np.eye(4), C=1e-4 * K)
+
+
+def run_of(folder, name: str, text: str):
+    (folder / f"{name}.toml").write_text(text)
+    return pf.run(folder / f"{name}.toml")
+
+
+def test_exact_one_direction_turned_or_not_is_the_engine_of_one_direction(tmp_path):
+    found = {}
+    for name, turn, lateral in (("line", 0.0, ""), ("plane", 0.0, LATERAL), ("turned", TURN, LATERAL)):
+        matrices(tmp_path, name, turn)
+        found[name] = run_of(tmp_path, name, NODES.format(name=name, lateral=lateral))
+    line, plane, turned = found.values()
+    assert line.measures.slip_amplitude.value > 1e-4 and line.extra["engine"] == plane.extra["engine"] == "march"
+    for name, one in line.measures.items():
+        if one.value is not None:
+            assert plane.measures[name].value == pytest.approx(one.value, rel=1e-9, abs=one.floor + 1e-15), name
+    for name in ("relative_displacement_amplitude", "absolute_acceleration_peak", "friction_force_peak",
+                 "slip_amplitude", "stick_fraction", "slip_start_phase", "loop_area", "friction_work",
+                 "energy_dissipated"):
+        assert turned.measures[name].value == pytest.approx(line.measures[name].value, rel=1e-9), name
+        assert turned.measures[name].error == pytest.approx(line.measures[name].error, rel=1e-3,
+                                                            abs=1e-9 * line.measures[name].value), name
+    r = turned.response
+    np.testing.assert_allclose(r.extra["lateral_forces"], -np.tan(TURN) * r.extra["forces"], atol=1e-9 * 20)
+    assert "belongs to one direction" in turned.measures.equivalent_stiffness.reason
+
+
+@pytest.mark.share(0, 2)
+def test_exact_an_ellipse_turned_is_the_same_ellipse(tmp_path):
+    """Soft across: the force along x comes with a motion along y only where the axes are not x and y."""
+    found = []
+    for name, turn in (("plane", 0.0), ("turned", TURN)):
+        matrices(tmp_path, name, turn, 0.7)
+        npz = dict(np.load(tmp_path / f"{name}.npz"))
+        mix = np.eye(4)
+        mix[:2, :2] = [[0.8, -0.6], [0.6, 0.8]]  # the first node's directions, so that its force is along neither axis
+        np.savez(tmp_path / f"{name}.npz", **{key: mix @ one @ mix.T for key, one in npz.items()})
+        found.append(run_of(tmp_path, name, NODES.format(name=name, lateral=LATERAL)))
+    first, second = found
+    assert np.ptp(first.window.extra["lateral_slides"]) > 0.1 * np.ptp(first.window.slide) > 0
+    for name in ("relative_displacement_amplitude", "friction_force_peak", "slip_amplitude", "loop_area",
+                 "stick_fraction", "energy_dissipated"):
+        assert second.measures[name].value == pytest.approx(first.measures[name].value, rel=1e-8), name
+
+
+SEEDS = (2, 12, 22)  # three interfaces, one of two in a plane, two in planes
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_always_bars_hold_an_independent_integration_of_the_rate_equations(seed, tmp_path):
+    found = compared(chain(seed), tmp_path)
+    assert len(found["rows"]) >= 6
+    assert not [row for row in found["rows"] if not held(row)]
+
+
+def test_exact_energy_balances_and_force_stays_within_its_circle(tmp_path):
+    s = chain(2)
+    result = run_of(tmp_path, "chain", text_of(s))
+    assert result.measures.energy_balance.value < 1e-9
+    assert result.measures.energy_created.value < 1e-12
+    assert result.measures.work_check.value < 1e-4
+    extra, (rubs, stored, lost, made) = result.window.extra, result.window.extra["ledger"]
+    for k, (*_, load) in enumerate(s["faces"]):
+        assert np.hypot(extra["forces"][:, k], extra["lateral_forces"][:, k]).max() <= 0.4 * load * (1 + 1e-9)
+    np.testing.assert_allclose(rubs, stored + lost - made, rtol=1e-9)
+    elastic = sum((extra["forces"][:, k]**2 + extra["lateral_forces"][:, k]**2) / (2 * stiff)
+                  for k, (*_, stiff, _) in enumerate(s["faces"]))
+    np.testing.assert_allclose(stored, elastic, rtol=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_exact_the_widest_of_a_path_is_that_of_its_hull(seed):
+    from patchfem.response.measures import widest as found
+    draw, t = np.random.default_rng(seed), np.linspace(0, 6 * np.pi, 3000)
+    x, y = (sum(draw.normal() * np.cos(k * t + draw.uniform(0, 6)) / k for k in (1, 2, 3)) for _ in range(2))
+    assert found(x, y) == pytest.approx(widest(np.stack([x, y], axis=1)), rel=1e-5)
+    assert found(x, 0 * x) == np.ptp(x) and found(x, x) == pytest.approx(np.sqrt(2) * np.ptp(x), rel=1e-14)
+
+
+def test_always_check_plan_run_and_sweep_take_a_plane(tmp_path):
+    path = tmp_path / "chain.toml"
+    path.write_text(text_of(chain(2)))
+    assert cli("check", path).code == 0
+    planned = cli("plan", path, "--json")
+    assert planned.code == 0 and json.loads(planned.out)["engine"] == "march"
+    ran = cli("run", path, "-o", tmp_path / "out")
+    assert ran.code == 0, ran.err
+    assert "slip_amplitude_3" in json.loads((tmp_path / "out" / "summary.json").read_text())["measures"]
+    assert "across: 4-2" in (tmp_path / "out" / "report.html").read_text()
+    with xr.open_dataset(tmp_path / "out" / "result.nc") as data:
+        force = np.hypot(data.friction_force, data.lateral_force)
+        assert force.shape == data.lateral_displacement.shape and float(force.max()) > 0.5
+        assert data.lateral_velocity.attrs["units"] == "m s-1"
+    swept = cli("sweep", path, "--over", "structure.interface[1].load=1 N, 2 N", "-o", tmp_path / "swept", "--no-page")
+    assert swept.code == 0, swept.err
+
+
+def test_always_a_plane_stands_beside_other_laws_and_a_spring_that_bends(tmp_path):
+    text = text_of(chain(12)).replace("[drive]", '[[structure.interface]]\nbetween = [2, 0]\nlaw = "coulomb"\n'
+                                      'static = 0.3\nload = "0.5 N"\n[structure.stiffening]\ncubic = "1e10 N/m^3"\n'
+                                      '[drive]', 1)
+    found = run_of(tmp_path, "beside", text)
+    assert found.outcome != "not_converged" and found.measures.energy_balance.value < 1e-8
+    assert found.measures.slip_amplitude_3.value > 0
+
+
+REFUSED = {
+    'lateral = [3, 3]': "joins mass 3 to itself",
+    'lateral = [9, 0]': "there is no mass 9",
+    'lateral = [1, 0]': "mass 1 is already in `between`",
+    'lateral = [2, 0]\n[structure.bonded]\nstiffness = "1 N/m"': "not supported yet with [structure.bonded]",
+}
+LAWS = {'"coulomb"': "law 'elastic-plastic' with a short bond_length", '"tanh"': "use law 'elastic-plastic', or leave",
+        '"nonlocal"': "use law 'elastic-plastic', or leave lateral out"}
+MASSES = """\
+[structure]
+masses = ["1 kg", "1 kg", "1 kg"]
+[[structure.spring]]
+between = [1, 0]
+stiffness = "40 kN/m"
+[[structure.interface]]
+between = [1, 0]
+law = "elastic-plastic"
+static = 0.4
+stiffness = "60 kN/m"
+load = "50 N"
+lateral = [2, 0]
+[drive]
+kind = "base"
+acceleration = "5 m/s^2"
+frequency = "35 Hz"
+cycles = 4
+"""
+
+
+@pytest.mark.parametrize("keys", REFUSED)
+def test_refuses_pairs_that_are_no_second_direction(keys, tmp_path):
+    with pytest.raises(pf.SceneError, match=r"lateral|bonded") as caught:
+        run_of(tmp_path, "bad", MASSES.replace("lateral = [2, 0]", keys))
+    assert REFUSED[keys] in str(caught.value)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_refuses_laws_without_a_form_in_a_plane(law, tmp_path):
+    more = {'"tanh"': 'reference_speed = "1 mm/s"', '"nonlocal"': 'bond_length = "1 um"'}.get(law, "")
+    with pytest.raises(pf.SceneError) as caught:
+        run_of(tmp_path, "bad", MASSES.replace('"elastic-plastic"', law).replace('stiffness = "60 kN/m"', more))
+    assert LAWS[law] in str(caught.value)
+
+
+@pytest.mark.parametrize("method", ["exact", "harmonic", "duhamel", "newmark", "euler"])
+def test_refuses_methods_that_know_one_direction(method, tmp_path):
+    with pytest.raises(pf.SceneError, match=r"structure\.interface\.lateral.*use 'march'"):
+        run_of(tmp_path, "bad", MASSES + f'[accuracy]\nmethod = "{method}"\n')
+
+
+def test_refuses_a_patch_a_file_a_backbone_and_friction_elements(tmp_path):
+    patch = MASSES.replace('load = "50 N"\nlateral = [2, 0]', 'lateral = [2, 0]\n[structure.interface.contact]\n'
+                           'length = "10 mm"\nwidth = "10 mm"\nheight = "5 mm"\nload = "50 N"\nsubstrate = "steel"')
+    with pytest.raises(pf.SceneError, match=r"lateral: not supported yet with \[structure.interface.contact\]"):
+        run_of(tmp_path, "bad", patch)
+    np.savez(tmp_path / "whole.npz", M=np.eye(3), K=np.diag([4e4] * 3))
+    file = '[structure]\nfile = "whole.npz"\n' + MASSES[MASSES.index("[[structure.interface]]"):]
+    with pytest.raises(pf.SceneError, match=r"lateral: not supported yet with structure\.file"):
+        run_of(tmp_path, "bad", file)
+    (tmp_path / "good.toml").write_text(MASSES)
+    with pytest.raises(pf.PatchfemError, match="a backbone with interfaces that slide in a plane is not supported"):
+        pf.backbone(tmp_path / "good.toml")
+    wrote = cli("export", tmp_path / "good.toml", "-o", tmp_path / "rig.mat")
+    assert wrote.code == 2 and "cannot be written with structure.interface.lateral" in wrote.err
