@@ -1,6 +1,7 @@
 """What an installation has and lacks, each with the line that cures it."""
 
 import os
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -75,11 +76,13 @@ def _window() -> Finding:
     """Whether the window on the pieces can be drawn here (patchfem view)."""
     try:
         done = subprocess.run([sys.executable, "-P", "-c", PICTURE], capture_output=True, text=True, timeout=SECONDS)
-        fine, why = done.returncode == 0, (done.stderr.strip().splitlines() or ["it crashed"])[-1][:100]
+        said = (done.stderr.strip().splitlines() or ["it crashed"])[-1]
+        why = re.sub(r"^.*\b(?:WARN|ERR)\| ", "", said)[:100]  # VTK puts its clock before it
+        fine = done.returncode == 0
     except (OSError, subprocess.TimeoutExpired) as error:
         fine, why = False, str(error)[:100]
-    cure = "" if fine else ("run apt-get install libgl1 libxrender1, or write a picture (view -o FILE.png), which "
-                            "needs neither")
+    cure = "" if fine else ("run apt-get install libgl1 libxcursor1 on a machine with a screen, or write a picture "
+                            "(view -o FILE.png), which needs neither")
     return Finding("the window by OpenGL", fine, "drawn" if fine else why, cure)
 
 

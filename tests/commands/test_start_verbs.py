@@ -67,6 +67,9 @@ def test_always_the_doctor_tells_what_is_missing(monkeypatch):
     assert "no display" in found["the window by OpenGL"]["found"] and found["the window by OpenGL"]["cure"]
     lines = cli("doctor").out.splitlines()
     assert len(lines) == len(found)
+    clock = "2026-11-24 11:39:48.555 (   2.046s) [    7FA06DECE780]    vtkX11Functions.cxx:126   WARN| "
+    monkeypatch.setattr(examine, "PICTURE", f"import sys; sys.exit('{clock}Failed to load an X11 library')")
+    assert examine._window().found == "Failed to load an X11 library"
     assert [line.split()[1] for line in lines if line.startswith("--")] == ["scipy", "the", "trame"]
 
 

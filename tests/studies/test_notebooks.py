@@ -15,9 +15,9 @@ import patchfem as pf
 
 ROOT = Path(__file__).parents[2]
 PICTURES = {"own_joint": 2, "misalignment": 1, "before_after": 1, "accuracy_time": 1, "backbone": 1, "measured_loop": 1,
-            "sweep_of_a_thousand": 1, "patch_at_every_interface": 1}
+            "sweep_of_a_thousand": 1, "patch_at_every_interface": 1, "own_law": 1}
 # Markdown whose cells of code the site runs
-TASKS = ("backbone", "measured_loop", "patch_at_every_interface", "sweep_of_a_thousand")
+TASKS = ("backbone", "measured_loop", "own_law", "patch_at_every_interface", "sweep_of_a_thousand")
 NAMES = tuple(PICTURES)
 
 
