@@ -138,7 +138,8 @@ class Chromium:
 
     def pressed(self, key: str) -> None:
         """Press a key on what has the focus."""
-        code = {"ArrowRight": 39, "ArrowLeft": 37, " ": 32, "Home": 36, "End": 35}[key]
+        code = {"ArrowRight": 39, "ArrowLeft": 37, "ArrowUp": 38, " ": 32, "Home": 36, "End": 35, "+": 187,
+                "0": 48}[key]
         for kind in ("keyDown", "keyUp"):
             text = {"text": key} if key == " " and kind == "keyDown" else {}
             self.ask("Input.dispatchKeyEvent", type=kind, key=key, code=key.strip() or "Space",

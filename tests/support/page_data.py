@@ -4,6 +4,7 @@ import gzip
 import json
 import re
 from base64 import b64decode
+from html.parser import HTMLParser
 
 
 def data_of(text: str) -> dict:
@@ -20,3 +21,39 @@ def charts_of(text: str) -> dict:
 def own_part(text: str) -> str:
     """The page without scripts."""
     return re.sub(r"<script.*?</script>", "", text, flags=re.S)
+
+
+class _Heard(HTMLParser):
+    """What a page tells a reader who hears it: `lacks`, what has no name there; `levels` of its headings."""
+
+    def __init__(self):
+        super().__init__()
+        self.lacks, self.levels, self.label, self.named = [], [], None, set()
+
+    def handle_starttag(self, tag, attrs):
+        """Controls are named by a label around them, in which nothing stands that a label names first, or by theirs."""
+        of = dict(attrs)
+        if tag == "label":
+            self.label = of.get("for", "")
+            self.named |= {self.label}
+        self.levels += [int(tag[1])] if re.fullmatch("h[1-6]", tag) else []
+        control = tag in ("input", "select", "output", "textarea")
+        fine = {"html": of.get("lang"), "img": of.get("alt"), "th": of.get("scope"),
+                "svg": of.get("aria-label") or of.get("aria-hidden"), "canvas": of.get("role") == "img"}.get(tag, True)
+        if control and tag != "output":
+            fine = of.get("aria-label") or of.get("id") in self.named - {""} or self.label == ""
+        self.lacks += [] if fine else [self.get_starttag_text()]
+        if control and self.label == "":
+            self.label = None  # the first control of a label is the one that it names
+
+    def handle_endtag(self, tag):
+        if tag == "label":
+            self.label = None
+
+
+def unheard(text: str) -> list:
+    """Tags of a page that have no language, name, scope or text in their place, and headings that skip a level."""
+    heard = _Heard()
+    heard.feed(own_part(text))
+    skips = [f"h{low} before h{high}" for low, high in zip([0, *heard.levels], heard.levels) if high > low + 1]
+    return heard.lacks + skips

@@ -56,19 +56,22 @@ def document(title: str, lead: str, sections: list, data: dict | None = None, sc
 def table(heads: Sequence, rows: Iterable, frame: str = "across", kind: str = "") -> str:
     """HTML of a table in a frame that scrolls sideways.
 
-    heads: HTML of the columns' heads, ">" before that of a column of numbers, all "" for a table without a head; rows:
-    lists of the HTML of their cells, or pairs of attributes and such a list; a cell that begins with "<td" brings its
-    own tag; frame: class of the frame, "wide" for one whose head stays in sight; kind: class of the table.
+    heads: HTML of the columns' heads, ">" before that of a column of numbers, all "" for a table whose rows have their
+    heads in the first cell; rows: lists of the HTML of their cells, or pairs of attributes and such a list; a cell that
+    begins with "<td" brings its own tag; frame: class of the frame, "wide" for one whose head stays in sight; kind:
+    class of the table.
     """
     numbers = [" class=n" * head.startswith(">") for head in heads]
-    top = "".join(f"<th{number}>{head.removeprefix('>')}</th>" for number, head in zip(numbers, heads))
-    body = ""
+    top = "".join(f"<th scope=col{number}>{head.removeprefix('>')}</th>" for number, head in zip(numbers, heads))
+    body, headed = "", any(heads)
     for row in rows:
         attributes, cells = row if isinstance(row, tuple) else ("", row)
-        body += f"<tr{attributes}>" + "".join(cell if cell.startswith("<td") else f"<td{number}>{cell}</td>"
+        if not headed:
+            cells = [f"<th scope=row>{cells[0]}</th>", *cells[1:]]
+        body += f"<tr{attributes}>" + "".join(cell if cell.startswith(("<td", "<th")) else f"<td{number}>{cell}</td>"
                                               for number, cell in zip(numbers, cells)) + "</tr>"
     return (f"<div class='{frame}'><table{f' class={kind}' if kind else ''}>"
-            f"{f'<thead><tr>{top}</tr></thead>' if any(heads) else ''}<tbody>{body}</tbody></table></div>")
+            f"{f'<thead><tr>{top}</tr></thead>' if headed else ''}<tbody>{body}</tbody></table></div>")
 
 
 def warned(texts: Sequence, heading: str = "") -> str:

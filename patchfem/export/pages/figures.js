@@ -81,6 +81,7 @@ const pictures = (() => {
       title_text_font_style: "normal", major_label_text_color: ink("--ink"), background_fill_color: null}), "right");
   }
 
+  const KEYS = "arrow keys move the picture, + and - scale it, 0 restores it";
   let queue = Promise.resolve();                 // one picture after the other: showing takes its time
   function put(make, place) {                    // make: returns the figure, in the inks that stand
     const fig = make();
@@ -100,7 +101,29 @@ const pictures = (() => {
   }
 
   function show(fig, place) {
-    queue = queue.then(() => { place.replaceChildren(); return Bokeh.Plotting.show(fig, place); });
+    queue = queue.then(() => { place.replaceChildren(); return Bokeh.Plotting.show(fig, place); }).then(() => keyed(fig, place));
+  }
+
+  function keyed(fig, place) {                   // one stop of the Tab key, not one for each tool, which need a pointer
+    const inside = (node) => [...node.querySelectorAll("*")].flatMap((one) => [one, ...(one.shadowRoot ? inside(one.shadowRoot) : [])]);
+    for (const one of inside(place)) if (one.hasAttribute("tabindex")) one.tabIndex = -1;
+    if (place.classList.contains("onpaper")) return;
+    place.tabIndex = 0;
+    place.dataset.keys = KEYS;
+    place.setAttribute("aria-description", KEYS);
+    place.onkeydown = (event) => {
+      const [across, up, size] = {ArrowLeft: [-1, 0, 1], ArrowRight: [1, 0, 1], ArrowDown: [0, -1, 1], ArrowUp: [0, 1, 1],
+        "+": [0, 0, 0.8], "-": [0, 0, 1.25], 0: []}[event.key] ?? [null];
+      if (across === null || event.ctrlKey || event.metaKey || event.altKey) return;
+      event.preventDefault();
+      if (across === undefined) fig.reset.emit();
+      else [[fig.x_range, fig.x_scale, across], [fig.y_range, fig.y_scale, up]].forEach(([range, scale, way]) => {
+        const log = scale.type === "LogScale", [low, high] = [range.start, range.end].map((v) => log ? Math.log(v) : v);
+        const middle = (low + high) / 2 + 0.1 * way * (high - low), half = size * (high - low) / 2;
+        const [start, end] = [middle - half, middle + half].map((v) => log ? Math.exp(v) : v);
+        range.setv({start, end});
+      });
+    };
   }
 
   function themed(draw) {                        // now, and when the reader's theme changes

@@ -199,4 +199,4 @@ def table(peaks: list) -> str:
             "estimate of the steady value is used if the error of this estimate is at most 1 %; otherwise the case is "
             "left out. A half-power width is given if the curve falls to its peak/&radic;2 on both sides within the "
             "swept range.</p>"
-            + document.table(("", ">at", ">height", ">half-power width"), rows, "wide"))
+            + document.table(("case", ">at", ">height", ">half-power width"), rows, "wide"))

@@ -114,7 +114,7 @@ def picture(ranks: dict) -> str:
         rows = [[escape(one.key), f"{100 * one.first:.0f} %", f"{100 * one.total:.0f} %", _range(one),
                  f"<td class=bars>{_bar(one)}</td>"] for one in shares]
         parts.append(f"<h3>{linked(label(name), name)}</h3>"
-                     + document.table(("key", ">alone", ">total", ">from, to", ""), rows, "wide", "shares"))
+                     + document.table(("key", ">alone", ">total", ">from, to", "share"), rows, "wide", "shares"))
     return ("<p class=soft>The bars show the share of each key in the variance over the cases: the key alone (dark) "
             "and with its interactions (light). "
             "The line is the interval of the share with interactions.</p>" + "".join(parts))

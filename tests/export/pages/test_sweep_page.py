@@ -6,10 +6,11 @@ import re
 import numpy as np
 import pytest
 from chromium import LATER
-from page_data import data_of, own_part
+from page_data import data_of, own_part, unheard
 
 from patchfem.export.pages import drawn, library
-from patchfem.export.pages.document import DIGITS, document, encoded
+from patchfem.export.pages.document import DIGITS, Section, document, encoded
+from patchfem.export.pages.document import table as sheet
 from patchfem.export.pages.lead import lead_of, span
 from patchfem.export.pages.sweep import brief, page
 from patchfem.export.sweeps.page import joined, wide
@@ -386,3 +387,32 @@ def test_always_a_browser_that_cannot_unpack_says_so(chromium, table):
 def test_exact_a_page_is_half_as_large_as_its_library_was(table):
     assert len(page(table)) < 0.6e6 and library.bokeh() == library.packed("\n".join(
         library.own(f"bokehjs/{name}") for name in library.FILES))
+
+
+def test_always_a_page_can_be_heard(table):
+    """The sliders of the player had no name once: their labels named the value that stood before them."""
+    assert unheard(page(table)) == []
+    for name in ("player.html", "line.html"):
+        assert unheard(library.own(name)) == []
+    assert unheard(document("Ways", "", [Section("a", "Ways", sheet(("", ""), [["held", "1"]]))])) == []
+    bad = "<html><h1>a</h1><h3>b</h3><label>c <output></output><input></label><svg></svg><th>d</th>"
+    assert unheard(bad) == ["<html>", "<input>", "<svg>", "<th>", "h1 before h3"]
+
+
+def test_always_a_picture_is_one_stop_of_the_tab_key_and_obeys_keys(chromium, table):
+    seen = chromium.opened(page(table))
+    stops = """(function all(node) { return [...node.querySelectorAll('*')].flatMap((one) =>
+        [...(one.tabIndex >= 0 ? [one.id] : []), ...(one.shadowRoot ? all(one.shadowRoot) : [])]) })"""
+    assert seen.js(f"{stops}(document.getElementById('chart'))") == []
+    assert seen.js("document.getElementById('chart').tabIndex") == 0
+    assert seen.js("document.getElementById('chart').ariaDescription").startswith("arrow keys move")
+    ends = "(({start, end}) => [start, end])(Bokeh.documents.at(-1).roots()[0].y_range)"
+    low, high = seen.js(ends)
+    seen.js("document.getElementById('chart').focus()")
+    seen.pressed("+")
+    assert seen.js(ends) == pytest.approx([low + 0.1 * (high - low), high - 0.1 * (high - low)])
+    seen.pressed("ArrowUp")
+    assert seen.js(ends) == pytest.approx([low + 0.18 * (high - low), high - 0.02 * (high - low)])
+    seen.pressed("0")
+    assert seen.js(ends) == pytest.approx([low, high])
+    assert seen.faults == []
