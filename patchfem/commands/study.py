@@ -146,6 +146,7 @@ def fit(scene: Path, /, *, to: word(
         print("\n".join(fits.lines_of(answer)))
         for text in answer["warnings"]:
             say(f"warning: {text}")
+        print(f"page: {target / 'report.html'}")
         print(f"results: {target}")
     if answer["outcome"] == "not_converged":
         raise NotReached

@@ -26,9 +26,10 @@ In: a `Result`. Out: files. A module imports its own entry of this list and the 
 22. `fitted_patch` laws of one point fitted to a patch
 23. `fit_rows`  a rig fitted to rows
 24. `wear_fit`  a fitted wear coefficient on disk
-25. `fits`      a fit of any kind, from its options to its folder
-26. `backbone`  frequency and damping over the amplitude on disk
-27. `chosen`    a results folder in the format, or the picture, that the ending of a file asks for
+25. `fit_page`  the page of a fit
+26. `fits`      a fit of any kind, from its options to its folder
+27. `backbone`  frequency and damping over the amplitude on disk
+28. `chosen`    a results folder in the format, or the picture, that the ending of a file asks for
 
 Read `folder` first.
 """

@@ -67,10 +67,17 @@ def lines_of(answer: dict) -> list:
 
 def line_of(name: str, one: dict) -> str:
     """A fitted value with its interval in the unit that people read; one: its object in fit.json."""
-    unit, scale = fitting(one["value"], SPOKEN.get(one["unit"], one["unit"]))
-    ends, bound = one["interval"], f", at its {one['at_bound']} bound" if one["at_bound"] else ""
-    half = None if ends is None else scale * (ends[1] - ends[0]) / 2
-    value, *ends = (rounded(number * scale, half)[0] for number in (one["value"], *(ends or ())))
+    value, unit, ends = told_of(one)
+    bound = f", at its {one['at_bound']} bound" if one["at_bound"] else ""
     bar = "not determined" if not ends else f"95 % in [{', '.join(ends)}] by the " + \
         ("profile" if one["method"] == "profile" else "linearised problem")
     return f"  {name} {f'{value} {unit}'.strip()}   {bar}{bound}"
+
+
+def told_of(one: dict) -> tuple:
+    """(value, unit, ends of its interval or none) of a fitted value in the unit that people read; one: as above."""
+    unit, scale = fitting(one["value"], SPOKEN.get(one["unit"], one["unit"]))
+    ends = one.get("interval")
+    half = None if ends is None else scale * (ends[1] - ends[0]) / 2
+    value, *ends = (rounded(number * scale, half)[0] for number in (one["value"], *(ends or ())))
+    return value, unit, ends

@@ -15,14 +15,15 @@ from ..campaigns.rows.asked import Question
 from ..campaigns.rows.fit import RowsOptions, fit_rows
 from ..campaigns.rows.search import UNSTABLE, Search
 from ..core import PatchfemError
+from ..disk.whole import write_text
 from ..model.model import build
 from ..scene import axes
 from ..scene.ranges import ranges
 from ..scene.scene import SceneError, loads
 from . import fit as loop_lines
-from . import fit_folder, fitted_decay, fitted_patch, wear_fit
+from . import fit_folder, fit_page, fitted_decay, fitted_patch, wear_fit
 from . import fit_rows as written
-from .results import STARTS, Folder
+from .results import PAGE, STARTS, Folder
 
 LOOP, ROWS = ("offset", "warm_up"), ("leave_out", "seed", "unstable", "placebo", "resume")
 STARTED = {"rows": 8, "curve": 3}  # starts of a search, unless given
@@ -79,18 +80,21 @@ def fit_into(whole, to: str, free: Sequence[str], options: Options, target: Path
         if folder.dropped and heard.say is not None:
             heard.say(folder.dropped)
         if kind == "patch":
-            return fitted_patch.fit_into(fit_patch(whole, slides), folder)
-        if kind == "rows":
-            return _of_rows(whole, Path(to), free, options, folder, heard)
-        if kind == "curve":
-            return fitted_decay.fit_into(fit_decay(whole, Path(to), free, heard.say, options.starts or
-                                                  STARTED[kind]), folder)
-        if kind == "loop":
+            answer = fitted_patch.fit_into(fit_patch(whole, slides), folder)
+        elif kind == "rows":
+            answer = _of_rows(whole, Path(to), free, options, folder, heard)
+        elif kind == "curve":
+            answer = fitted_decay.fit_into(fit_decay(whole, Path(to), free, heard.say, options.starts or
+                                                    STARTED[kind]), folder)
+        elif kind == "loop":
             how = LoopOptions(options.offset, options.warm_up)
-            return fit_folder.fit_into(fit_loop(whole, Path(to), free, options.hold, heard.say, how), folder)
-        found = wear_coefficient.wear_coefficient(build(whole), to, free, heard.progress)
-        text = loads(whole.text, whole.path, [*whole.sets, found.bounds.assigned(found.value)]).resolved()
-        return wear_fit.fit_into(found, whole.title, text, folder)
+            answer = fit_folder.fit_into(fit_loop(whole, Path(to), free, options.hold, heard.say, how), folder)
+        else:
+            found = wear_coefficient.wear_coefficient(build(whole), to, free, heard.progress)
+            text = loads(whole.text, whole.path, [*whole.sets, found.bounds.assigned(found.value)]).resolved()
+            answer = wear_fit.fit_into(found, whole.title, text, folder)
+        write_text(folder.path / PAGE, fit_page.page(answer, lines_of(answer), folder.path))
+        return answer
 
 
 def kind_of(whole, to: str) -> str:

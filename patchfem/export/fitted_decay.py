@@ -5,8 +5,10 @@ import numpy as np
 from .. import __version__
 from ..campaigns.fit_decay import FittedDecay
 from ..disk.whole import write_rows, write_text
+from ..scales import axis_unit
 from ..scene.scene import loads
 from . import fit_folder
+from .drawing.pictures import BLUE, GREY, drawing, styled
 from .fit import line_of
 from .results import Folder
 from .summary import write_json
@@ -29,7 +31,8 @@ def answer_of(fitted: FittedDecay) -> dict:
 
 
 def fit_into(fitted: FittedDecay, folder: Folder) -> dict:
-    """Write fit.json, fit.csv and scene.fitted.toml into an open results folder, and return the object of fit.json."""
+    """Write fit.json, fit.csv, fit.svg and scene.fitted.toml into an open results folder, and return the object of
+    fit.json."""
     answer = answer_of(fitted)
     whole = loads(fitted.scene.text, fitted.scene.path, [*fitted.scene.sets, *fitted.sets])
     write_json(answer, folder.path / "fit.json")
@@ -37,8 +40,23 @@ def fit_into(fitted: FittedDecay, folder: Folder) -> dict:
     write_text(folder.path / "scene.fitted.toml", text)
     rows = zip(fitted.amplitude, fitted.measured[0], 2 * fitted.error[0], fitted.measured[1], 2 * fitted.error[1],
                *fitted.model)
+    write_text(folder.path / "fit.svg", draw(fitted))
     write_rows(folder.path / "fit.csv", [HEAD, *([repr(float(one)) for one in row] for row in rows)])
     return answer
+
+
+@styled
+def draw(fitted: FittedDecay):
+    """Draw frequency and damping ratio over the amplitude, measured with errors and fitted, as SVG text."""
+    figure, axes = drawing(2, 3.6)
+    along, size = axis_unit(fitted.amplitude, "m")
+    for k, (axis, name) in enumerate(zip(axes, ("frequency [Hz]", "damping ratio"))):
+        axis.errorbar(fitted.amplitude * size, fitted.measured[k], 2 * fitted.error[k], fmt=".", color=GREY, ms=5,
+                      lw=0.8, label="measured")
+        axis.plot(fitted.amplitude * size, fitted.model[k], color=BLUE, lw=1.2, label="fitted")
+        axis.set(xlabel=f"amplitude [{along}]", ylabel=name, xscale="log")
+    axes[0].legend(frameon=False)
+    return figure
 
 
 def lines_of(answer: dict) -> list:

@@ -7,12 +7,14 @@ import math
 import numpy as np
 import pytest
 from command_line import cli
+from page_data import unheard
 from scipy.integrate import solve_ivp
 from scipy.stats import t as student
 
 from patchfem.campaigns.fit import LOAD_UNITS, fit_loop
 from patchfem.campaigns.fit_model import BenchModel
 from patchfem.core import PatchfemError
+from patchfem.export.fit import told_of
 from patchfem.export.fit_folder import fitted_scene
 from patchfem.inputs.loops import read_loop
 from patchfem.model.model import build
@@ -368,8 +370,14 @@ def test_exact_the_verb_writes_a_scene_that_runs_to_the_fitted_loop(tmp_path, as
     found = json.loads(answer.out)
     assert found == json.loads((tmp_path / "out/fit.json").read_text())
     assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["fit.csv", "fit.json", "fit.svg",
-                                                                    "scene.fitted.toml"]
+                                                                    "report.html", "scene.fitted.toml"]
     one = found["values"]["friction.static"]
+    page = (tmp_path / "out/report.html").read_text("utf-8")
+    assert unheard(page) == [] and page.count("<svg") == 1 and "Brackets hold the intervals of 95 %" in page
+    value, _, (low, high) = told_of(one)
+    assert f"<b>friction.static = {value} ({low} to {high});" in page
+    assert f"<td>friction.static</td><td class=n>{value}</td><td class=n>{low} .. {high}</td>" in page
+    assert "rms of the residual" in page and "rms of held-out rows" in page
     assert one["interval"][0] < 0.31 < one["interval"][1] and found["held"]["rows"] == 24 and found["unit"] == "N"
     assert (tmp_path / "out/fit.svg").read_text().startswith("<svg")
     scene = load(tmp_path / "out/scene.fitted.toml")

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from command_line import cli
+from page_data import unheard
 from scene_texts import DRIVE, KILOGRAM, POINT, friction_of, shaken
 
 import patchfem as pf
@@ -89,6 +90,8 @@ def test_the_verb_reads_a_curve_and_refuses_what_is_none(tmp_path, monkeypatch):
     assert "--hold" in cli(*ask, "--hold", "frequency=1 Hz").err
     answer = cli(*ask, "--set", "friction.stiffness=1e6 N/m", "-o", "out")
     assert answer.code == 0 and "3 amplitudes of decay.csv by balance" in answer.out and "friction.chi" in answer.out
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert unheard(page) == [] and page.count("<svg") == 1 and "rms of the residual" in page
     both = tmp_path / "backbone.csv"
     both.write_text("method,amplitude [m],frequency [Hz],damping\na,1e-6,100,0.1\nb,2e-6,100,0.1\n")
     with pytest.raises(PatchfemError, match="several methods"):

@@ -113,8 +113,8 @@ def test_the_verb_prints_what_a_law_leaves_out(tmp_path, monkeypatch):
                  "A mesh coarser than the present one"):
         assert word in answer.out
     assert sorted(one.name for one in (tmp_path / "out").iterdir()) == [
-        "fit.csv", "fit.json", "fit.svg", "scene.bouc-wen.toml", "scene.elastic-plastic.toml", "scene.fitted.toml",
-        "scene.iwan.toml"]
+        "fit.csv", "fit.json", "fit.svg", "report.html", "scene.bouc-wen.toml", "scene.elastic-plastic.toml",
+        "scene.fitted.toml", "scene.iwan.toml"]
     assert pf.run(tmp_path / "out/scene.fitted.toml").measures["friction_force_peak"].value == pytest.approx(
         pf.run(JOINT + SLIDE).measures["friction_force_peak"].value, rel=1e-6)
     assert cli("fit", "bench.toml", "--from-patch", "-o", "out").code == 0  # its own folder is replaced

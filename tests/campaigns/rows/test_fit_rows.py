@@ -6,6 +6,7 @@ import json
 import numpy as np
 import pytest
 from command_line import cli
+from page_data import unheard
 
 from patchfem.campaigns.rows.asked import Asked, Question
 from patchfem.campaigns.rows.cells import cells_of
@@ -384,6 +385,8 @@ def test_the_table_of_a_fit_holds_what_was_measured_and_computed(tmp_path):
         for name in ("displacement [mil]", "computed displacement [mil]"):
             assert float(row[name]) == pytest.approx(y / MIL, rel=1e-4)
         assert row["held"] == ("1" if f == 160 else "0")
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert unheard(page) == [] and page.count("<svg") == 1 and "rms of ln(computed/measured)" in page
 
 
 @pytest.mark.slow
