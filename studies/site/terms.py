@@ -26,6 +26,9 @@ TERMS = {
                               "the piece turns until the moment of the pressure balances that of the load.",
     "friction coefficient": "Largest friction force divided by the normal load: `static` before slip, `kinetic` while "
                             "slipping.",
+    "friction law": "The equation that gives the shear stress from normal stress and slide: `friction.law`. [The "
+                    "guide](../../../patchfem/scene/GUIDE.md#the-friction) compares all laws; [my own "
+                    "law](../tasks/own_law.md) adds one.",
     "friction loop": "Friction force against slide over a cycle. The area of the loop is the energy dissipated per "
                      "cycle.",
     "gap": "The distance between the two faces before they are loaded.",
@@ -33,6 +36,12 @@ TERMS = {
               "inertia force of the drive, μN/(moving mass · a).",
     "holder": "The rigid body to which the far face of a piece is bonded. `[contact.holder]` adds springs between the "
               "far face and the holder.",
+    "how long a run takes": "`patchfem plan SCENE` estimates the seconds before a run or sweep starts. [What does "
+                            "accuracy cost?](../../notebooks/accuracy_time.ipynb) shows how time grows with accuracy; "
+                            "`patchfem cost` measures it.",
+    "import of my own modes": "`patchfem import` finds modes in records of a test or in files of other programs and "
+                              "writes `[structure]` for a scene: see [laboratory "
+                              "records](../../../patchfem/scene/GUIDE.md#laboratory-records).",
     "interface": "The surface at which two pieces touch and rub, or the joint between two masses.",
     "jump of wear": "Many cycles of wear taken in one step: `wear.jumps`. One cycle is computed; its wear is "
                     "counted for all cycles of the jump.",
@@ -43,7 +52,7 @@ TERMS = {
     "march": "Time integration of the motion, step by step.",
     "micro-slip": "Slip of a part of the interface while the rest sticks, also called partial slip.",
     "outcome": "How a run ended, in one word: `steady`, `stuck`, `transient`, `grows`, `done` and others.",
-    "own law": "A law of friction that you add, in three files: see [how to add a law](../../../patchfem/ADDING.md).",
+    "own law": "A law of friction that you add, in three files: see [my own law of friction](../tasks/own_law.md).",
     "patch": "The area in which two pieces are pressed together.",
     "path": "The length that a point has slid since a bond formed, counted positive in both directions.",
     "prescribed slide": "The relative motion of the two surfaces as given by `[slide]`.",
