@@ -1,4 +1,5 @@
-"""Links and commands of the site: every link between its pages leads somewhere, every command that it shows runs.
+"""Links, pictures and commands of the site: every link between its pages leads somewhere, every picture has words in
+its place, every command that it shows runs.
 
 `python check.py out/site` in this folder's repository prints what is wrong and counts what was tried.
 """
@@ -18,16 +19,17 @@ PAGES = (HERE / "start.md", *sorted((HERE / "tasks").glob("*.md")))
 
 
 class _Page(HTMLParser):
-    """What a page links to, and the names that can be linked in it."""
+    """What a page links to, the names that can be linked in it, and its pictures without words in their place."""
 
     def __init__(self):
         super().__init__()
-        self.links, self.names = [], set()
+        self.links, self.names, self.mute = [], set(), []
 
     def handle_starttag(self, tag, attrs):
         of = dict(attrs)
         self.links += [of[key] for key in ("href", "src") if of.get(key)]
         self.names |= {of[key] for key in ("id", "name") if of.get(key)}
+        self.mute += [of["src"]] if tag == "img" and of.get("alt", of["src"]) in ("", of["src"]) else []
 
 
 @cache
@@ -38,10 +40,20 @@ def read(path: Path) -> _Page:
     return page
 
 
+def _pages(folder: Path) -> list:
+    """The pages of a built site, without the theme's templates."""
+    return sorted(set(folder.rglob("*.html")) - set(folder.rglob("_static/**/*.html")))
+
+
+def mute(folder: Path) -> list:
+    """The pictures of a built site that have no words in their place, as "page: picture"."""
+    return [f"{path.relative_to(folder)}: {name}" for path in _pages(folder) for name in read(path).mute]
+
+
 def links(folder: Path) -> tuple:
     """(how many links inside a built site were tried, those that lead nowhere as "page: link")."""
     tried, dead = 0, []
-    for path in sorted(set(folder.rglob("*.html")) - set(folder.rglob("_static/**/*.html"))):  # the theme's templates
+    for path in _pages(folder):
         for link in read(path).links:
             target, _, name = unquote(link).partition("#")
             if re.match(r"[a-z]+:|//", target) or not (target or name):
@@ -74,10 +86,12 @@ def main(site: str) -> int:
     """Print what is wrong; 1 where anything is."""
     tried, wrong = links(Path(site))
     print(f"{tried} links tried, {len(wrong)} dead")
+    silent = mute(Path(site))
+    print(f"{len(silent)} pictures without words in their place")
     failed = [text for page in PAGES for text in faults(page)]
     print(f"{sum(len(commands(page)) for page in PAGES)} commands tried, {len(failed)} fail")
-    print(*wrong, *failed, sep="\n")
-    return int(bool(wrong or failed))
+    print(*wrong, *silent, *failed, sep="\n")
+    return int(bool(wrong or silent or failed))
 
 
 if __name__ == "__main__":

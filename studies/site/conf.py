@@ -13,6 +13,7 @@ sys.path[:0] = [str(ROOT), str(HERE), str(ROOT / "tests/support")]
 os.environ["PYTHONPATH"] = os.pathsep.join([str(ROOT), os.environ.get("PYTHONPATH", "")])  # of the notebooks too
 
 import made  # noqa: E402
+from docutils import nodes  # noqa: E402
 
 import patchfem  # noqa: E402
 
@@ -48,7 +49,17 @@ suppress_warnings = ["myst.header"]  # a page of the repository may begin below 
 def setup(app) -> None:
     """Write the pages that are made from the program, before any page is read; at the end a first one for a browser."""
     app.connect("builder-inited", lambda app: made.write(HERE / "made"))
+    app.connect("doctree-read", _heard)
     app.connect("build-finished", _front)
+
+
+def _heard(app, doctree) -> None:
+    """Pictures that a cell of code draws are told by the heading above them; else their file is read out."""
+    for image in doctree.findall(nodes.image):
+        above = image
+        while above.parent and not isinstance(above, nodes.section):
+            above = above.parent
+        image.setdefault("alt", f"Picture drawn by the code above: {above.next_node(nodes.title).astext()}")
 
 
 def _front(app, fault) -> None:
