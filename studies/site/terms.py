@@ -18,9 +18,9 @@ TERMS = {
     "drive": "What causes the motion of the rig: an accelerated base, a force, or a release.",
     "dwell": "A rest between two parts of a prescribed slide. Bonds age during the rest.",
     "effect": "A part of the model that is used if the scene contains its table or value.",
-    "error bar": "The estimated numerical error of a measure, given as a half-width. The error bar should be "
-                 "larger than the true numerical error in 19 of 20 scenes. An error bar does not include what the "
-                 "model neglects.",
+    "error bars": "The estimated numerical error of each measure, given as a half-width. An error bar should be "
+                  "larger than the true numerical error in 19 of 20 scenes. An error bar does not include what the "
+                  "model neglects. See [how far to trust it](../trust.md).",
     "flutter": "Vibration that grows without a drive because a mode has a negative damping ratio.",
     "free and held rotation": "The rotation of a piece is held if the scene prescribes it. The rotation is free if "
                               "the piece turns until the moment of the pressure balances that of the load.",
@@ -36,12 +36,12 @@ TERMS = {
               "inertia force of the drive, μN/(moving mass · a).",
     "holder": "The rigid body to which the far face of a piece is bonded. `[contact.holder]` adds springs between the "
               "far face and the holder.",
-    "how long a run takes": "`patchfem plan SCENE` estimates the seconds before a run or sweep starts. [What does "
-                            "accuracy cost?](../../notebooks/accuracy_time.ipynb) shows how time grows with accuracy; "
-                            "`patchfem cost` measures it.",
-    "import of my own modes": "`patchfem import` finds modes in records of a test or in files of other programs and "
-                              "writes `[structure]` for a scene: see [laboratory "
-                              "records](../../../patchfem/scene/GUIDE.md#laboratory-records).",
+    "how long will it take": "`patchfem plan SCENE` estimates the seconds before a run or sweep starts. [What does "
+                             "accuracy cost?](../../notebooks/accuracy_time.ipynb) shows how time grows with accuracy; "
+                             "`patchfem cost` measures it.",
+    "import my modes": "`patchfem import` finds modes in records of a test or in files of other programs and writes "
+                       "`[structure]` for a scene: see [laboratory "
+                       "records](../../../patchfem/scene/GUIDE.md#laboratory-records).",
     "interface": "The surface at which two pieces touch and rub, or the joint between two masses.",
     "jump of wear": "Many cycles of wear taken in one step: `wear.jumps`. One cycle is computed; its wear is "
                     "counted for all cycles of the jump.",
