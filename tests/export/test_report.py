@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from page_data import charts_of, data_of, own_part
+from page_data import charts_of, data_of, own_part, unheard
 
 from patchfem import scales
 from patchfem.__main__ import main
@@ -118,6 +118,11 @@ class Parsed(HTMLParser):
     def handle_data(self, text):
         if self.tags[-1:] == ["td"]:
             self.cells.append(text)
+
+
+@pytest.mark.parametrize("name", PAGES)
+def test_always_a_page_can_be_heard(name, pages):
+    assert unheard(pages[name][1]) == []
 
 
 def captions(page) -> str:
