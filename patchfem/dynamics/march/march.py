@@ -88,7 +88,8 @@ def _runner(model):
 def warm_up(modes: ModalBasis, drive: BaseSine, model: ContactModel, say=None) -> None:
     """Load the compiled loop of a model, or compile it, by a march of no steps; say: told before it compiles."""
     runner = _runner(model)
-    kind = (model.kind, model.laws, model.loading, modes.damping is None) if runner is Run else None
+    kind = (model.kind, model.laws, model.loading, modes.damping is None, any(one.mate for one in model.joints)) \
+        if runner is Run else None
     if kind not in _WARM:
         run = runner(modes, drive, model, 4, np.inf, load_kernels(say))
         run.cycle(0, 0, [])
