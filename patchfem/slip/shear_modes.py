@@ -21,7 +21,8 @@ from ..core import Compliance, PatchfemError, frozen_array
 from ..elasticity.lapack import dpotrf, dpotrs, dtrsm, dtrtri, one_thread
 
 SAME = 1e-11  # of a yield slide: nodes that yield at once, as mirrored ones do; round-off parts 801 of them by 7e-13
-TRIES = 12  # orders of yields that are tried before points are taken out one by one: rough gaps ask for 1 to 36
+TRIES = 2  # times that yields are sorted anew before neighbours are exchanged, which finds a point that is far off
+SWAPS = 20  # exchanges of neighbours per point before points are taken out one by one: patches ask for 1 at most
 SHEAR_MODES = 4  # modes a shear reduction starts from: of bare pieces they leave 1e-6 of the friction limit
 FEW, BEYOND = 16, 0.8  # modes that fewer are held against; share of a tolerance that they may miss these by
 GATHERED = 16, 32, 64  # points that may stand for all of a patch
@@ -161,18 +162,64 @@ def _in_order(c: np.ndarray, force: np.ndarray) -> tuple:
     While the first m of them stick, their rates solve the leading block of c. So what the m-th carries less by its
     yield is the m-th row of L^-1 times (L^-1 1)_m, and slides at which all yield solve share @ slides = force: they are
     (L' force)/(L^-1 1). An order is right where these rise, as a rate only grows until its point yields. The first is
-    that of no yields, a further one that of these slides.
+    that of no yields, a further one that of these slides. What then is still wrong is exchanged with its neighbour.
     """
     rate = dpotrs(_factor(c), np.ones(force.size), lower=1)[0]
     order, slides = np.arange(force.size), np.divide(force, rate, out=np.full(force.size, np.inf), where=rate > 0)
-    for tried in range(TRIES + 2):
-        order = order[np.argsort(-slides, kind="stable")] if tried < TRIES + 1 else _one_by_one(c, force)
-        low = _factor(c[np.ix_(order, order)])
-        root = dtrsm(1.0, low, np.ones((force.size, 1)), lower=1)[:, 0]
-        slides = np.divide(force[order] @ low, root, out=np.full(force.size, np.inf), where=root > 0)
-        if (slides[1:] <= slides[:-1] * (1 + SAME)).all():
+    for _ in range(TRIES + 1):
+        order = order[np.argsort(-slides, kind="stable")]
+        low, root, pull, slides = _yields(c, force, order)
+        if _rises(slides):
             break
+    else:
+        if (found := _exchanged(order, low, root, pull)) is None:
+            order = _one_by_one(c, force)
+            low, root, _, slides = _yields(c, force, order)
+        else:
+            order, low, root, slides = found
     return order, low, root, np.maximum.accumulate(slides[::-1]), int((rate <= 0).sum())
+
+
+def _yields(c: np.ndarray, force: np.ndarray, order: np.ndarray) -> tuple:
+    """(L (n, n), L^-1 1 (n,), L' force (n,), slides (n,) [m] of the yields) in an order."""
+    low = _factor(c[np.ix_(order, order)])
+    root, pull = dtrsm(1.0, low, np.ones((force.size, 1)), lower=1)[:, 0], force[order] @ low
+    return low, root, pull, np.divide(pull, root, out=np.full(force.size, np.inf), where=root > 0)
+
+
+def _rises(slides: np.ndarray) -> bool:
+    """Whether slides (n,) rise from the last on."""
+    return bool((slides[1:] <= slides[:-1] * (1 + SAME)).all())
+
+
+def _exchanged(order: np.ndarray, low: np.ndarray, root: np.ndarray, pull: np.ndarray) -> tuple | None:
+    """(order, L, L^-1 1, slides) with neighbours exchanged until the slides of their yields rise; None where that does
+    not come to an end. Arguments as `_yields` has them.
+
+    An exchange changes the yields of these two alone: L with two rows exchanged is lower again by a rotation of two of
+    its columns, which turns L^-1 1 and L' force with them.
+    """
+    order, root, pull = order.tolist(), root.tolist(), pull.tolist()
+    slides = [a / b if b > 0 else np.inf for a, b in zip(pull, root)]
+    looked, left = list(range(len(order) - 1))[::-1], SWAPS * len(order)
+    while looked:
+        k = looked.pop()
+        if not (0 <= k < len(order) - 1 and slides[k + 1] > slides[k] * (1 + SAME)):
+            continue
+        if (left := left - 1) < 0:
+            return None
+        both = slice(k, k + 2)
+        low[both, :k + 2] = low[[k + 1, k], :k + 2]
+        size = np.hypot(low[k, k], low[k, k + 1])
+        c, s = float(low[k, k] / size), float(low[k, k + 1] / size)
+        turn = np.array([[c, s], [s, -c]])  # low[k + 1, k] times s is what stays on the diagonal, above 0
+        low[k:, both] = low[k:, both] @ turn
+        low[k, k + 1], order[both] = 0.0, order[both][::-1]
+        for one in (root, pull):
+            one[both] = c * one[k] + s * one[k + 1], s * one[k] - c * one[k + 1]
+        slides[both] = [a / b if b > 0 else np.inf for a, b in zip(pull[both], root[both])]
+        looked += [k + 1, k - 1]
+    return np.array(order), low, np.array(root), np.array(slides)
 
 
 def _factor(c: np.ndarray) -> np.ndarray:

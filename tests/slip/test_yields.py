@@ -31,11 +31,13 @@ def half_plane(count: int):
     return np.log((x[-1] + 2 - x[0]) / np.where(apart > 0, apart, 0.3))
 
 
-@pytest.mark.parametrize("tries", [shear_modes.TRIES, -1])  # -1: points are taken out one by one at once
+# the order of no yields alone is put right by exchanges, or by points that are taken out one by one
+@pytest.mark.parametrize(("tries", "swaps"), [(shear_modes.TRIES, shear_modes.SWAPS), (0, shear_modes.SWAPS), (0, -1)])
 @pytest.mark.parametrize("count", [1, 2, 7, 60])
 @pytest.mark.parametrize("local", [0.0, 0.05])
-def test_exact_the_order_is_that_of_a_system_solved_anew_after_every_yield(count, local, tries, monkeypatch):
+def test_exact_the_order_is_that_of_a_system_solved_anew_after_every_yield(count, local, tries, swaps, monkeypatch):
     monkeypatch.setattr(shear_modes, "TRIES", tries)
+    monkeypatch.setattr(shear_modes, "SWAPS", swaps)
     r = np.random.default_rng(count)
     limit, c = r.uniform(0.5, 2, count), half_plane(count)
     group = jenkins_set(c, limit, local)
