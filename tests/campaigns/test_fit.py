@@ -210,7 +210,7 @@ def test_exact_a_moved_patch_is_condensed_once_whatever_was_asked_before(tmp_pat
     for values in ((5e-6, 4e-5, 2e-4), (2e-4, 4e-5)):
         model = BenchModel(scene, loop, wanted)
         found.append([model(np.array([value])) for value in values])
-    assert condensed._shared.cache_info().misses == before + 1
+    assert condensed._shared.cache_info().misses == before + 3  # a level each
     assert np.array_equal(found[0][1], found[1][1]) and np.array_equal(found[0][2], found[1][0])
     assert np.abs(found[0][0] - found[0][2]).max() > 1e-3 * np.abs(found[0][0]).max()
 

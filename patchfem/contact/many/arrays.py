@@ -10,7 +10,7 @@ class Body(NamedTuple):
 
     c (m, m) [m/N]; x (m,) [m]; upper (m, m): factor of the nodes from a on, which is overwritten; side (2, m): U^-T of
     1 and of x; table (m + 1, 3, m + 1): of the stretches [a, stop) the sums of the first squared, of both and of the
-    second squared, which are dN/d closing, -dN/d theta and -dM/d theta; room (2, m): scratch.
+    second squared, which are dN/d closing, -dN/d theta and -dM/d theta; room (m,): scratch.
     """
 
     c: np.ndarray
@@ -26,10 +26,9 @@ class Cases(NamedTuple):
 
     begin, reach (q,): the first left end that is tried, and the node by which the contact is expected to have ended;
     gap (q, m) [m]; target (q, 3): load [N], moment [N m] about x = 0, spring [N m/rad]. Written are first, stop (q,):
-    the stretch, a stop of 0 where none was found; force (q, m) [N]; moved (q, 2): closing [m] and theta [rad]; pace (q,
-    2, 2): of the left and of the right end the force of the last node over its rise per approach and the gap at the
-    next one over its fall [m], left alone where the stretch ends with the interface. heads (m + 1,), link (q,): the
-    cases that wait for a left end, scratch.
+    the stretch, a stop of 0 where none was found; force (q, m) [N]; moved (q, 2): closing [m] and theta [rad]; leave,
+    fall (q, 2): of the left and of the right end the force of the last node over its rise per approach [m], and the
+    fall of the gap at the next one per approach; left alone where the stretch ends with the interface.
     """
 
     begin: np.ndarray
@@ -40,6 +39,5 @@ class Cases(NamedTuple):
     stop: np.ndarray
     force: np.ndarray
     moved: np.ndarray
-    pace: np.ndarray
-    heads: np.ndarray
-    link: np.ndarray
+    leave: np.ndarray
+    fall: np.ndarray

@@ -1,4 +1,4 @@
-"""Compiled contacts of one stretch of nodes: all cases of a mesh in one pass along its left ends.
+"""Compiled parts of the contacts of one stretch of nodes: what a body is to all cases, and where their stretches end.
 
 With C = U^T U on the nodes from a on, the leading blocks of U are the factors of every stretch that begins at a. One
 forward substitution of a gap tells of every right end at once what closing and rotation it takes, the force of its last
@@ -8,7 +8,7 @@ node and the gap at the next one:
 
 The substitution back has the force of the first node, which says whether the contact begins further on. The factor from
 a + 1 on is that from a on with its first row added to the rest, by rotations that lose no digits. NumPy twin:
-`unilateral.solve`, a case at a time. Bodies and cases are those of `arrays`.
+`unilateral.solve`, a case at a time. Bodies are those of `arrays`; `intervals` substitutes for many cases at once.
 """
 
 from math import sqrt
@@ -46,16 +46,6 @@ def forward(upper, a, stop, y):
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
-def back(upper, a, stop, f):
-    """Solve U f = f on the nodes from a to stop, in its place."""
-    for j in range(stop - 1, a - 1, -1):
-        rest = 0.0
-        for i in range(j + 1, stop):
-            rest += upper[j, i] * f[i]
-        f[j] = (f[j] - rest) / upper[j, j]
-
-
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
 def motions(body, a):
     """Write `side` and the row of the table of the stretches that begin at a."""
     one, arm, m = body.side[0], body.side[1], body.x.size
@@ -84,129 +74,51 @@ def rigid(load, moment, spring, turns, sums, stop):
 
 @njit(error_model="numpy", **LEAN)
 def right_end(body, y, a, stop, load, moment, spring, turns):
-    """(end of the largest stretch from a on whose last node pushes and whose next one stays open, load and moment with
-    what its gap takes of both); an end of 0 where there is none before stop. y (m,): U^-T of the gap."""
+    """End of the largest stretch from a on whose last node pushes and whose next one stays open, 0 where there is none
+    before stop. y (k,): U^-T of the gap from a on."""
     one, arm, out, m = body.side[0], body.side[1], 0, body.x.size
     for i in range(a, stop):
-        load += y[i] * one[i]
-        moment += y[i] * arm[i]
+        load += y[i - a] * one[i]
+        moment += y[i - a] * arm[i]
         closing, theta = rigid(load, moment, spring, turns, body.table[a], i + 1)
-        push = closing * one[i] - theta * arm[i] - y[i] > 0
+        push = closing * one[i] - theta * arm[i] - y[i - a] > 0
         n = min(i + 1, m - 1)
-        stays = i + 1 == m or (i + 1 < stop and closing * one[n] - theta * arm[n] - y[n] <= 0)
+        stays = i + 1 == m or (i + 1 < stop and closing * one[n] - theta * arm[n] - y[n - a] <= 0)
         if push and stays:  # of a few nodes a free rotation is round-off, which may look like a contact
             out = i + 1
     return out
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def forces(body, y, a, stop, load, moment, spring, turns, out):
-    """Write the forces of a stretch to out (m,); (closing, theta) of it."""
-    one, arm = body.side[0], body.side[1]
-    for i in range(a, stop):
-        load += y[i] * one[i]
-        moment += y[i] * arm[i]
-    closing, theta = rigid(load, moment, spring, turns, body.table[a], stop)
-    for i in range(a, stop):
-        out[i] = closing * one[i] - theta * arm[i] - y[i]
-    back(body.upper, a, stop, out)
-    return closing, theta
-
-
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def opening(body, gap, force, a, stop, moved, i):
-    """Opening [m] of node i under the forces of a stretch."""
-    bent = 0.0
-    for j in range(a, stop):
-        bent += body.c[i, j] * force[j]
-    return gap[i] + moved[1] * body.x[i] - moved[0] + bent
-
-
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def refine(body, gap, force, moved, a, stop, target, turns):
-    """Take what round-off left of openings inside, of load and moment out of the forces and the motion `moved` (2,)."""
-    y, more = body.room[0], body.room[1]
-    load, moment = target[0], target[1] + target[2] * moved[1]
-    for i in range(a, stop):
-        y[i] = opening(body, gap, force, a, stop, moved, i)
-        load -= force[i]
-        moment -= force[i] * body.x[i]
-    forward(body.upper, a, stop, y)
-    closing, theta = forces(body, y, a, stop, load, moment, target[2], turns, more)
-    for i in range(a, stop):
-        force[i] += more[i]
-    moved[0] += closing
-    moved[1] += theta
-
-
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def paces(body, gap, force, moved, a, stop, out):
-    """Write `Cases.pace` of a stretch to out (2, 2)."""
-    rise, upper, one = body.room[1], body.upper, body.side[0]
-    if stop < body.x.size:
-        out[1, 0] = force[stop - 1] * upper[stop - 1, stop - 1] / one[stop - 1]
-        out[1, 1] = opening(body, gap, force, a, stop, moved, stop) / (upper[stop, stop] * one[stop])
-    if a > 0:
-        for i in range(a, stop):
-            rise[i] = one[i]
-        back(upper, a, stop, rise)
-        fall = 1.0
-        for j in range(a, stop):
-            fall -= body.c[a - 1, j] * rise[j]
-        out[0, 0] = force[a] / rise[a]
-        out[0, 1] = opening(body, gap, force, a, stop, moved, a - 1) / fall
-
-
-@njit(error_model="numpy", **LEAN)
-def contact(body, cases, k, a, turns):
-    """Solve case k with a contact that begins at a; False where it begins further on."""
-    m, y, gap, target, force, moved = body.x.size, body.room[0], cases.gap[k], cases.target[k], cases.force[k], \
-        cases.moved[k]
-    reach, end = min(cases.reach[k], m), 0
-    while not end:
-        for i in range(a, reach):
-            y[i] = gap[i]
-        forward(body.upper, a, reach, y)
-        end = right_end(body, y, a, reach, target[0], target[1], target[2], turns)
-        if not end and reach == m:
-            return False
-        reach = m if not end else reach
-    moved[0], moved[1] = forces(body, y, a, end, target[0], target[1], target[2], turns, force)
-    if not force[a] > 0:
-        for i in range(a, end):
-            force[i] = 0.0
-        return False
-    refine(body, gap, force, moved, a, end, target, turns)
-    paces(body, gap, force, moved, a, end, cases.pace[k])
-    cases.first[k], cases.stop[k] = a, end
-    return True
+@njit(error_model="numpy", cache=True, **LEAN)
+def walk(body, a, b, begins):
+    """Go from the left end a to b: `upper` becomes the factor from b on, `side` and the rows of the table up to b are
+    written; begins: that of a as well. Cost: 2 m^2 multiplications a left end."""
+    if begins:
+        motions(body, a)
+    for k in range(a, b):
+        drop(body.upper, k, body.room)
+        motions(body, k + 1)
 
 
 @njit(error_model="numpy", cache=True, **LEAN)
-def press(body, cases, low, high, tries, turns):
-    """Press all cases of a body and fill the rows of its table from `low` to `high` and beside every stretch.
+def pushes(body, a, y, reach, target, stop, moved, turns):
+    """From U^-T of gaps to what U^-1 makes of them the forces of stretches that begin at a.
 
-    low: the left end that `body.upper` is the factor from; tries: left ends that are tried; turns: the rotation is
-    free. Cost: 2 m^2 multiplications a left end and 4 k^2 a case of k nodes.
+    y (n, k): of n cases on k nodes from a on, in its place, 0 beyond the stretch; reach (n,): node before which the
+    right end is sought of a case whose stop (n,) is 0, which stays 0 where none is found; target (n, 3): as of
+    `arrays.Cases`; moved (n, 2): closing [m] and theta [rad], written; turns: the rotation is free.
     """
-    m, waiting = body.x.size, cases.begin.size
-    for k in range(waiting):
-        cases.link[k] = cases.heads[cases.begin[k]]
-        cases.heads[cases.begin[k]] = k
-    a = low
-    while a < m and (a <= high or waiting > 0):
-        motions(body, a)
-        k = cases.heads[a]
-        while k >= 0:
-            after = cases.link[k]
-            if contact(body, cases, k, a, turns):
-                waiting -= 1
-                high = max(high, a + 1)
-            elif a + 1 < m and a + 1 < cases.begin[k] + tries:
-                cases.link[k] = cases.heads[a + 1]
-                cases.heads[a + 1] = k
-            else:
-                waiting -= 1
-            k = after
-        drop(body.upper, a, body.room[0])
-        a += 1
+    one, arm = body.side[0], body.side[1]
+    for k in range(stop.size):
+        load, moment, spring, row = target[k, 0], target[k, 1], target[k, 2], y[k]
+        if stop[k] == 0:
+            stop[k] = right_end(body, row, a, reach[k], load, moment, spring, turns)
+        end = max(stop[k], a)
+        for i in range(a, end):
+            load += row[i - a] * one[i]
+            moment += row[i - a] * arm[i]
+        closing, theta = rigid(load, moment, spring, turns, body.table[a], end) if end > a else (0.0, 0.0)
+        for i in range(a, end):
+            row[i - a] = closing * one[i] - theta * arm[i] - row[i - a]
+        row[end - a:] = 0.0
+        moved[k, 0], moved[k, 1] = closing, theta

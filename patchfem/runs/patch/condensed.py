@@ -13,7 +13,7 @@ from ...mesh.tensor import TensorGrid
 from ...model.pieces import layers_of
 
 LEAST_CACHED = 150  # interface nodes from which a condensed operator is kept on disk
-SHARED = 4  # geometries whose shared pieces are kept, either plane state counted
+SHARED = 16  # levels whose shared pieces are kept, of all geometries and of either plane state
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -106,16 +106,21 @@ def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
 
 
 def shared_pairs(asked) -> tuple:
-    """The condensed pieces of every level of a `PatchModel` that has `meshes`; those of the last patches are kept."""
+    """The condensed pieces of every level of a `PatchModel` that has `meshes`; those of the last levels are kept."""
+    return tuple(shared_pair(asked, level) for level in range(len(asked.meshes.levels)))
+
+
+def shared_pair(asked, level: int) -> Pair:
+    """The condensed pieces of one level of a `PatchModel`, as `shared_pairs` has them."""
     pieces = asked.lower, asked.upper, asked.plane, asked.width * asked.pairs
-    return _shared(Keyed(asked, (asked.meshes.name, *pieces)))
+    return _shared(Keyed(asked, (asked.meshes.name, *pieces)), level)
 
 
 def pair_beside(asked, pair: Pair) -> Pair:
     """The pieces of a `PatchModel` on the bodies of another Pair; kept where these are of meshes that it shares."""
     for k, level in enumerate(() if asked.meshes is None else asked.meshes.levels):
         if np.array_equal(level[0].x, pair.grid.x) and (level[1] is None) == (pair.upper is pair.piece):
-            return shared_pairs(asked)[k]
+            return shared_pair(asked, k)
     return condensed(asked, pair.grid, None if pair.upper is pair.piece else pair.upper_grid)
 
 
@@ -133,12 +138,12 @@ class Keyed:
 
 
 @lru_cache(maxsize=SHARED)
-def _shared(one: Keyed) -> tuple:
-    out = tuple(condensed(one.asked, *level) for level in one.asked.meshes.levels)
-    for piece in {id(part): part for pair in out for part in (pair.piece, pair.upper)}.values():
+def _shared(one: Keyed, level: int) -> Pair:
+    pair = condensed(one.asked, *one.asked.meshes.levels[level])
+    for piece in (pair.piece, pair.upper):
         if isinstance(piece, Piece) and not piece.rounding:
             piece.made.clear()  # factors are far larger than the compliance, and made again where fields are wanted
-    return out
+    return pair
 
 
 def _rise(body, x) -> np.ndarray:

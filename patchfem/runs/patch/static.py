@@ -17,7 +17,7 @@ from ...elasticity.lapack import one_thread
 from ...mesh.tensor import TensorGrid
 from ..results.patch_rows import TABLE
 from . import measures as one_by_one
-from .condensed import Pair, shared_pairs
+from .condensed import Pair, shared_pair, shared_pairs
 from .measures import Hidden, least_of, settled
 from .press import as_patch, with_linear_skin
 from .values import peak_pressure, vertex
@@ -247,7 +247,7 @@ def _in_other_plane(asked: Asked, known: LevelValues) -> tuple:
     """The patches on the second mesh in the other plane state, whose values in their own are known; () where nobody
     asks."""
     other = one_by_one.other_plane(asked.first)
-    return () if other is None else (pressed_on(asked._replace(first=other), shared_pairs(other)[1], known),)
+    return () if other is None else (pressed_on(asked._replace(first=other), shared_pair(other, 1), known),)
 
 
 def pressed_on(asked: Asked, pair: Pair, coarse: LevelValues | None = None) -> LevelValues:

@@ -107,8 +107,8 @@ def test_exact_a_wrong_contact_has_the_flaw_of_its_residual(name):
     good = body.press(gap[None], load, moment, spring)
     force, closing, theta = WRONG[name](good.force[0], good.closing[0], good.theta[0])
     given = force[None], np.array([closing]), np.array([theta])
-    opening, target = body._opening(gap, *given), np.array([[100.0, -0.3, spring]])
-    flaw = body._flaw(gap[None], given[0], opening, *given[1:], target, True)
+    bent, target = given[0] @ C, np.array([[100.0, -0.3, spring]])
+    flaw = body._flaw(gap[None], given[0], bent, body._opening(gap, bent, *given[1:]), *given[1:], target, True)
     wanted = residuals(C, X, gap, force, closing, theta, load[0], moment[0], spring)
     assert good.flaw < 1e-13 and 1e-4 < wanted[name] <= flaw[0] * (1 + 1e-9) <= max(wanted.values()) * (1 + 2e-9)
 
