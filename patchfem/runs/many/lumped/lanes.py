@@ -62,10 +62,15 @@ OF_LOOP = 4e-10  # least error of the area of a loop over its largest force and 
 OF_MIDDLE = 1e-6  # of the amplitude, by which its middle errs behind sliders or a stretch, of which no event is missed
 ORDERLY, SHOWN = 10.0, 0.25  # a change at half the steps that falls by this shows a high order, and is so much of it
 MORE, SETTLED = 10, 1e-5  # times its cycles marches what has not settled; change over a tenth of these that is left
+PACES = 0.25, 0.25, 0.5, *(MORE - 1) * (1.0,)  # of its cycles, after which it is asked whether it has
+# error of an extrapolated range over what the extrapolation says, and over the range at least: 1 of 571 erred more
+OF_STATED, OF_TAIL = 2.5, 7e-6
 # times twice as many cells as a run by itself has in a check of Iwan, and of its bars: 1 of 590 random cases erred more
 # than one, by 1.9
 FINER_CELLS, SHORT = 2, 2.0
 RING = "ring_frequency", "ring_damping"
+# of a measure, by which a coarser mesh that marches changes it at most: the loop of little slip may be all unknown
+WILD = ("relative_displacement_amplitude", 0.1), ("friction_force_peak", 0.1), ("loop_area", 10.0)
 DROPPED = 1e-2  # share of a loop by which another may be larger that is forgotten for want of room
 CHECKED, FEWEST = 200, 2  # one of so many cases is held against the exact engine, so many of a batch at least
 RINGS = 0.9 * 3 * np.pi  # angle that its spring turns in a stick, from which a ring is looked for
@@ -251,24 +256,31 @@ def answered(models: Sequence[Model], cases: tuple, steps, exactly: Callable) ->
 def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
     """(Answers of models, (n,) which must be run otherwise, steps a cycle (n,) of each, furthest (n,) [m] their output
     was) from steps (n,) on that many more are made of where bars miss the tolerance; all that march by the same steps
-    do so together, those for whose errors it is too. What a coarser mesh changes is told by the fewest steps."""
+    do so together, those for whose errors it is too. What a coarser mesh changes is told by the fewest steps, and by
+    more where that is so much that steps are too long for its start."""
     found, exact, steps = Answers.blank(len(models)), np.zeros(len(models), bool), steps.copy()
     reach = np.zeros(len(models))
     law, cycles, meshed = kind_of(models[0]), group(models[0])[0], {}
     shares = (2, 4) if march.flows(law) else (2,)
     fewest, coarser = steps // shares[-1], {}
     now = int(fewest.min())
+
+    def tell_mesh(places, fine: dict) -> None:
+        rough = _measured(law, *_of(cases[2], places), cycles, now)[0]
+        for name, error in _of_mesh(fine, rough).items():
+            meshed.setdefault(name, np.zeros(len(models)))[places] = error
+
     while (steps >= now).any():
         here = np.flatnonzero((fewest <= now) & (steps >= now))
         if here.size:
             part, ready = _of(cases, here), np.flatnonzero(steps[here] == now)
             seen, places = _measured(law, *part[:2], cycles, now), here[ready]
             coarser[now] = here, seen[0]
-            first = np.flatnonzero(fewest[here] == now) if part[2] is not None else []
-            if len(first):
-                rough = _measured(law, *_of(part[2], first), cycles, now)[0]
-                for name, error in _of_mesh(_of(seen[0], first), rough).items():
-                    meshed.setdefault(name, np.zeros(len(models)))[here[first]] = error
+            tells = fewest[here] == now
+            if meshed and ready.size:
+                tells[ready] |= _wild(_of(seen[0], ready), _of(meshed, places))
+            if cases[2] is not None and tells.any():
+                tell_mesh(here[tells], _of(seen[0], tells))
         if here.size and ready.size:
             fewer = [_of(values, np.searchsorted(whose, places)) for whose, values in (
                 coarser[now // share] for share in shares)]
@@ -280,6 +292,12 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
             steps[places[finer]] = 2 * now
         now *= 2
     return found, exact, steps, reach
+
+
+def _wild(values: dict, meshed: dict) -> np.ndarray:
+    """(n,) whether a coarser mesh changes a motion or its loop by more than a mesh does that is fine enough to march;
+    values, errors by name (n,)."""
+    return np.any([~(meshed[name] <= share * np.abs(values[name])) for name, share in WILD if name in meshed], axis=0)
 
 
 def _of(found, places):
@@ -463,40 +481,40 @@ def _settled(law: str, cases, found, steps: int, amplitudes, free) -> tuple:
     """((half the range of the slide that motions settle to [m], its error), (n,) each, NaN of those that need none;
     (n,) which of them do not show it after MORE times their cycles, nor by how they come near).
 
-    amplitudes (n, w) [m] of the output by windows; free: (n,) which may. They march on by as many cycles as they did,
-    each until it settles, so that what settles soon costs little.
+    amplitudes (n, w) [m] of the output by windows; free: (n,) which may. They march on by a part of as many cycles as
+    they did, later by all of these, each until it settles, so that what settles soon costs little.
     """
     out, part = np.full((2, len(free)), np.nan), found.history.shape[1]
     if amplitudes.shape[1] > 2:
         free = free & (np.ptp(amplitudes[:, -3:], axis=1) > CHANGES * TIGHTEST * amplitudes[:, -1])
     lost, where, motion = free.copy(), np.flatnonzero(free), found.motion[free]
-    history = np.empty((where.size, 0, 4))
-    for _ in range(MORE):
+    history = found.history[where]
+    for share in PACES:
         if not where.size:
             break
-        more, motion = march.march_on(law, _of(cases, where), motion, part, steps)
+        more, motion = march.march_on(law, _of(cases, where), motion, max(1, int(share * part)), steps)
         history = np.concatenate([history, more], axis=1)
         value, error = _known(history, part)
-        known = error < 10 * SETTLED * np.ptp(history[:, -1, :2], axis=1) / 2
+        near = 10 * SETTLED if history.shape[1] > MORE * part else 2 * SETTLED
+        known = error < near * np.ptp(history[:, -1, :2], axis=1) / 2
         out[:, where[known]], lost[where[known]] = (value[known], error[known]), False
         where, motion, history = where[~known], motion[~known], history[~known]
     return tuple(out), lost
 
 
 def _known(history, part: int) -> tuple:
-    """(half the range of the slide that motions settle to [m], its error, infinite where nothing tells it, (n,) each),
-    of their history (n, c, 4), the last `part` cycles of which have come since it was asked last: what these change it
-    by where they hardly do, and no more than those before them; in the end an extrapolation of windows."""
-    ranges = np.ptp(history[:, :, :2], axis=2) / 2
+    """(half the range of the slide that motions settle to [m], its error, NaN where nothing tells it, (n,) each), of
+    their history (n, c, 4) beyond `part` cycles: the last where so many cycles hardly change it, and no more than those
+    before them, else an extrapolation of windows, in the end of windows of `part` cycles."""
+    ranges, count = np.ptp(history[:, :, :2], axis=2) / 2, history.shape[1]
     last, left = ranges[:, -1], 2 * np.ptp(ranges[:, -part:], axis=1)
-    before = 2 * np.ptp(ranges[:, -2 * part:-part], axis=1) if ranges.shape[1] > part else np.inf
+    before = 2 * np.ptp(ranges[:, -2 * part:-part], axis=1) if count >= 2 * part else np.inf
     closes = (left < SETTLED * last) & (left <= np.maximum(before, 1e-9 * last))
-    value, error = last, np.full(len(last), np.inf)
-    if ranges.shape[1] == MORE * part:
-        ends = np.arange(MORE * part - 1, 0, -part)[::-1]
-        with np.errstate(all="ignore"):
-            value, error = steady_amplitudes(ranges[:, ends], history[:, ends, 2:] @ [1, 1j])
-    return np.where(closes, last, value), np.where(closes, left + 1e-9 * last, error)
+    ends = np.arange(count - 1, 0, -(part if count > MORE * part else window_of(part)))[::-1]
+    with np.errstate(all="ignore"):
+        value, error = steady_amplitudes(ranges[:, ends], history[:, ends, 2:] @ [1, 1j])
+    tail = np.maximum(OF_STATED * error, OF_TAIL * value)
+    return np.where(closes, last, value), np.where(closes, left + 1e-9 * last, tail)
 
 
 def cases_of(models, contacts=None) -> tuple:
