@@ -37,11 +37,12 @@ from .names_kernels import (
 )
 from .rigid_kernels import crossing, highest
 from .rigid_kernels import foretell as foretell
+from .rigid_kernels import settles as settles
 
 RESTS = TURNS_HELD = False  # it never holds
 # of its own state: friction, mean square of the stretches, friction work of the last step, whether that is read
 FELT, SQUARE, WORK, READS = range(OWN, OWN + 4)
-OWN_STATE = 4
+OWN_STATE, KEPT = 4, 2  # the friction and the mean square move on as a motion settles
 PARTS = 4  # of a step: a reversal and a kink on either side of it
 CORRECTED = 2  # times, by Newton, is the place of an event, which a cubic over a kink misses by the second order
 FINEST = 64  # parts of a step through a layer
@@ -124,6 +125,12 @@ def begin(room, i):
     """Set the friction of a lane that takes a case."""
     room[FELT * LANES + i] = felt(room[X * LANES + i], room[V * LANES + i], room[WAY * LANES + i],
                                   room[PLACE * LANES + i], 0.0, room, i)
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def resume(room, i):
+    """Set what follows from a motion that moved on."""
+    begin(room, i)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)

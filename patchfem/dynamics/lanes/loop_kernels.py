@@ -3,13 +3,14 @@
 Cost: some 2 ns a step and case on a core with vectors of eight numbers.
 """
 
-from math import nan
+from math import nan, sqrt
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 from . import rigid_kernels as law
 from .names_kernels import (
     ACCELERATION,
+    ALONG,
     BASE,
     BEGUN,
     C1,
@@ -18,6 +19,7 @@ from .names_kernels import (
     CLOSE,
     COS,
     CYCLE,
+    ENDS,
     EVENT,
     F_FIRST,
     F_LAST,
@@ -32,11 +34,13 @@ from .names_kernels import (
     LOST,
     LOW,
     MEAN,
+    NEAR,
     NUMBER,
     NUMBERS,
     OUT,
     OWN,
     PASSED,
+    PAST,
     PATH,
     PLACE,
     POWER,
@@ -57,8 +61,13 @@ from .names_kernels import (
     START_SIN,
     STARTS,
     STATE,
+    STATES,
     STICK,
     STUCK,
+    SUMS,
+    SURE,
+    SURE_SUM,
+    TOLD,
     TURNED,
     WAS_PLACE,
     WAS_V,
@@ -323,10 +332,106 @@ def repeats(i, room):
         and abs(room[PLACE * LANES + i] - room[WAS_PLACE * LANES + i]) <= size
 
 
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def changes(number, n, room, i):
+    """The last three changes of a number from cycle to cycle, the nth of those that are kept."""
+    last, one, two = room[number * LANES + i], room[(PAST + n) * LANES + i], room[(PAST + TOLD + n) * LANES + i]
+    return last - one, one - two, two - room[(PAST + 2 * TOLD + n) * LANES + i]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def remember(i, room):
+    """Keep how a cycle of a lane ends."""
+    for k in range(ENDS - 1, 0, -1):
+        for n in range(len(STATES) + len(SUMS) + law.KEPT):
+            room[(PAST + k * TOLD + n) * LANES + i] = room[(PAST + (k - 1) * TOLD + n) * LANES + i]
+    for n in range(len(STATES)):
+        room[(PAST + n) * LANES + i] = room[STATES[n] * LANES + i]
+    for n in range(len(SUMS)):
+        room[(PAST + len(STATES) + n) * LANES + i] = room[SUMS[n] * LANES + i]
+    for n in range(law.KEPT):
+        room[(PAST + len(STATES) + len(SUMS) + n) * LANES + i] = room[(OWN + n) * LANES + i]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def map_of(i, room, history, case, k, size):
+    """(a, b, whether they are sure) of the map of a cycle, by which each number changes in the next one: by a of its
+    last change and b of that before; size: range of a cycle.
+
+    Two numbers move on by a linear map near a motion that repeats. So a sequence of any number of theirs follows the
+    equation of its eigenvalues, which the slide and the speed give; what place and extremes miss of it tells what is
+    not linear, and falls as the square of what is left.
+    """
+    (x, x1, x2), (v, v1, v2), (p, p1, p2) = changes(X, 0, room, i), changes(V, 1, room, i), changes(PLACE, 2, room, i)
+    way = room[WAY * LANES + i]
+    alike = max(abs(x), abs(v)) < NEAR * size and law.settles(room, i)
+    for n in range(ENDS):
+        alike = alike and room[(PAST + n * TOLD + 3) * LANES + i] == way
+    if not alike:
+        return 0.0, 0.0, False
+    cross, square = x1 * v2 - v1 * x2, x1 * x1 + v1 * v1
+    if cross * cross > ALONG * square * (x2 * x2 + v2 * v2):
+        a, b = (x * v2 - v * x2) / cross, (x1 * v - v1 * x) / cross
+    else:
+        a, b = (x * x1 + v * v1) / square, 0.0
+    miss = max(abs(x - a * x1 - b * x2), max(abs(v - a * v1 - b * v2), abs(p - a * p1 - b * p2)))
+    for n in range(4):
+        last, one, two = history[case, k - 1, n], history[case, k - 2, n], history[case, k - 3, n]
+        miss = max(miss, abs(last - one - a * (one - two) - b * (two - history[case, k - 4, n])))
+    root = a * a + 4 * b
+    slow = 0.5 * (abs(a) + sqrt(root)) if root > 0.0 else sqrt(-b)
+    part = (1 - slow) * (1 - slow * slow)  # what it misses now over what it misses in all
+    sure = slow < 1.0 and miss < SURE * size * part
+    for n in range(len(SUMS)):
+        last, one, two = changes(SUMS[n], len(STATES) + n, room, i)
+        three = room[(PAST + 2 * TOLD + len(STATES) + n) * LANES + i] \
+            - room[(PAST + 3 * TOLD + len(STATES) + n) * LANES + i]
+        miss = abs(last - one - a * (one - two) - b * (two - three))
+        sure = sure and miss <= SURE_SUM * abs(room[SUMS[n] * LANES + i]) * part * (1 - slow)
+    return a, b, sure
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def leap(i, room, history, case, k, until):
+    """Cycles done, after k of them, of a lane whose motion goes on by the map of its cycle up to the cycle `until`, or
+    to one that repeats; k where it does not."""
+    size = history[case, k - 1, 1] - history[case, k - 1, 0]
+    if k <= ENDS:
+        return k
+    a, b, sure = map_of(i, room, history, case, k, size)
+    if not sure:
+        return k
+    # the changes after n cycles are p and q of the last two, all of them c and d, and what sums miss of these e and f
+    p, q, p1, q1, c, d, e, f, n = 1.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0
+    (x, x1, _), (v, v1, _) = changes(X, 0, room, i), changes(V, 1, room, i)
+    begun, more = k - 1, True
+    while more:
+        p, q, p1, q1 = a * p + b * p1, a * q + b * q1, p, q
+        c, d, n = c + p, d + q, n + 1
+        e, f = e + c, f + d
+        for m in range(4):
+            last, one, two = history[case, begun, m], history[case, begun - 1, m], history[case, begun - 2, m]
+            history[case, begun + n, m] = last + c * (last - one) + d * (one - two)
+        left = max(abs(p * x + q * x1), abs(p * v + q * v1))
+        more = begun + n + 1 < until and left > CLOSE * size
+    for m in range(len(SUMS)):
+        last, one, two = changes(SUMS[m], len(STATES) + m, room, i)
+        room[SUMS[m] * LANES + i] += n * last + e * (last - one) + f * (one - two)
+    for m in range(len(STATES) - 1):
+        last, one, _ = changes(STATES[m], m, room, i)
+        room[STATES[m] * LANES + i] += c * last + d * one
+    for m in range(law.KEPT):
+        last, one, _ = changes(OWN + m, len(STATES) + len(SUMS) + m, room, i)
+        room[(OWN + m) * LANES + i] += c * last + d * one
+    room[HIGH * LANES + i] = room[LOW * LANES + i] = room[X * LANES + i]
+    law.resume(room, i)
+    return k + n
+
+
 @njit(error_model="numpy", cache=True, nogil=True, fastmath=FAST, **LEAN)
 def march(cases, order, motion, table, until, history, ended, room, marked):
-    """March cases up to the end of the cycle `until`, or of one that repeats. A lane that is done takes the next case,
-    or that of the last lane.
+    """March cases up to the end of the cycle `until`, or of one that repeats; a case leaps on once the map of its cycle
+    is known. A lane that is done takes the next case, or that of the last lane.
 
     cases (n, NUMBERS and those of its table); order (m,): numbers of those that march; motion (n, STATE and more): at
     their begin, and end; table (3, s + 1): sine and cosine at the steps of a cycle, and the step; history (n, c, 4):
@@ -344,11 +449,13 @@ def march(cases, order, motion, table, until, history, ended, room, marked):
             case, k = int(room[CASE * LANES + i]), int(room[CYCLE * LANES + i])
             same = repeats(i, room)
             turn_over(i, room, history, case, k, share)
-            room[CYCLE * LANES + i] = k + 1
-            if k + 1 < until and not same:
+            done = leap(i, room, history, case, k + 1, until) if k + 1 < until and not same else k + 1
+            room[CYCLE * LANES + i] = done
+            if done < until and not same and done == k + 1:
+                remember(i, room)
                 i += 1
                 continue
-            ended[case] = k + 1
+            ended[case] = done
             bring(case, i, room, motion)
             if given < len(order):
                 fetch(order[given], i, cases, motion, room)

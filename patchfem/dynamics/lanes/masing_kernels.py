@@ -14,11 +14,34 @@ friction. Twin: many elements, from event to event (`dynamics.events`).
 from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 from . import power_curve_kernels as curve
-from .names_kernels import CURVE, GK, HALF, LANES, LENGTH, OWN, PLACE, WAY, WHERE, D, H, K, P, V, W, X
+from .names_kernels import (
+    CURVE,
+    ENDS,
+    GK,
+    HALF,
+    LANES,
+    LENGTH,
+    OWN,
+    OWN_MOST,
+    PAST,
+    PLACE,
+    STATES,
+    SUMS,
+    TOLD,
+    WAY,
+    WHERE,
+    D,
+    H,
+    K,
+    P,
+    V,
+    W,
+    X,
+)
 from .rigid_kernels import folds, furthest, sticking
 
-__all__ = ["RESTS", "TURNS_HELD", "advance", "ahead", "at_turn", "begin", "felt", "folds", "foretell", "furthest",
-           "held", "path", "rise", "slid", "sticking"]
+__all__ = ["KEPT", "RESTS", "TURNS_HELD", "advance", "ahead", "at_turn", "begin", "felt", "folds", "foretell",
+           "furthest", "held", "path", "resume", "rise", "settles", "slid", "sticking"]
 
 RESTS = False  # it never holds
 TURNS_HELD = True  # an event may leave a stick as it is
@@ -31,7 +54,8 @@ TURNS_HELD = True  # an event may leave a stick as it is
 (SIDE, M, FROM, HELD, SLIP_FROM, ENERGY_FROM, NEXT, STIFF, STIFF_0, STIFF_1, STIFF_2, STIFF_3, GONE, AT_TURN, EVER,
  VIRGIN, ALL, DROPPED, BEHIND, STUCK_IN, PER, WHOLE) = range(OWN, OWN + 22)
 STACK, EACH = OWN + 22, 4  # those points: slide, friction, irreversible slide and energy of each
-DEPTH = (CURVE - STACK) // EACH
+DEPTH, KEPT = (CURVE - STACK) // EACH, OWN_MOST  # those that move on as a motion settles: the first of these points
+FORM = SIDE, M, VIRGIN, ALL, BEHIND  # numbers that stay as they are then
 OWN_STATE = CURVE - OWN + curve.ROOM
 LEAST = 1e-30  # of w
 CLOSE = 1e-9  # of a step, by which Newton's last goes: what is left is of its square
@@ -46,6 +70,24 @@ def begin(room, i):
     length = room[LENGTH * LANES + i]
     room[PER * LANES + i] = room[SIDE * LANES + i] / (room[M * LANES + i] * length)
     room[WHOLE * LANES + i] = room[K * LANES + i] * length / room[GK * LANES + i]
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def settles(room, i):
+    """Whether the same points have been behind at the ends of the last cycles, and all of them are kept."""
+    same = STACK + EACH * room[BEHIND * LANES + i] <= OWN + KEPT
+    for k in range(ENDS):
+        for n in FORM:
+            before = room[(PAST + k * TOLD + len(STATES) + len(SUMS) + n - OWN) * LANES + i]
+            same = same and before == room[n * LANES + i]
+    return same
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def resume(room, i):
+    """Set what follows from a motion that moved on."""
+    begin(room, i)
+    curve.begin_at(within(room[X * LANES + i], room, i), room, i)
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)

@@ -7,6 +7,9 @@ drive, so forces over the mass are in m and energies over it in m^2.
 
 LANES, GROUP = 32, 3  # of which groups of two to this power march while one of them has a case
 CLOSE = 1e-9  # of the range of a cycle, by which the next one may differ that is the same
+# of the range of a cycle: the change over one from which it may settle as a linear map does; by how much the end of the
+# run is missed if it does, and by how much of the sums; square of the sine up to which two changes have one direction
+NEAR, SURE, SURE_SUM, ALONG = 1e-2, 1e-7, 1e-6, 1e-6
 
 # the motion: state, then sums of the run, then extremes and phasor of a cycle; whether the next step holds an event
 X, V, WAY, PLACE, PATH, IN, LOST, POWER, HIGH, LOW, COS, SIN, EVENT = range(13)
@@ -31,7 +34,12 @@ SHOWN = 28
 
 # which case a lane has, its cycle and where that began
 CASE, CYCLE, WAS_X, WAS_V, WAS_PLACE = range(SHOW + SHOWN, SHOW + SHOWN + 5)
-OWN = SHOW + SHOWN + 5  # from here on what the state of a law has besides; it stands behind STATE in a motion
+
+# at the ends of the last cycles but the one that ends: what tells how a motion settles, numbers of the state and sums,
+# then those of its law
+STATES, SUMS, OWN_MOST, ENDS = (X, V, PLACE, WAY), (PATH, IN, LOST, POWER), 38, 4
+PAST, TOLD = SHOW + SHOWN + 5, 8 + OWN_MOST
+OWN = PAST + ENDS * TOLD  # from here on what the state of a law has besides; it stands behind STATE in a motion
 
 # of Masing's rule: the number from which half of its friction slips, over LENGTH; from where on its curve has a table,
 # and the place on it that is to be found

@@ -10,6 +10,7 @@ from .names_kernels import A11, A12, A21, A22, CV, CX, GK, GS, LANES, RV, RX, SV
 
 RESTS = True  # nothing moves in a stick
 TURNS_HELD = False  # an event may leave a stick as it is
+KEPT = 0  # of the first numbers of its own state, those that move on as a motion settles
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -101,6 +102,18 @@ def held(begin, end, way, room, i, h):
 @njit(error_model="numpy", forceinline=True, **LEAN)
 def begin(room, i):
     """Set what a law has of its own state by the common one when a lane takes a case: nothing."""
+
+
+@njit(error_model="numpy", forceinline=True, **LEAN)
+def settles(room, i):
+    """Whether the memory of a lane has had the same form at the ends of the last cycles, so that its numbers can move
+    on as the motion does."""
+    return True
+
+
+@njit(error_model="numpy", forceinline=True, **LEAN)
+def resume(room, i):
+    """Set what follows from the common state and from the numbers that moved on with it: nothing."""
 
 
 @njit(error_model="numpy", **LEAN)

@@ -40,10 +40,23 @@ from .names_kernels import (
     W,
     X,
 )
-from .rigid_kernels import begin, crossing, folds, foretell, furthest, held, path, slid, sticking
+from .rigid_kernels import (
+    KEPT,
+    begin,
+    crossing,
+    folds,
+    foretell,
+    furthest,
+    held,
+    path,
+    resume,
+    settles,
+    slid,
+    sticking,
+)
 
-__all__ = ["RESTS", "TURNS_HELD", "advance", "ahead", "at_turn", "begin", "felt", "folds", "foretell", "furthest",
-           "held", "path", "rise", "slid", "sticking"]
+__all__ = ["KEPT", "RESTS", "TURNS_HELD", "advance", "ahead", "at_turn", "begin", "felt", "folds", "foretell",
+           "furthest", "held", "path", "resume", "rise", "settles", "slid", "sticking"]
 
 RESTS = False  # a stick moves its spring
 TURNS_HELD = False

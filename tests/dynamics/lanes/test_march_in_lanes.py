@@ -192,6 +192,26 @@ def test_exact_sliders_are_cells_side_by_side(name):
             law.look_ahead(place, room, 0)
 
 
+LEAPS = "rigid", "yielding", "masing", "table", FLOWS[1]  # each march of a law by itself compiles it
+
+
+@pytest.mark.parametrize("law", LEAPS)
+def test_exact_a_case_leaps_to_where_it_would_march(law):
+    """Motion, extremes and phasors of a march that leaps are those of a march by three cycles at a time, which never
+    leaps."""
+    some, cycles = cases(law, 60, 11), 150
+    begun = run.begun_at(law, some)
+    history, motion = run.march_on(law, some, begun, cycles, 96)
+    parts, step = [], begun
+    for _ in range(cycles // 3):
+        part, step = run.march_on(law, some, step, 3, 96)
+        parts.append(part)
+    sizes, apart = np.ptp(history[:, -1, :2], axis=1), np.abs(history - np.concatenate(parts, axis=1)).max(axis=(1, 2))
+    assert np.all(apart < 2e-6 * sizes) and np.mean(apart > 0) > 0.5
+    for place in (at.X, at.V, at.PLACE):
+        assert np.all(np.abs(motion - step)[:, place] < 2e-6 * sizes)
+
+
 @pytest.mark.share(*ALWAYS)
 @pytest.mark.parametrize("law", LAWS)
 def test_exact_lanes_are_the_text_as_python(law, monkeypatch):

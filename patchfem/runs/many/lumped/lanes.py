@@ -569,7 +569,8 @@ def window_of(cycles: int) -> int:
 def _measured(law: str, cases, c: dict, cycles: int, steps: int) -> tuple:
     """(values, books, Marched, extremes of the output (n, c, 2) [m], rise of the force [N]) of a march."""
     found, window = march.march(law, cases, cycles, window_of(cycles), steps), window_of(cycles)
-    extremes = np.sort(found.history[:, :, :2] * c["ratio"][:, None, None], axis=2)
+    extremes = found.history[:, :, :2] * c["ratio"][:, None, None]
+    extremes[c["ratio"] < 0] = extremes[c["ratio"] < 0, :, ::-1]
     book = reading.books(law, cases, found, c["energy"])
     seen = reading.reading_of(law, cases, found, c["energy"], c["omega"], extremes[:, -window:])
     with np.errstate(all="ignore"):
