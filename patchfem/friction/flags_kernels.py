@@ -9,8 +9,8 @@ from ..compiled.inner import INNER, LEAN, njit
 
 FAST = {"reassoc", "contract", "arcp"}
 SET_VALUED = False  # whether a law holds without a stretch
-# of a law in lanes: whether its slope has a kink at no stretch; whether its stretch follows the slide in closed form,
-# `after`; whether its force changes within a layer of the speed, `parts`
+# of a law in lanes: whether its slope has a kink at no stretch; whether its stretch follows the slide alone, `after`;
+# whether its force changes within a layer of the speed, `parts`
 BENDS = FOLLOWS = LAYERS = False
 
 

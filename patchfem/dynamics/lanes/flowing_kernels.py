@@ -90,7 +90,7 @@ def path(place, pe, place1, v1, room, i):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def followed(k, z, far, rises, way):
-    """Stretch after a slide `far` that raises it by `rises`, in closed form where the law has one."""
+    """Stretch after a slide `far` that raises it by `rises`, by the law itself where the slide alone tells."""
     return friction.after(k, z, 0.0, far, way)[0] if friction.FOLLOWS else z + rises
 
 

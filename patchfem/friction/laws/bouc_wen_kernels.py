@@ -10,12 +10,13 @@ from math import exp, expm1, inf, log, log1p, nan
 import numpy as np
 
 from ...compiled.inner import njit
-from ..flags_kernels import FAST, FOLLOWS, LAYERS, LEAN, SET_VALUED, after, closed, gives, knee, longest, middle, parts
+from ..flags_kernels import FAST, LAYERS, LEAN, SET_VALUED, closed, gives, knee, longest, middle, parts
+from .exponential_kernels import decay
 
 __all__ = ["BENDS", "FOLLOWS", "LAYERS", "SET_VALUED", "after", "begin", "closed", "commit", "finish", "flow",
            "flowing", "gives", "knee", "longest", "mean", "middle", "parts", "pull", "rate", "shown", "state"]
 
-UNITS, BENDS = "N m 1 1", True  # of the numbers k of the law in lanes; as of `flags_kernels`
+UNITS, BENDS, FOLLOWS = "N m 1 1", True, True  # of the numbers k of the law in lanes; as of `flags_kernels`
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(8)
 PIECE = 0.25  # longest piece of a Gauss rule, in -y or w
@@ -140,6 +141,38 @@ def flowing(k, z, v, way):
     `way`, slopes of the force over stretch [N/m] and speed, 0); k: limit [N], eps [m], n, s."""
     stiffness = k[0] / k[1]
     return stiffness * z, slope(way * z / k[1], k[2], k[3]), stiffness, 0.0
+
+
+@njit(error_model="numpy", **LEAN)
+def quickly(u, n, s):
+    """dw/dx of w = -ln(u), u = 1 - y: `slope` over u, between 1/2 and n, so that any step in x is stable."""
+    return n * (1 - 0.5 * (n - 1) * u) if u < 1e-5 else slope(1 - u, n, s) / u
+
+
+@njit(error_model="numpy", **LEAN)
+def along_knee(u, x, n, s):
+    """(u, integral of u over x) after a slide x in lengths eps, u = 1 - y: a step of Runge and Kutta's order 4 in w =
+    -ln(u), and Simpson's rule over u, whose integrand is one over the pace of w."""
+    k0 = quickly(u, n, s)
+    k1 = quickly(u * decay(0.5 * x * k0), n, s)
+    k2 = quickly(u * decay(0.5 * x * k1), n, s)
+    k3 = quickly(u * decay(x * k2), n, s)
+    end = u * decay(x * (k0 + 2 * (k1 + k2) + k3) / 6)
+    return end, (u - end) / 6 * (1 / k0 + 4 / quickly(0.5 * (u + end), n, s) + 1 / quickly(end, n, s))
+
+
+@njit(error_model="numpy", forceinline=True, **LEAN)
+def after(k, z, square, dx, way):
+    """(stretch [m], its square [m2], work of its force [J]) after a slide dx [m] of any length in the direction `way`:
+    exact for n = 1 above zero, else of order 4."""
+    u, x, n = 1 - way * z / k[1], way * dx / k[1], k[2]
+    if n == 1.0 and u <= 1.0 and x >= 0.0:
+        end = u * decay(x)
+        left = u - end
+    else:
+        end, left = along_knee(u, x, n, k[3])
+    stretch = way * k[1] * (1 - end)
+    return stretch, stretch * stretch, k[0] * k[1] * (x - left)
 
 
 @njit(error_model="numpy", **LEAN)

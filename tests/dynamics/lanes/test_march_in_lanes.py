@@ -90,6 +90,27 @@ def test_exact_bonds_of_lanes_follow_a_slide_in_closed_form(way):
         np.testing.assert_allclose(np.gradient(found, x)[1:-1], rate[1:-1], rtol=0, atol=1e-5)
 
 
+@pytest.mark.parametrize("exponent, begin", [(1.0, 0.2), (1.0, -0.9), (1.5, 0.2), (4.0, 0.2), (4.0, -0.9)])
+def test_order_bouc_wen_of_lanes_follows_a_slide(exponent, begin):
+    """Stretch and work of many slides are those of the integral over the slide: exact where the way to the limit is an
+    exponential, else of order 4. After one long slide the stretch is its limit, and the work that of the limit."""
+    text, length, limit, shape = plain("patchfem.friction.laws.bouc_wen_kernels"), 0.2, 3.0, 0.8
+    misses, k, way = [], (limit, length, exponent, shape), -1.0
+    for count in (4, 8, 16):
+        z, work = way * length * begin, 0.0
+        for _ in range(count):
+            z, square, part = text.after(k, z, 0.0, way * length * 0.5 / count, way)
+            work += part
+        y, area = text.along(begin, 0.5, exponent, shape)
+        misses.append(max(abs(way * z / length - y), abs(work / (limit * length) - area)))
+        assert square == z * z
+    exact = exponent == 1.0 and begin > 0
+    assert max(misses) < 1e-12 if exact else misses[0] < 2e-4 and np.log2(misses[1] / misses[2]) > 3.6
+    far = text.after(k, way * length * begin, 0.0, way * length * 1e5, way)
+    assert far[0] == pytest.approx(way * length, rel=1e-12)
+    assert far[2] == pytest.approx(limit * length * text.along(begin, 1e5, exponent, shape)[1], rel=1e-5)
+
+
 @pytest.mark.parametrize("exponent", [1.0, 2.0])
 def test_exact_a_kink_is_found_inside_a_step(exponent, monkeypatch):
     """A step in which the stretch of Bouc-Wen passes 0, anywhere: its end and the slide where the irreversible
@@ -125,12 +146,15 @@ def test_exact_a_kink_is_found_inside_a_step(exponent, monkeypatch):
 
 
 @pytest.mark.share(0)
-@pytest.mark.parametrize("law, size, most", [(FLOWS[0], 0.005, 1e-5), (FLOWS[1], 0.0033, 1e-4)])
+@pytest.mark.parametrize("law, size, most", [(FLOWS[0], 0.005, 1e-5), (FLOWS[1], 0.0033, 1e-4),
+                                             (FLOWS[2], 0.0033, 2e-4)])
 def test_always_a_thin_layer_needs_no_fine_steps(law, size, most):
     """A speed of reference of 1/200 of the speed, a bond length of 1/300 of the slide: so well do 128 steps a cycle
     know the amplitude. Without parts of a step tanh erred by up to 1e-3, by rates of the stretch bonds ran away."""
     some, tanh = cases(law, 40), law == FLOWS[0]
     numbers = np.stack([some.slip, 0 * some.slip + 1 / size] if tanh else [some.slip / size, 0 * some.slip + size], 1)
+    if law == FLOWS[2]:
+        numbers = np.stack([some.slip, *(0 * some.slip + one for one in (size, 1.0, 0.5))], 1)
     some = some._replace(law=numbers, length=0 * some.slip + (0 if tanh else size),
                          spring=0 * some.slip if tanh else some.slip / size)
     reach = [np.ptp(run.march(law, some, 40, 4, steps).history[:, -4:, :2], axis=(1, 2)) / 2 for steps in (128, 2048)]
