@@ -85,7 +85,12 @@ def test_figure_14_curve_of_the_study(tmp_path):
 @pytest.mark.share(1)
 @pytest.mark.parametrize("words", [(), ("--set", "contact.element_size=64 um")])
 def test_exact_the_table_of_the_mesh_is_what_the_command_prints(words, tmp_path, monkeypatch):
-    """Errors to every digit printed; seconds hang on the machine, and their ratios to a third or three times."""
+    """Errors to every digit printed; seconds hang on the machine, and their ratios to a third or three times.
+
+    Round-off moves these errors by less than 1e-4 of themselves, except with cells of order 4 (tolerances of 1e-4 and
+    1e-5): there a node at the edge of the contact bears or not by round-off, and with three sets of BLAS kernels the
+    error of the contact fraction is 1.8e-6, 2.2e-6 and 2.3e-6.
+    """
     monkeypatch.setattr("patchfem.campaigns.cost.TIMINGS", 1)
     said = cli("cost", STUDIES / "rig/pieces.toml", *words, "-o", tmp_path, "-q")
     assert said.code == 0, said.err
@@ -93,7 +98,12 @@ def test_exact_the_table_of_the_mesh_is_what_the_command_prints(words, tmp_path,
     (names, ours, said), (printed, theirs, sentence) = (table(one) for one in (said.out.split("results:")[0],
                                                                                blocks[bool(words)]))
     assert names == printed and re.sub(r"[\d.]+ CPU s", "", said) == re.sub(r"[\d.]+ CPU s", "", sentence)
-    assert [row[::2] for row in ours] == [row[::2] for row in theirs] and len(ours) in (3, 6)
+    assert [label for label, *_ in ours] == [label for label, *_ in theirs] and len(ours) in (3, 6)
+    errors, known = ([cells for *_, cells in rows] for rows in (ours, theirs))
+    if not words:
+        last, printed = ([float(cell.split()[0]) for cell in cells.pop()] for cells in (errors, known))
+        assert last == pytest.approx(printed, rel=0.3)
+    assert errors == known
     ratios = np.array([float(one[1]) / float(other[1]) for one, other in zip(ours, theirs, strict=True)])
     assert (np.abs(np.log(ratios / np.median(ratios))) < np.log(3)).all()
 
