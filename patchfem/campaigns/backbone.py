@@ -15,7 +15,7 @@ import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
 from ..compiled import load
-from ..core import NotConverged, Outcome, PatchfemError, Start, say
+from ..core import NotConverged, PatchfemError, Start, say
 from ..dynamics import limit_cycles
 from ..dynamics.events.elements import JOINED, cells_joined
 from ..dynamics.harmonic import quasi_static
@@ -30,7 +30,7 @@ from ..friction.record import loop_from
 from ..model.model import Model
 from ..model.slide import SlidePath
 from ..model.source import placed
-from ..response import ring_down
+from ..response.decay_curve import DecayCurve, curve_of, of_turns, turns
 from ..response.errors import OF_MODES, with_errors
 from ..runs.bench import bench
 from ..runs.bench.engine import steps_of
@@ -67,12 +67,11 @@ SLIDES = 60  # tries of the slides whose static motion has the amplitudes that a
 CLOSE = 1e-7  # of an amplitude, within which a free motion is at it
 PLAIN, BALANCED = (1e-6, 1e-3, 4), 8  # amplitudes [m] of a linear rig; steps to the damping that keeps it swinging
 SIZED, SLOW = 8, 0.1  # steps to a motion that has the amplitude asked for; least slope of both amplitudes that is taken
-CYCLES = (50.0, 200.0, 800.0)  # lengths of a decay that are tried
+SHORT, LONGEST = 50, (12800, 3200)  # cycles of a first decay; of the longest, of one mode and where several ring
 STARTS = 12  # amplitudes on the way to the free motion that a release begins in
-DENSE = 400.0  # of them where several modes ring, whose samples are all kept
 BESIDE = 1.15  # the release over the largest amplitude: the first swings still show how it began
+HIGHER, BELOW = 3, 0.8  # releases from higher up; share of the smallest amplitude down to which coarser runs come, too
 FINER = 3  # doublings of the steps of a decay
-DOWN = (1, 3)  # half swings of a reading, and of the one that shows how much the decay bends
 
 
 UNKNOWN = ('bonds have a closed-form friction loop only with reading = "stretch", order = 1, constant bond length, no '
@@ -662,21 +661,12 @@ def _loop(joint: Joint, slide: float, frequency: float, cycles: float) -> tuple:
 
 def _decayed(joint: Joint, amplitudes) -> Curve:
     """Curve of a release from the largest amplitude, read from turn to turn, as far as it comes down."""
-    model = released(joint, min(BESIDE * float(amplitudes[-1]), joint.model.rig.travel))
-    for cycles in CYCLES:
-        many = joint.modes.omega.size > 1
-        what = replace(model, rig=replace(model.rig, cycles=min(cycles, DENSE) if many else cycles))
-        how = numerics.choose(what)
-        how = replace(how, window=int(what.rig.cycles)) if many else how
-        engine = ENGINES[how.engine]
-        found = engine.run(what, how, joint.patch, 0, None, None)
-        read = _read(joint, found)[0]
-        if found.outcome is Outcome.STUCK or not read.whole or read.amplitude[-1] < amplitudes[0]:
-            break
+    what, how, found = _come_down(joint, amplitudes)
+    engine, tolerance = ENGINES[how.engine], joint.model.accuracy.tolerance
     for tried in range(FINER + 1):
         best, reading, error = _with_errors(joint, what, how, found, amplitudes)
         known = np.isfinite(best + error).all(axis=0)
-        small = (error <= np.maximum(model.accuracy.tolerance * np.abs(best), reading)).all(axis=0)
+        small = (error <= np.maximum(tolerance * np.abs(best), reading)).all(axis=0)
         if (known.any() and small[known].all()) or tried == FINER or \
                 not engine.in_time(what, how, joint.patch) or "steps_per_cycle" in how.pinned:
             break
@@ -686,6 +676,32 @@ def _decayed(joint: Joint, amplitudes) -> Curve:
     if not known.any():
         raise NotConverged("the free decay gave no frequency and damping at these amplitudes")
     return Curve(amplitudes, best[0], error[0], best[1], error[1], np.full(amplitudes.size, np.nan)).at(known)
+
+
+def _come_down(joint: Joint, amplitudes) -> tuple:
+    """(Model, numerics, Solution) of a release that is long enough to come down from the largest amplitude to the
+    smallest, as far as it swings on. It begins so high that its first reading lies above the largest."""
+    travel, many = joint.model.rig.travel, joint.modes.omega.size > 1
+    begin, cycles, tries = min(BESIDE * float(amplitudes[-1]), travel), SHORT, 0
+    while True:
+        model = released(joint, begin)
+        what = replace(model, rig=replace(model.rig, cycles=float(cycles)))
+        how = numerics.choose(what)
+        if many or not _rigid(joint.model):  # a contact that holds on its spring has no events, and no other samples
+            how = replace(how, window=int(cycles))
+        found = ENGINES[how.engine].run(what, how, joint.patch, 0, None, None)
+        read = _read(joint, found)
+        if not read.time.size:
+            return what, how, found
+        high, low, zeta = read.amplitude[0], read.amplitude[-1], read.damping[-1]
+        if high < amplitudes[-1] and begin < travel and tries < HIGHER:
+            begin, tries = min(begin * BESIDE * amplitudes[-1] / high, travel), tries + 1
+        elif low <= BELOW * amplitudes[0] or cycles >= LONGEST[many] or \
+                read.time[-1] < found.response.time[-1] - 3 / read.frequency[-1]:  # it has come to rest
+            return what, how, found
+        else:
+            further = np.log(low / (BELOW * amplitudes[0])) / (2 * np.pi * zeta) if zeta > 0 else np.inf
+            cycles = int(min(np.clip(cycles + further, 2 * cycles, 8 * cycles), LONGEST[many]))
 
 
 def released(joint: Joint, amplitude: float) -> Model:
@@ -719,32 +735,30 @@ def _start(joint: Joint, amplitude: float) -> Start:
     return Start(joint.held[1] * amplitude / joint.reach, still)
 
 
-def _read(joint: Joint, found) -> tuple:
-    """(RingDown of every swing, of every third one) of a Solution; beside other modes it turns when the part of the
-    motion along the held shape does, which rings least."""
+def _read(joint: Joint, found) -> DecayCurve:
+    """The curve of a Solution; beside other modes it turns when the part of the motion along the held shape does, which
+    rings least."""
     motion, shape = found.response, joint.held[1]
-    place, rate = motion.output, motion.output_rate
-    if shape.size > 1:
-        place, rate = (part @ shape for part in (motion.modal, motion.modal_rate))
-    times, places = ring_down.turns(motion.time, place, rate)
-    if shape.size > 1 and times.size:
+    if shape.size == 1:
+        return curve_of(of_turns(*turns(motion.time, motion.output, motion.output_rate)))
+    times, places = turns(motion.time, *(part @ shape for part in (motion.modal, motion.modal_rate)))
+    if times.size:
         places = CubicHermiteSpline(motion.time, motion.output, motion.output_rate)(times)
-    return tuple(ring_down.ring_down(times, places, every) for every in DOWN)
+    return curve_of(of_turns(times, places))
 
 
 def _with_errors(joint: Joint, what: Model, how, found, amplitudes) -> tuple:
-    """((2, k) frequency [Hz] and damping at amplitudes (k,) of a release, (2, k) what reading them from three times the
-    swings, or half of them, changes, (2, k) what coarser runs change)."""
-    engine, read, made = ENGINES[how.engine], _read(joint, found), {}
-    best = np.array(read[0].at(amplitudes))
-    reading = np.abs(np.array(read[1].at(amplitudes)) - best)
-    reading = np.fmax(reading, read[0].bend(amplitudes))
-    reading, error = np.where(np.isfinite(reading), reading, 0.0), ROUND * np.abs(best)
+    """((2, k) frequency [Hz] and damping at amplitudes (k,) of a release, (2, k) what reading them leaves open, (2, k)
+    what coarser runs change)."""
+    engine, read, made = ENGINES[how.engine], _read(joint, found).over(amplitudes), {}
+    best = np.array([read.frequency, read.damping])
+    reading, error = np.array([read.frequency_error, read.damping_error]), ROUND * np.abs(best)
 
     def curve(variant) -> np.ndarray:
         if variant not in made:
             run = engine.run(what, replace(variant.numerics, whole=True), variant.patch, 0, None, None)
-            made[variant] = np.array(_read(joint, run)[0].at(amplitudes))
+            one = _read(joint, run).over(amplitudes)
+            made[variant] = np.array([one.frequency, one.damping])
         return made[variant]
 
     ways = [*engine.in_time(what, how, joint.patch), *engine.in_space(what, how, joint.patch, joint.coarse, found)]

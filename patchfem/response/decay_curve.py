@@ -1,9 +1,11 @@
 """Frequency and damping of a decay over its amplitude with intervals, from its half swings, computed or measured.
 
-Half swing k has a middle t_k and a size S_k, from turn to turn. Over 2 m + 1 of them the slope of ln S_k tells the
-logarithmic decrement of half a cycle, pi zeta/(1 - zeta^2)^(1/2), the slope of t_k half a period. Of a viscous decay
-both are exact for any m, of any other they are means over the span. What noise leaves falls with m^(-3/2), what the
-bend leaves grows with m^2: the span is the longest whose value those of all shorter ones allow (Lepski 1991).
+A computed motion has its turns by the cubic between samples (`turns`), a measured one its half swings by a sine fitted
+to each (`identify.swings`). Half swing k has a middle t_k and a size S_k, from turn to turn. Over 2 m + 1 of them the
+slope of ln S_k tells the logarithmic decrement of half a cycle, pi zeta/(1 - zeta^2)^(1/2), the slope of t_k half a
+period. Of a viscous decay both are exact for any m, of any other they are means over the span. What noise leaves falls
+with m^(-3/2), what the bend leaves grows with m^2: the span is the longest whose value those of all shorter ones allow
+(Lepski 1991).
 """
 
 from typing import NamedTuple
@@ -14,8 +16,10 @@ SPANS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)  # half sw
 APART = 2.0  # standard deviations by which the values of two spans may differ
 SURE = 2.5  # standard deviations of an interval of 95 %, with what choosing the span adds
 BESIDE = 8  # half swings on both sides whose third differences show noise
-FEWEST = 3  # half swings of a curve
 ROUND = 1e-12  # of a value, what round-off leaves
+REST = 1e-12  # of the largest speed, one below which a sample is a turn itself
+FAINT = 1e-9  # of the largest half swing, one below which is round-off
+CLOSE = 1e-6  # of an amplitude, by which a curve reaches beyond its ends
 
 
 class HalfSwings(NamedTuple):
@@ -43,20 +47,54 @@ class DecayCurve(NamedTuple):
         """Some of its points."""
         return DecayCurve(*(part[pick] for part in self))
 
+    def over(self, amplitudes) -> "DecayCurve":
+        """The curve at other amplitudes (k,) [m], straight over their logarithms; NaN outside it."""
+        if not self.amplitude.size:
+            return DecayCurve(*np.full((6, len(amplitudes)), np.nan))._replace(amplitude=np.asarray(amplitudes))
+        order, x = np.argsort(self.amplitude), np.log(amplitudes)
+        own = np.log(self.amplitude[order])
+        inside = (x > own[0] - CLOSE) & (x < own[-1] + CLOSE)
+        return DecayCurve(*(np.where(inside, np.interp(x, own, part[order]), np.nan) for part in self))._replace(
+            amplitude=np.asarray(amplitudes))
+
+    def widened(self, one: "DecayCurve", other: "DecayCurve") -> "DecayCurve":
+        """The curve with what two curves at its amplitudes differ by in its errors; infinite where one has no value."""
+        def wider(name: str) -> np.ndarray:
+            change = np.abs(getattr(one, name) - getattr(other, name))
+            return getattr(self, f"{name}_error") + np.where(np.isnan(change), np.inf, change)
+
+        return self._replace(frequency_error=wider("frequency"), damping_error=wider("damping"))
+
+
+def turns(time, place, speed) -> tuple:
+    """(times (k,) [s], places (k,) [m]) where a motion turns, by the cubic between the samples on both sides.
+
+    time, place [m], speed [m/s]: (n,) of samples, however far apart, where each turn lies between two or at one.
+    """
+    speed = np.where(np.abs(speed) <= REST * np.abs(speed).max(initial=0.0), 0.0, speed)
+    at = [(t, y) for t, y, v in zip(time, place, speed) if v == 0]
+    for k in np.flatnonzero(speed[:-1] * speed[1:] < 0):
+        span, part = time[k + 1] - time[k], slice(k, k + 2)
+        share = _zero(place[part], speed[part] * span)
+        at.append((time[k] + share * span, _cubic(place[part], speed[part] * span, share)))
+    at.sort()
+    kept = [one for k, one in enumerate(at) if k == 0 or one[0] > at[k - 1][0]]
+    return tuple(np.array(part) for part in zip(*kept)) if kept else (np.empty(0), np.empty(0))
+
 
 def of_turns(times, places) -> HalfSwings:
     """Half swings between the turns (k,) [s], (k,) [m] of a computed motion, as far as each is smaller than the one
-    before."""
+    before and no round-off of the first."""
     size = np.abs(np.diff(places))
-    rises = np.flatnonzero((size[1:] >= size[:-1]) | (size[1:] <= 1e-9 * size.max(initial=0.0)))
-    count = int(rises[0]) + 1 if rises.size else size.size
+    ends = np.flatnonzero((np.diff(size, prepend=np.inf) >= 0) | (size <= FAINT * size.max(initial=0.0)))
+    count = int(ends[0]) if ends.size else size.size
     still = np.zeros(count)
     return HalfSwings((times[1:] + times[:-1])[:count] / 2, size[:count], still, still)
 
 
 def curve_of(swings: HalfSwings) -> DecayCurve:
     """Frequency and damping over the amplitude, at points whose spans overlap by half, of a computed motion at every
-    half swing; without a point where there are fewer than FEWEST half swings."""
+    half swing; without a point where there are fewer than three half swings."""
     count, log = swings.size.size, np.log(swings.size)
     noise = _at_least(swings.size_noise / swings.size, log)
     wide = _at_least(swings.middle_noise, swings.middle)
@@ -138,3 +176,18 @@ def _level(log, k: int, m: int) -> float:
     x2, n = x**2, x.size
     weight = (np.sum(x2**2) - np.sum(x2) * x2) / (n * np.sum(x2**2) - np.sum(x2)**2) if m > 1 else (x == 0) * 1.0
     return float(weight @ log[k - m:k + m + 1])
+
+
+def _cubic(place, speed, share: float) -> float:
+    """Place at a share of the step by the cubic of both ends; speed over the step."""
+    (a, b), (c, d), s = place, speed, share
+    return float(a + s * (c + s * (3 * (b - a) - 2 * c - d + s * (2 * (a - b) + c + d))))
+
+
+def _zero(place, speed) -> float:
+    """Share of the step where the cubic turns."""
+    (a, b), (c, d) = place, speed
+    two, three = 3 * (b - a) - 2 * c - d, 2 * (a - b) + c + d
+    found = np.roots([3 * three, 2 * two, c])
+    inside = [one.real for one in np.atleast_1d(found) if abs(one.imag) < 1e-9 and -1e-9 <= one.real <= 1 + 1e-9]
+    return float(np.clip(inside[0], 0, 1)) if inside else float(c / (c - d))

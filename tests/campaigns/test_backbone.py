@@ -298,6 +298,42 @@ def test_two_modes_in_gross_slip_lose_the_same_by_decay_and_by_balance():
     assert curves["decay"].amplitude.size == 2 and curves["quasi-static"].amplitude == pytest.approx(a, rel=1e-6)
 
 
+@pytest.mark.parametrize("two", [False, True])
+def test_exact_a_decay_goes_on_where_the_contact_holds(two):
+    """A contact that holds on a spring is no end: where nothing slips the decay is that of the held modes, zeta
+    omega/omega_held of one mode. Of 13 points there were 7, of two modes 3."""
+    a, text = np.geomspace(1e-7, 2e-3, 13), (TWO.replace("1 um", "0.1 mm") if two else
+                                             shaken(PLASTIC.replace("1 mm", "10 um")))
+    found = backbone(pf.build(text), "", a, ("decay",))
+    one = found.curves["decay"]
+    assert one.amplitude.size == 13 and not any("points left out" in note for note in found.notes)
+    still = one.amplitude < 2e-6
+    if two:
+        own, shape, phi = np.array([1, 4.7]) * OMEGA, np.diag([0.004, 0.006 * 4.7]) * OMEGA, np.array([1, 0.8])
+        stiff = np.diag(own**2) + 3e5 / 0.5 * np.outer(phi, phi)
+        roots = np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], [-stiff, -shape]]))
+        root = roots[np.argmin(np.abs(roots))]
+        zeta, omega = -root.real / abs(root), abs(root.imag)
+    else:
+        omega = np.sqrt(OMEGA**2 + 3e6 / 0.5)
+        zeta = 0.002 * OMEGA / omega
+        omega *= np.sqrt(1 - zeta**2)
+    assert still.sum() >= 3
+    for value, error, truth in ((one.damping, one.damping_error, zeta),
+                                (one.frequency, one.frequency_error, omega / (2 * np.pi))):
+        assert (np.abs(value - truth) <= error + 1e-6 * truth)[still].all()
+    assert (one.damping_error < 0.2 * one.damping)[still].all()
+
+
+def test_a_damped_decay_begins_above_the_largest_amplitude_asked_for():
+    """Of a damping of 0.1 the first reading lies at 0.62 of the release, more than 1.15 below it."""
+    a = np.geomspace(1e-6, 2e-4, 5)
+    text = shaken(PLASTIC).replace("damping = 0.002", "damping = 0.1")
+    one = backbone(pf.build(text), "", a, ("decay",)).curves["decay"]
+    assert one.amplitude == pytest.approx(a) and one.damping == pytest.approx(
+        0.1 * OMEGA / np.sqrt(OMEGA**2 + 3e4 / 0.5), rel=1e-5)
+
+
 def test_exponents_only_where_both_points_lie_in_a_regime_and_the_loss_is_no_round_off():
     sparse = backbone(model(IWAN), "", [1e-8, 1e-2], ("quasi-static",))
     assert sparse.micro is None and sparse.gross is None

@@ -1,12 +1,16 @@
 """Frequency and damping of a decay over its amplitude, from half swings without noise."""
 
+import warnings
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scene_texts import DRIVE, KILOGRAM, POINT, friction_of
 from scipy.integrate import solve_ivp
 
 import patchfem as pf
-from patchfem.response.decay_curve import curve_of, of_turns
+from patchfem.response.decay_curve import curve_of, of_turns, turns
+from patchfem.runs.rig.decays import decay_of
 
 RELEASED = DRIVE[:DRIVE.index('kind')] + 'kind = "free"\ndisplacement = "2 mm"\ncycles = 30\n'
 
@@ -18,6 +22,32 @@ def test_exact_a_viscous_decay_has_one_frequency_and_one_ratio(zeta):
     assert found.damping == pytest.approx(zeta, rel=1e-9)
     assert found.frequency == pytest.approx(own / (2 * np.pi), rel=1e-12)
     assert found.amplitude.size > 6 and (np.diff(found.amplitude) < 0).all()
+
+
+def viscous(zeta: float, omega: float, samples: int):
+    t = np.linspace(0, 40 * 2 * np.pi / omega, samples)
+    lam = complex(-zeta * omega, omega * np.sqrt(1 - zeta**2))
+    y = np.exp(lam * t)
+    return t, y.real, (lam * y).real
+
+
+def test_order_turns_lie_between_samples_to_the_fourth():
+    """The cubic of places and speeds at both ends misses the place of a turn by the fourth power of the step."""
+    off = []
+    for samples in (407, 1627):
+        found = curve_of(of_turns(*turns(*viscous(0.01, 300.0, samples))))
+        off.append(np.abs(found.damping - 0.01).max())
+    assert off[0] < 1e-4 and 50 < off[0] / off[1] < 500
+
+
+def test_exact_between_its_points_a_curve_is_straight_and_outside_there_is_none():
+    found = curve_of(of_turns(np.pi * np.arange(9), (-0.9)**np.arange(9.0)))
+    there = found.over(found.amplitude[2:5])
+    assert there.damping == pytest.approx(found.damping[2:5], rel=1e-12)
+    assert np.isnan(found.over([2.0, 1e-3]).frequency).all()
+    wider = there.widened(there, there._replace(damping=there.damping + np.array([1.0, np.nan, 0.0])))
+    assert wider.damping_error == pytest.approx(there.damping_error + np.array([1.0, np.inf, 0.0]))
+    assert np.isnan(curve_of(of_turns(np.arange(3.0), np.array([1.0, -0.5, 0.2]))).over([0.3]).damping).all()
 
 
 def test_exact_a_block_on_rigid_friction():
@@ -55,6 +85,8 @@ def test_always_intervals_hold_a_loss_that_bends_with_the_amplitude():
 def test_too_few_swings_or_one_that_grows_end_it():
     assert curve_of(of_turns(np.arange(3.0), np.array([1.0, -0.5, 0.2]))).time.size == 0
     assert of_turns(np.arange(5.0), np.array([1.0, -0.5, 0.2, -0.9, 0.1])).size.size == 2
+    assert of_turns(np.arange(6.0), np.array([1.0, -0.5, 0.25, -0.1, 0.02, 0.02])).size.size == 4
+    assert turns(np.arange(3.0), np.arange(3.0), np.ones(3))[0].size == 0
 
 
 def test_exact_a_release_under_coulomb_friction():
@@ -79,3 +111,18 @@ def test_a_release_of_an_iwan_joint_follows_its_balance():
         other = beside[f"quasi_static_{name}"].values[::-1]
         assert np.isfinite(bar).all() and (
             np.abs(ours - other) < bar + 4 * beside.quasi_static_damping.values[::-1] * other).all()
+
+
+def test_always_runs_that_do_not_reach_leave_an_infinite_error_and_no_warning_of_python():
+    """Of a coarser run and of the one beside it, both of which hold at once: their curves have no point."""
+    def run(amplitude: float, *coarser):
+        t, y, v = viscous(0.05, 300.0, 2000)
+        return SimpleNamespace(response=SimpleNamespace(time=t, output=amplitude * y, output_rate=amplitude * v),
+                               coarser=coarser)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found = decay_of(run(1.0, (run(0.0), run(0.0)), (run(1.0), None)))
+    assert np.isinf(found.damping_error).all() and np.isinf(found.frequency_error).all()
+    same = decay_of(run(1.0, (run(1.0), None)))
+    assert same.damping == pytest.approx(0.05, rel=1e-4) and np.isfinite(same.damping_error).all()
