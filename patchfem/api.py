@@ -194,7 +194,7 @@ def backbone(scene: str | Path | Scene | Model, /, *, mode: str = "",
 
 
 def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *, out: str | Path | None = None,
-          draw: int = 0, seed: int = 0, sobol: bool = False, jobs: int = 1, executor: str = "",
+          draw: int = 0, seed: int = 0, sobol: bool = False, of: str = "", jobs: int = 1, executor: str = "",
           resume: bool = False) -> Dataset:
     """Run a scene for all combinations of the values of some keys: the Dataset of sweep.nc.
 
@@ -202,7 +202,8 @@ def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *
     such as "1e-6 rad..1e-2 rad:9"; default: the table [sweep] of the scene. draw: number of cases to draw between the
     ends of ranges such as "1e-6 rad..1e-2 rad", instead of all combinations; with `seed`, or by Sobol's sequence with
     `sobol`. Drawn cases are rows of one dimension `case`. out: folder to write, as `patchfem sweep -o` does; `resume`
-    continues it. jobs: number of processes. executor: "dask" or "dask:ADDRESS".
+    continues it. of: the measure that the answer begins with, such as "equivalent_damping". jobs: number of processes.
+    executor: "dask" or "dask:ADDRESS".
 
     The attribute `answer` states the main result in one sentence. A case that is refused or fails has the outcome
     "failed" and its message. Raises SceneError if no case is valid.
@@ -211,9 +212,9 @@ def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *
         raise PatchfemError(f"sweep: over must be a dict of keys and their values, not {over!r:.60}")
     if wrong := oversized(over or {}):
         raise SceneError(wrong)
-    asked = case_models.Asked(*_text_of(scene))
+    asked = case_models.Asked(*_text_of(scene), of=of)
     lines = [one if isinstance(one, str) else ",".join(texts(key, one)) for key, one in (over or {}).items()]
-    request = ask.Request([f"{key}={line}" for key, line in zip(over or {}, lines)], None, draw, sobol, seed)
+    request = ask.Request([f"{key}={line}" for key, line in zip(over or {}, lines)], None, draw, sobol, seed, of)
     cases, by = ask.cases_of(asked, request), executors.of(executor, jobs)
     place = None if out is None else sweep_run.Place(Path(out), resume)
     found = sweep_run.swept(asked, cases, by, _on_stderr) if out is None else \

@@ -34,6 +34,7 @@ class Over:
     sobol: Annotated[int, Parameter(name="--sobol", show_default=False, help="number of cases by Sobol's sequence, "
                                                                              "such as 256; best a power of 2")] = 0
     seed: Annotated[int, Parameter(name="--seed", help="seed seed of the draws, such as 1")] = 0
+    of: word("measure that the answer and the page begin with, such as equivalent_damping", "--of") = ""
 
     def given(self) -> bool:
         """Whether any case is asked for."""
@@ -42,7 +43,7 @@ class Over:
     def words(self, *more: str) -> tuple:
         """What asks for the same cases of the same scene, as words."""
         drawn = f"draw={self.random},{self.sobol},{self.seed}"
-        return (*self.over, "" if self.cases is None else str(self.cases), drawn, *more)
+        return (*self.over, "" if self.cases is None else str(self.cases), drawn, f"of={self.of}", *more)
 
     def request(self):
         """The request; Refused where its parts do not stand together."""
@@ -52,7 +53,8 @@ class Over:
             raise Refused("--random, --sobol and --seed must be whole numbers >= 0")
         if (self.random or self.sobol) and not self.over:
             raise Refused("--random and --sobol need --over table.key=low..high to draw from")
-        return ask.Request(self.over, self.cases, self.random or self.sobol, bool(self.sobol), self.seed)
+        return ask.Request(self.over, self.cases, self.random or self.sobol, bool(self.sobol), self.seed,
+                           self.of)
 
 
 @Parameter(name="*")

@@ -11,7 +11,7 @@ step, run at STEPS and half as many a cycle, whose change is its error:
 
 - balance: the rig with a damping 2 zeta omega taken off, from the balanced amplitude on, must neither grow nor fall;
   what it does in a cycle, after WARM, corrects zeta at the amplitude that it has then, where a spline reads the curve.
-- decay: the same release, read from turn to turn as `patchfem.response.ring_down` says it is.
+- decay: the same release, read from turn to turn as `patchfem.response.decay_curve` says it is.
 - quasi-static: tip and area of a loop of the law alone.
 
 Run: python studies/steady/three_ways.py [COUNT] [SEED]      (long: some four minutes; 30 joints of seed 41)

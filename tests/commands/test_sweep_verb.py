@@ -3,6 +3,7 @@
 import csv
 import json
 import os
+import re
 import shutil
 from time import sleep
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import cli
+from page_data import data_of
 from scene_texts import COULOMB, POINT, SHORT
 
 import patchfem as pf
@@ -404,11 +406,51 @@ def test_refuses_a_key_of_the_file_and_of_the_line(scene, tmp_path):
     (["--random", "4", "--over", "friction.static=0.1..0.2:3"], "leave out :3"),
     (["--over", "friction.static=0.1,0.2", "--shard", "5/4"], "--shard 5/4"),
     (["--over", "friction.static=0.1,0.2", "-j", "0"], "at least one process"),
+    (["--over", "friction.static=0.1,0.2", "--of", "equivalent_dampin"], "did you mean 'equivalent_damping'?"),
+    (["--over", "friction.static=0.1,0.2", "--of", "zzz"], "--of zzz: unknown measure; use a name that"),
     (["--over", "friction.static=0.1,0.2", "--executor", "slurm"], "--executor slurm: unknown"),
 ])
 def test_refuses_words_that_do_not_stand_together(scene, tmp_path, words, says):
     answer = cli("sweep", scene, *words, "-o", tmp_path / "a")
     assert answer.code == 2 and says in answer.err and not (tmp_path / "a").exists()
+
+
+BENCH = """\
+[normal]
+load = "100 N"
+[friction]
+law = "elastic-plastic"
+stiffness = "100 kN/m"
+static = 0.3
+[slide]
+kind = "sine"
+amplitude = "1 mm"
+frequency = "10 Hz"
+cycles = 2
+"""
+
+
+def test_exact_the_answer_begins_with_the_measure_that_is_asked_for(tmp_path):
+    """Of a slide of 1 mm with gross slip the secant stiffness is mu N/1 mm, the largest force over the slide; the load
+    has 0 % of it where it hardly changes. A measure that no case has, or that cannot be ranked, is told as that."""
+    scene, data = tmp_path / "bench.toml", tmp_path / "a/sweep.json"
+    scene.write_text(BENCH, encoding="utf-8")
+    drawn = ("--over", "friction.static=0.1..0.5", "--over", "normal.load=99.9 N..100.1 N", "--sobol", "64")
+    said = cli("sweep", scene, *drawn, "--of", "secant_stiffness", "-o", tmp_path / "a")
+    answer = json.loads(data.read_text("utf-8"))["answer"]
+    with open(tmp_path / "a/sweep.csv", newline="", encoding="utf-8") as file:
+        mu = [float(row["friction.static"]) for row in csv.DictReader(file)]
+    ends = re.search(r"have a secant stiffness from (\S+) N/mm to (\S+) N/mm, a loop area", answer).groups()
+    assert [float(one) for one in ends] == pytest.approx(1e2 * np.quantile(mu, [0.05, 0.95]), rel=5e-3)
+    assert answer.startswith("Secant stiffness depends most on friction.static, which contributes to 100 %")
+    assert answer in " ".join(said.out.split("\n"))
+    page = (tmp_path / "a/report.html").read_text("utf-8")
+    assert data_of(page)["first"] == "secant_stiffness" and "--of secant_stiffness" in page
+    again = cli("sweep", scene, *drawn, "--of", "pressure_peak", "-o", tmp_path / "a", "--resume")
+    assert "No case has a value of pressure peak; what follows describes other measures." in again.out
+    assert json.loads(data.read_text("utf-8"))["answer"].startswith("No case has a value of pressure peak")
+    assert pf.sweep(scene, {"friction.static": [0.1, 0.2]}, of="secant_stiffness").attrs["answer"].startswith(
+        "Secant stiffness runs from 10 N/mm to 20 N/mm")
 
 
 @pytest.mark.share(1, 2)

@@ -5,9 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from math import prod
 from pathlib import Path
 
+from ...response import rows
+from ...runs.results import patch_rows
 from ...scene.axes import Axis, read
 from ...scene.keys.quantities import NUMBER
 from ...scene.lines import pieces_of
@@ -26,7 +29,8 @@ class Request:
     """Which cases are asked for.
 
     over: "table.key=values" texts; file: a table with a case per row, or None; count: cases to draw between the ends of
-    the ranges of `over`, 0 for all combinations, from Sobol's sequence or independent ones, by `seed`.
+    the ranges of `over`, 0 for all combinations, from Sobol's sequence or independent ones, by `seed`; of: the measure
+    that the answer begins with, "" for the usual one.
     """
 
     over: Sequence[str] = ()
@@ -34,11 +38,12 @@ class Request:
     count: int = 0
     sobol: bool = False
     seed: int = 0
+    of: str = ""
 
 
 def asked_of(path: Path, sets: Sequence[str], request: Request) -> tuple[Asked, Cases]:
     """The scene in a file and its cases; SceneError as `cases_of`, and where a key is set for all cases and swept."""
-    asked = Asked(Path(path), text_of(path), tuple(sets))
+    asked = Asked(Path(path), text_of(path), tuple(sets), request.of)
     cases = cases_of(asked, request)
     swept = {asked.place(axis.key): axis.key for axis in cases.axes}
     both = [(one, swept.get(asked.place(".".join(pieces_of(one.partition("=")[0]))))) for one in sets]
@@ -58,8 +63,9 @@ def cases_of(asked: Asked, request: Request) -> Cases:
         raise SceneError([f"{request.count} random cases with seed {request.seed}: whole numbers >= 0 are needed, and "
                           "at least one case for Sobol's sequence"])
     if request.file is not None:
-        rows, wrong = table.read(request.file)
-        parts += [rows] if rows is not None else []
+        listed, wrong = table.read(request.file)
+        parts += [listed] if listed is not None else []
+    wrong += _unknown(request.of)
     axes, mistakes = read(request.over, request.count > 0)
     wrong += [f"--over {one.removeprefix('--over ')}" for one in mistakes]
     if not request.over and request.file is None:
@@ -86,6 +92,16 @@ def cases_of(asked: Asked, request: Request) -> Cases:
     cases = product(parts)
     _refuse_all(asked, cases)
     return cases
+
+
+def _unknown(measure: str) -> list[str]:
+    """A mistake where a measure is named that no run has, with the one that is nearest."""
+    known = [*rows.TABLE, *patch_rows.TABLE]
+    if not measure or rows.of_first(measure) in known:
+        return []
+    near = get_close_matches(measure, known, 1, 0.5)
+    return [f"--of {measure}: unknown measure; " + (f"did you mean '{near[0]}'?" if near else "use a name that "
+            "`patchfem run` prints, such as loop_area")]
 
 
 def _same(asked: Asked, keys: Sequence[str]) -> list[str]:

@@ -23,11 +23,15 @@ from ...scene.scene import Scene, SceneError, axes_of, loads, with_files
 
 @dataclass(frozen=True, slots=True)
 class Asked:
-    """The text of a scene, its path, which other files are relative to, and the --set strings that all cases share."""
+    """The text of a scene, its path, which other files are relative to, and the --set strings that all cases share.
+
+    of: the measure that the sweep is asked about, "" unless named.
+    """
 
     path: Path
     text: str
     sets: tuple = ()
+    of: str = ""
 
     def scene(self, sets: Sequence[str]) -> Scene:
         """The scene with `table.key=value` of each changed key; SceneError names every mistake."""

@@ -24,7 +24,8 @@ class Lead(NamedTuple):
     span: from where to where the main measure runs; turns: what changes as the key grows. "" where there is nothing to
     say. ranks, spread, peaks: as `ranked.ranks_of`, `ranked.quantiles` and `peaks.found` give them; rank, scatter,
     peak: what matters most, where nine in ten drawn cases lie, where a swept frequency has its peak, in sentences;
-    left: how many cases have no answer yet, and that none has settled; least: where the motion is least."""
+    left: how many cases have no answer yet, and that none has settled; least: where the motion is least; asked: the
+    measure that the sweep was asked about, "" unless it was."""
 
     missed: dict
     misses: str
@@ -40,18 +41,21 @@ class Lead(NamedTuple):
     peak: str = ""
     left: str = ""
     least: str = ""
+    asked: str = ""
 
     def sentences(self) -> list:
         """What people read, the worst first."""
         rank = self.rank if self.scatter or not (self.limit or self.peak) else ""  # of a grid they say more
-        return [one for one in (self.left, self.misses, self.limit, self.peak, self.least, rank, self.scatter,
-                                self.span, self.turns) if one]
+        said = (self.limit, self.peak, self.least, rank, self.scatter, self.span, self.turns) if not self.asked else \
+            (self.rank, self.scatter, self.span, self.limit, self.peak, self.least, self.turns)
+        return [one for one in (self.left, self.misses, *said) if one]
 
     def answer(self) -> str:
         """One sentence, two of drawn cases: how far the key may go, where the peak is, what matters most and how far
         the answers scatter, or where the main measure runs; before it how many cases miss the tolerance."""
         drawn = " ".join(one for one in (self.rank, self.scatter) if one)
-        text = self.limit or self.peak or self.least or drawn or self.span or self.turns
+        text = (self.asked and (drawn or self.span)) or self.limit or self.peak or self.least or drawn or self.span or \
+            self.turns
         if self.left:
             return f"{self.left} {self._replace(left='').answer()}".strip()
         return f"{self.misses.rstrip('.')}; {text[0].lower() if text[1:2].islower() else text[0]}{text[1:]}" \
@@ -76,30 +80,34 @@ def lead_of(table: dict) -> Lead:
 
     tops, edge = (find(keys, columns(table), trusted, table["grid"]) for find in (peaks.found, peaks.edge))
     return Lead(missed.counted(measures, tolerance), missed.sentence(measures, tolerance, where), limits,
-                allowed.sentence(limits), span(columns(table), trusted, settled),
+                allowed.sentence(limits),
+                span(columns(table), trusted, settled, ranked.asked_first(FIRST, table)),
                 changes(keys, columns(table), outcome, table["grid"]), *ranked.told(table, trusted, settled.any()),
-                tops, f"{peaks.sentence(tops)} {edge}".strip(), _left(outcome),
-                least(keys, columns(table), trusted, shown))
+                tops, f"{peaks.sentence(tops)} {edge}".strip(), _left(table, outcome),
+                least(keys, columns(table), trusted, shown), table.get("first", ""))
 
 
-def _left(outcome: np.ndarray) -> str:
+def _left(table: dict, outcome: np.ndarray) -> str:
     """What holds of all that follows: how many cases of an interrupted sweep have no answer, and that of those that run
     none has settled; "" where neither is so."""
     count, ran = int(np.sum(outcome == "")), outcome[(outcome != "") & (outcome != FAILED)]
     said = f"{count} of {outcome.size} cases have no answer yet; what follows covers the others." if count else ""
     if ran.size and not np.isin(ran, SETTLED).any():
         said += " No case has settled; what follows describes the motions as they ended."
+    first = table.get("first", "")
+    if first and not np.isfinite(table["measures"].get(first, {"values": ()})["values"]).any():
+        said += f" No case has a value of {label(first)}; what follows describes other measures."
     return said.strip()
 
 
-def span(measures: dict, trusted: dict, settled: np.ndarray) -> str:
+def span(measures: dict, trusted: dict, settled: np.ndarray, names: Sequence = FIRST) -> str:
     """From where to where the first measure of interest runs, and how well its values are known; "" where none has a
     value that counts.
 
     measures: {name: (values (n,), errors (n,), SI unit)}, NaN where a case has none; trusted: {name: (n,) whether the
-    value of a case counts}; settled: (n,) whether a case did.
+    value of a case counts}; settled: (n,) whether a case did; names: of the measures, the first of interest first.
     """
-    for name in FIRST:
+    for name in names:
         every = np.isfinite(measures[name][0]) if name in measures else np.zeros(1, bool)
         if not every.any():
             continue

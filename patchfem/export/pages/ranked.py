@@ -28,7 +28,16 @@ def told(table: dict, trusted: dict, settled: bool = True) -> tuple:
     ranks, found, of = ranks_of(table), quantiles(table, trusted), len(table["outcome"])
     left = of - int(np.sum(trusted[next(iter(ranks))])) if ranks else 0
     moves = not settled or Outcome.TRANSIENT.value in list(table["outcome"])
-    return ranks, sentence(ranks, left, moves), found, scatter(found, of, settled and moves)
+    names, first = asked_first(SPREAD, table), table.get("first", "")
+    rank = sentence(ranks, left, moves) if not first or first in ranks or first not in table["measures"] else \
+        f"What {label(first)} depends on cannot be told from these {of} cases; more cases may show it." if ranks else ""
+    return ranks, rank, found, scatter(found, of, settled and moves, names)
+
+
+def asked_first(names: tuple, table: dict) -> tuple:
+    """Names of measures, before them that which the sweep was asked about."""
+    first = table.get("first", "")
+    return (first, *(name for name in names if name != first)) if first else names
 
 
 def ranks_of(table: dict) -> dict:
@@ -38,7 +47,7 @@ def ranks_of(table: dict) -> dict:
         shape = tuple(len(set(one["texts"])) for one in table["keys"]) if table["grid"] else None
         fits = table.get("drawn") or (table["grid"] and np.prod(shape) == len(table["outcome"]))
         measures = {name: (table["measures"][name]["values"], table["measures"][name]["errors"])
-                    for name in RANKED if name in table["measures"]}
+                    for name in asked_first(RANKED, table) if name in table["measures"]}
         table["ranks"] = ranking(keys, measures, shape) if fits else {}
     return table["ranks"]
 
@@ -73,7 +82,7 @@ def quantiles(table: dict, trusted: dict) -> dict:
     """{measure: (unit, quantiles of ENDS, number of cases, how many of these miss the tolerance)} of the drawn cases
     that have a value and have settled, of all that have one where none has; trusted: as `lead` makes it."""
     out, settled = {}, np.isin(np.asarray(table["outcome"], str), SETTLES)
-    for name in RANKED if table.get("drawn") and len(table["outcome"]) >= FEW else ():
+    for name in asked_first(RANKED, table) if table.get("drawn") and len(table["outcome"]) >= FEW else ():
         one = table["measures"].get(name)
         if one is None:
             continue
@@ -85,15 +94,16 @@ def quantiles(table: dict, trusted: dict) -> dict:
     return out
 
 
-def scatter(found: dict, of: int, settled: bool = True) -> str:
+def scatter(found: dict, of: int, settled: bool = True, names: tuple = SPREAD) -> str:
     """Where nine in ten of `of` drawn cases lie, and how many of them miss the tolerance; found: as `quantiles` gives
-    them; settled: whether cases without a value may not have settled; "" where there are none."""
-    said, most = [], max((found[name][2] for name in SPREAD if name in found), default=0)
+    them; settled: whether cases without a value may not have settled; names: of the measures, in their order; "" where
+    there are none."""
+    said, most = [], max((found[name][2] for name in names if name in found), default=0)
     if most and most < SETTLED * of:
         missed = "have not settled within the tolerance" if settled else "have no value"
         return (f"{of - most} of {of} random cases {missed}, perhaps the cases that move most, so the scatter of the "
                 "results is not known.")
-    for name in [name for name in SPREAD if name in found]:
+    for name in [name for name in names if name in found]:
         unit, (low, _, high), count, misses = found[name]
         low, high = (short(one, unit, 3, zero_below(name)) for one in (low, high))
         some = [f"in the {count} that have one"] * (count < most) + \

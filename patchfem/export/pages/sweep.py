@@ -29,7 +29,7 @@ def page(table: dict, told: Lead | None = None) -> str:
     `messages`: {case: why it has no answer}; `folders` (n,): where the cases lie beside the page, or None; `own`: False
     where sweep.csv does not lie beside the page.
     """
-    first = next((name for name in FIRST if name in table["measures"]
+    first = next((name for name in ranked.asked_first(FIRST, table) if name in table["measures"]
                   and np.isfinite(table["measures"][name]["values"]).any()), None)
     told, part = told or lead_of(table), drawn(table, first, lambda cases, whole: _data(table, first, cases, whole))
     data = _data(table, first, part.cases, not part.said)
@@ -130,7 +130,7 @@ def _lead(table: dict, said: Lead) -> str:
 
 def _cases(table: dict) -> str:
     """The first cases as a table with their keys, outcome and the measures that change from case to case."""
-    shown = [name for name in FIRST if name in table["measures"]]
+    shown = [name for name in ranked.asked_first(FIRST, table) if name in table["measures"]]
     shown += [name for name, one in table["measures"].items() if name not in shown and _changes(one["values"])]
     shown = shown[:6]
     few = slice(LISTED)

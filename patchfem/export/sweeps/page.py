@@ -43,7 +43,7 @@ def table_of(asked: Asked, cases: Cases, found: Answers, keys: list, folder: Pat
     return {**titles(columns, tomllib.loads(asked.text).get("title") or asked.path.stem), "version": __version__,
             **_shared(facts(asked, cases), columns),
             "command": command(asked, cases), "scene": asked.text,
-            "grid": not cases.rows, "drawn": cases.drawn, "keys": columns, "measures": measures,
+            "first": asked.of, "grid": not cases.rows, "drawn": cases.drawn, "keys": columns, "measures": measures,
             "outcome": [str(one) for one in found.outcome],
             "messages": found.messages, "folders": [opened(folder, key) for key in keys] if len(keys) else None}
 
@@ -100,7 +100,8 @@ def wide(values) -> bool:
 
 def command(asked: Asked, cases: Cases) -> str:
     """The line that answers the same cases again."""
-    words = ["patchfem", "sweep", asked.path.name, *(word for one in asked.sets for word in ("--set", one))]
+    words = ["patchfem", "sweep", asked.path.name, *(word for one in asked.sets for word in ("--set", one)),
+             *(("--of", asked.of) if asked.of else ())]
     if cases.rows:
         return shlex.join(words) + "  # with the cases of sweep.csv"
     return shlex.join([*words, *(word for axis in cases.axes for word in
