@@ -118,14 +118,11 @@ def known(words: list) -> None:
 @app.command(name="--install-completion")
 def completion(*, shell: Literal["zsh", "bash", "fish", "powershell"] | None = None,
                output: Annotated[Path | None, Parameter(name=["-o", "--output"])] = None):
-    """Complete commands and options in this shell (bash, zsh, fish).
+    """Install completion of commands and options for this shell (bash, zsh, fish).
 
-    Parameters
-    ----------
-    shell : Literal["zsh", "bash", "fish", "powershell"] | None
-        Shell that is to complete; this one where it is left out.
-    output : Path | None
-        File of the completions; the usual one of the shell where it is left out.
+    Parameters ---------- shell : Literal["zsh", "bash", "fish", "powershell"] | None Shell for which completion is
+    installed; default: the present shell. output : Path | None File for the completions; default: the usual file of the
+    shell.
     """
     from cyclopts.completion.install import create_install_completion_command  # 10 ms of every command otherwise
 
@@ -172,7 +169,8 @@ def _guarded(words: list, before=lambda: None) -> int:
     if there := sys.modules.get(f"{__package__}.disk.whole"):
         there.begun()
     if words[:1] == ["help"]:
-        say("patchfem: there is no verb help; `patchfem --help` lists the verbs, `patchfem run --help` explains one")
+        say("patchfem: `help` is not a verb; `patchfem --help` lists the verbs, `patchfem run --help` explains the "
+            "verb `run`")
         return 2
     try:
         before()
@@ -237,11 +235,11 @@ def _interrupted() -> str:
     there = sys.modules.get(f"{__package__}.disk.whole")
     placed = there.replaced() if there else []
     kept = [one for one in dict.fromkeys(there.KEPT) if one.is_dir()] if there else []
-    text = "interrupted; nothing was replaced"
+    text = "interrupted; no file was replaced"
     if placed:
         text = f"interrupted; already complete: {', '.join(placed[-3:])}" + \
             " and more" * (len(placed) > 3)
-    return text + "".join(f"; {there.shown(one)} continues with --resume" for one in kept)
+    return text + "".join(f"; to continue {there.shown(one)}, add --resume to the command" for one in kept)
 
 
 def _once_more(lost) -> None:

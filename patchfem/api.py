@@ -200,10 +200,10 @@ def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *
 
     `scene` is that of `load`. over: dict of key -> list of values (texts as in a scene, or numbers in SI) or a range
     such as "1e-6 rad..1e-2 rad:9"; default: the table [sweep] of the scene. draw: number of cases to draw between the
-    ends of ranges such as "1e-6 rad..1e-2 rad", instead of all combinations; with `seed`, or by Sobol's sequence with
-    `sobol`. Drawn cases are rows of one dimension `case`. out: folder to write, as `patchfem sweep -o` does; `resume`
-    continues it. of: the measure that the answer begins with, such as "equivalent_damping". jobs: number of processes.
-    executor: "dask" or "dask:ADDRESS".
+    ends of ranges such as "1e-6 rad..1e-2 rad", instead of all combinations. The draw is random, with the seed `seed`,
+    or follows Sobol's sequence if `sobol` is true. Drawn cases are rows of one dimension `case`. out: folder to write,
+    as `patchfem sweep -o` does; `resume` continues it. of: the measure that the answer is about, such as
+    "equivalent_damping". jobs: number of processes. executor: "dask" or "dask:ADDRESS".
 
     The attribute `answer` states the main result in one sentence. A case that is refused or fails has the outcome
     "failed" and its message. Raises SceneError if no case is valid.
@@ -232,8 +232,9 @@ class SweepPlots:
     def sweep(dataset: Dataset, measure: str, ax: Axes | None = None) -> Axes:
         """Plot a measure of a sweep, with its numerical errors, against the key that has most values.
 
-        Hollow points miss the tolerance. Values over two decades have a logarithmic axis. ax: Axes to draw on. Raises
-        PatchfemError for a Dataset that is not that of a sweep, and for a measure that it does not have.
+        Hollow points miss the tolerance. An axis is logarithmic if its values span more than two decades. ax: Axes to
+        draw on. Raises PatchfemError for a Dataset that does not come from a sweep, and for a measure that the Dataset
+        does not contain.
         """
         if not hasattr(dataset, "coords") or not any(str(name).endswith("_error") for name in dataset):
             raise PatchfemError("plot.sweep: the Dataset of pf.sweep is needed, with measures and their errors")
@@ -347,7 +348,8 @@ def profile(*files: str | Path, cutoff: float | str | None = None, window: Itera
 
 def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None = None, *,
            measured: str | Path | None = None) -> Path:
-    """Put the results folders of a list side by side on one page and return its path. A single sweep gets its own page.
+    """Put the results folders of a list side by side on one page and return the path of the page. For a single sweep,
+    rebuild the page of the sweep.
 
     out: the page, default report.html. measured: laboratory file to draw over the pictures. Raises PatchfemError for an
     empty list and for folders that cannot be compared.
@@ -370,7 +372,8 @@ def export(folder: str | Path, out: str | Path, /, *, frame: int | None = None, 
     if folder.suffix != ".toml":
         chosen.export(folder, out, frame, histories, of)
     elif frame is not None or histories or of:
-        raise PatchfemError("frame, histories and of can be used only with a results folder; from a scene only the "
+        raise PatchfemError("the options `frame`, `histories` and `of` can be used only with a results folder; from a "
+                            "scene only the "
                             "structure is exported")
     else:
         from .export.lab import structures  # its folder holds more than words
@@ -425,18 +428,18 @@ def compare(*files: str | Path, direction: str = "", units: tuple[str, str] | No
             keep_spikes: bool = False, pairs: str | Path | None = None) -> dict[str, Any]:
     """Compare a measured surface before and after wear: the dict of compare.json, in SI.
 
-    files: the surface before and the one after, as two traces or two areal scans; optionally a second pair of traces in
-    the other direction. direction: "x" or "y", along which the first two traces run. units: units of x and z for files
-    that give none, such as ("mm", "um"). shift: known shift of the second trace [m], 0.0 if both start at the same
-    mark. keep_spikes: do not remove spikes, dropouts and dust. pairs: a table of pairs instead of files, with the
+    files: the surface before and the surface after wear, as two traces or two areal scans; optionally a second pair of
+    traces in the other direction. direction: "x" or "y", along which the first two traces run. units: units of x and z
+    for files that give none, such as ("mm", "um"). shift: known shift of the second trace [m], 0.0 if both start at the
+    same mark. keep_spikes: do not remove spikes, dropouts and dust. pairs: a table of pairs instead of files, with the
     columns before and after.
 
     In the dict, `verdict` and `sentences` are texts. `shift`, `worn_depth_mean`, `amplitude_ratio` and others have
     `value`, `low`, `high`, `unit`, and a `reason` if the value is None. Two scans also have `worn_volume`,
     `grown_volume`, `worn_share` and the `registration` in x, y and rotation. With `pairs` the dict has `pairs`, an
     entry per pair, and `means` with mean, interval and scatter; a pair that fails has its reason as `message`. For the
-    results folders of two runs, the second with [wear], it has the wear between them over the whole patch, and the
-    measures of both under `runs`. Raises PatchfemError for files that do not fit together.
+    results folders of two runs, the second with [wear], the dict has the wear between the two runs over the whole
+    patch, and the measures of both runs under `runs`. Raises PatchfemError for files that do not fit together.
     """
     how = {"units": units, "shift": _metres(shift, "compare: shift"), "keep_spikes": keep_spikes}
     files = [_path(one, "compare") for one in files]
@@ -500,7 +503,7 @@ def _on_stderr(text: str) -> None:
 
 def _without(sets: dict, kind: str) -> None:
     if sets:
-        raise PatchfemError(f"{', '.join(sets)} cannot be set in a {kind}; set it in the scene")
+        raise PatchfemError(f"{', '.join(sets)} cannot be set in a {kind}; set the value in the scene")
 
 
 class Measures(Mapping):
@@ -551,8 +554,8 @@ class Plots:
         self._result = result
 
     def pressure(self, ax: Axes | None = None) -> Axes:
-        """Normal stress along the interface, and the shear stress if there is any; of interfaces with a patch of their
-        own the normal stress on each. `ax` shows the first normal stress only.
+        """Normal stress along the interface, and the shear stress if there is any; if interfaces have patches of their
+        own, the normal stress on each. `ax` shows only the first of these charts.
         """
         bare = self._result.patch is None and not self._result.extra.get("faces")
         return self._drawn(ax, ("pressure", "faces"), "the scene has no [contact]" if bare else

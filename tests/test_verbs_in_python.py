@@ -112,7 +112,7 @@ def test_exact_an_export_is_that_of_the_command_line(saved, tmp_path, folder, na
 
 
 def test_refuses_settings_that_a_page_does_not_have(saved, tmp_path):
-    with pytest.raises(pf.PatchfemError, match="sliders for both"):
+    with pytest.raises(pf.PatchfemError, match="sliders for frame and magnification"):
         pf.view(saved / "pieces", tmp_path / "a.html", magnify=2.0)
 
 
@@ -140,11 +140,12 @@ def test_refuses_free_keys_without_two_ends(tmp_path, free, said):
 
 
 @pytest.mark.parametrize("scene, given, said", [
-    (BLOCK, {"offset": ["force"], "warm_up": True}, "offset belongs to a loop "
-                                                    "under a prescribed slide; warm_up belongs"),
-    (pf.new("bench"), {"starts": 3}, "starts belongs to rows of a rig"),
-    (pf.new("bench"), {"leave_out": "frequency"}, "leave_out belongs to rows of a rig"),
-    (pf.new("wear"), {"hold": "frequency=1 Hz"}, "hold belongs to a loop"), (BLOCK, {"starts": 0}, "at least one"),
+    (BLOCK, {"offset": ["force"], "warm_up": True}, "offset applies only to fits to a loop "
+                                                    "under a prescribed slide; warm_up applies only"),
+    (pf.new("bench"), {"starts": 3}, "starts applies only to fits to rows of a rig"),
+    (pf.new("bench"), {"leave_out": "frequency"}, "leave_out applies only to fits to rows of a rig"),
+    (pf.new("wear"), {"hold": "frequency=1 Hz"}, "hold applies only to fits to a loop"),
+    (BLOCK, {"starts": 0}, "at least one"),
     (BLOCK, {"seed": -1}, ">= 0"), (BLOCK, {"unstable": "maybe"}, "bound, out, read"),
     (BLOCK, {"hold": "frequency=135 Hz"}, "--hold frequency=135 Hz: no row")])
 def test_refuses_options_that_a_fit_does_not_have_before_anything_is_read(tmp_path, scene, given, said):

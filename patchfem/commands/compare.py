@@ -38,27 +38,29 @@ from .streams import plain
 
 
 def compare(before: Path | None = None, after: Path | None = None, /, *other: Path,
-            pairs: Annotated[Path | None, Parameter(help="a table with one pair of files or results folders per line, "
-                                                         "in place of BEFORE and AFTER, such as pairs.csv with the "
-                                                         "columns before and after")] = None,
-            direction: word("axis along which the traces run, x or y; not needed for an areal scan, which has "
-                            "both") = "",
+            pairs: Annotated[Path | None, Parameter(help="table of pairs in place of BEFORE and AFTER, such as "
+                                                         "pairs.csv: each line names two files or two results folders "
+                                                         "in the columns `before` and `after`")] = None,
+            direction: word("axis along which the traces run, x or y; not needed for areal scans") = "",
             units: Units = "",
             shift: word('known shift of the second trace (x of AFTER minus x of BEFORE), such as "0 mm" if both traces '
                         'start at the same mark') = "",
-            keep_spikes: flag("keep spikes, dropouts and dust, which are otherwise left out of traces") = False,
-            scene: Annotated[Path | None, Parameter(name="--scene", help="scene whose patch is pressed with each "
-                                                                         "surface, such as rig.toml")] = None,
+            keep_spikes: flag("keep spikes, dropouts and dust; without this option they are removed from "
+                              "traces") = False,
+            scene: Annotated[Path | None, Parameter(name="--scene", help="scene with a patch, such as rig.toml; the "
+                                                                         "patch is pressed with each of the two "
+                                                                         "surfaces in turn")] = None,
             set_: Sets = (), out: Out = None, json_: Json = False, quiet: Quiet = False):
-    """Compare the surface in BEFORE with that in AFTER: registration, worn depth, ratios, a verdict and a page. Areal
-    scans also give the worn volume, maps, and the levelled difference as X3P and text. Give two more traces to compare
-    the perpendicular direction too. With --pairs a table of many pairs gives mean, scatter and interval. Two results
-    folders, the second of a run with [wear], show what wore off.
+    """Compare the surfaces measured in the files BEFORE and AFTER. The results are the shift between the surfaces, the
+    worn depth, ratios of roughness parameters, a verdict and a page. Areal scans also give the worn volume, maps, and
+    the levelled difference as X3P and text. To compare the perpendicular direction too, append its two traces. With
+    --pairs, all pairs of a table are compared, with mean, scatter and interval over the pairs. BEFORE and AFTER may
+    also be two results folders, AFTER that of a run with [wear]; the page then shows what wore off.
 
     Example: patchfem compare before.csv after.csv --direction x -o out/worn
     """
     if direction not in ("", "x", "y"):
-        raise Refused(f"compare --direction {direction}: x or y is needed")
+        raise Refused(f"compare --direction {direction}: the direction must be x or y")
     how = {"units": pair(units), "shift": quantity(shift, "length", "compare --shift"), "keep_spikes": keep_spikes}
     files = [one for one in (before, after, *other) if one is not None]
     if pairs is not None:
@@ -68,7 +70,7 @@ def compare(before: Path | None = None, after: Path | None = None, /, *other: Pa
         _table(pairs, direction, how, placed(out, pairs.stem), json_, quiet)
         return
     if len(files) < 2:
-        raise Refused("compare: BEFORE and AFTER are needed, or --pairs with a table of them")
+        raise Refused("compare: give two files BEFORE and AFTER, or a table of pairs with --pairs")
     if before.is_dir() or after.is_dir():
         _no_traces({"a third file": other, "--direction": direction, "--units": units, "--shift": shift,
                     "--keep-spikes": keep_spikes, "--scene": scene, "--set": set_})
@@ -137,8 +139,8 @@ def _runs(before: Path, after: Path, out, json_: bool):
 def _pressed(scene: Path, sets, part, target: Path, quiet: bool):
     """The scene with each surface as its profile; the traces are written beside the page."""
     if not isinstance(part.before, profile.Profile):
-        raise Refused("compare --scene: the contact can be computed only for traces; write one row of each scan to a "
-                      "file")
+        raise Refused("compare --scene: the contact can be computed only for traces; write one line of heights of "
+                      "each scan to a file of its own")
     if scene_of(scene, sets).contact is None:
         raise Refused(f"compare --scene {scene}: the scene has no [contact], so it has no patch to press")
     models = []

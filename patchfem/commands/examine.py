@@ -69,7 +69,8 @@ def _threads() -> Finding:
         cores = len(os.sched_getaffinity(0))
     except AttributeError:  # not on every system
         cores = os.cpu_count() or 1
-    return Finding("threads", True, f"{cores} of {os.cpu_count()} cores; -j {cores} lets a sweep use them", "")
+    return Finding("threads", True, f"{cores} of {os.cpu_count()} cores can be used; with -j {cores} a sweep uses all "
+                                    f"of these", "")
 
 
 def _window() -> Finding:
@@ -82,7 +83,7 @@ def _window() -> Finding:
     except (OSError, subprocess.TimeoutExpired) as error:
         fine, why = False, str(error)[:100]
     cure = "" if fine else ("run apt-get install libgl1 libxcursor1 on a machine with a screen, or write a picture "
-                            "(view -o FILE.png), which needs neither")
+                            "(view -o FILE.png), which needs neither package")
     return Finding("the window by OpenGL", fine, "drawn" if fine else why, cure)
 
 
@@ -91,7 +92,7 @@ def _film() -> Finding:
     program = which("ffmpeg")
     found = "by ffmpeg" if program else _version("imageio-ffmpeg") and f"imageio-ffmpeg {_version('imageio-ffmpeg')}"
     return Finding("films (.mp4)", bool(found), found or "neither ffmpeg nor imageio-ffmpeg, optional",
-                   "" if found else "run pip install imageio-ffmpeg, or use .gif or .html, which do not need it")
+                   "" if found else "run pip install imageio-ffmpeg, or write .gif or .html, which need no ffmpeg")
 
 
 def _extras() -> Iterator[Finding]:

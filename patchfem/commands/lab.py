@@ -15,26 +15,30 @@ from .shared import Json, flag, note, texts, word
 class Estimate:
     """Options of a frequency response and its modes."""
 
-    segment: word('length of the averaged segments, such as "2 s" [the whole record if it begins and ends at rest, '
-                  "else an eighth]") = ""
-    window: word("window of the segments, hann or none, such as none [hann if the record is cut into segments]") = ""
+    segment: word('length of the averaged segments, such as "2 s"; default: the whole record if it begins and ends '
+                  "at rest, otherwise an eighth of the record") = ""
+    window: word("window function of the segments, hann or none, such as none; default: hann if the record is cut "
+                 "into several segments, otherwise none") = ""
     band: word('frequency band in which to find modes, such as "20 Hz..400 Hz"') = ""
-    decay: flag("read the record as a free decay, which gives frequency and damping without an input") = False
-    begin: word("where the free decay begins, such as \"0.2 s\" [at its largest value]") = ""
+    decay: flag("treat the record as a free decay; frequency and damping are then computed without a record of the "
+                "input") = False
+    begin: word('time at which the free decay begins, such as "0.2 s"; default: time of the largest value') = ""
 
 
 def import_(file: Path, /, *, out: Annotated[Path, Parameter(
-        name=["-o", "--out"], help="output: table.csv (records in SI), modes.toml (modes for a scene) or "
+        name=["-o", "--out"], help="file to write: table.csv (records in SI), modes.toml (modes for a scene) or "
                                    "response.uff")],
-            map_: texts('quantity of a channel of the file: "force=Load cell [lbf]", "displacement=12:+x", "time=t '
-                        '[s]", "force=run.load(:,2) [N]"; for shapes: slide=12:+x; may be repeated; without this '
-                        'option the labels of the channels are used', "--map") = (),
-            zero: flag("subtract the first row from time and displacement") = False,
+            map_: texts('quantity and name of a channel of the file, such as "force=Load cell [lbf]", '
+                        '"displacement=12:+x", "time=t [s]", "force=run.load(:,2) [N]"; or, for mode shapes, '
+                        'slide=12:+x; may be repeated; without this option the labels of the channels are used',
+                        "--map") = (),
+            zero: flag("subtract the time and the displacement of the first row from all rows") = False,
             modes: Annotated[Estimate, Parameter(name="*")] = Estimate(), json_: Json = False):
-    """Convert a laboratory file (.uff: datasets 58 in the units of 164; .mat; .csv with units in its header) into the
-    table that drive.file, slide.file and fit --to read, or into modes of a scene. Modes come from an input and a
-    response, from a free decay, from mode shapes (dataset 55) or from frequency responses. With --decay the table has
-    the frequency and damping ratio of the decay over its amplitude, with 95 % intervals; fit --to reads it as well.
+    """Convert a laboratory file into a table or into the modes of a scene. The table can be used as `drive.file`, as
+    `slide.file` and with `fit --to`. The laboratory file may be .uff (datasets 58, with the units of dataset 164),
+    .mat, or .csv with units in its header. Modes are computed from an input and a response, from a free decay, from
+    mode shapes (dataset 55) or from frequency responses. With --decay the table gives frequency and damping ratio of
+    the decay against its amplitude, with 95 % intervals.
 
     Example: patchfem import bench.uff --map "force=Load cell [lbf]" --map displacement=12:+x -o loop.csv
     """

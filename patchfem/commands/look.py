@@ -14,16 +14,17 @@ Frame = Annotated[int | None, Parameter(help="number of the frame, such as 0 for
 
 
 def export(folder: Path, /, *, out: Annotated[Path, Parameter(
-        name=["-o", "--out"], help="fields.pvd (a series, for any ParaView), .vtu, .csv or .vtkhdf; cycle.py (plays "
-                                   "the last cycle in ParaView); histories.uff, .mat or .csv; for a scene its "
-                                   "matrices and friction elements as .mat (NLvib) or .npz (TMDSimPy, pyHarm)")],
+        name=["-o", "--out"], help="file to write; fields: fields.pvd (all frames, for any version of ParaView), "
+                                   ".vtu, .csv or .vtkhdf; script that plays the last cycle in ParaView: cycle.py; "
+                                   "histories: histories.uff, .mat or .csv; matrices and friction elements of a "
+                                   "scene: .mat (NLvib) or .npz (TMDSimPy, pyHarm)")],
            frame: Frame = None, sets: Sets = (),
-           histories: flag("the histories and loops as .csv, not the interface") = False,
+           histories: flag("write histories and loops as .csv, instead of the fields along the interface") = False,
            of: word("stress that the script for ParaView shows in colour, such as sigma_yy or tau_xy (default: "
                     "von_mises); 'status' shows where the interface sticks and slips",
                     "--of") = ""):
-    """Write the fields of a results folder in another format, or its histories and loops. For a fit, write the measured
-    and the fitted loop; for a scene, write its structure for other programs.
+    """Write the fields, or the histories and loops, of a results folder in another format. From the folder of a fit,
+    write the measured and the fitted loop. From a scene, write the structure for other programs.
 
     Example: patchfem export out/rig -o histories.uff
     """
@@ -38,8 +39,8 @@ def export(folder: Path, /, *, out: Annotated[Path, Parameter(
     print(structures.export(model_of(folder, sets), out))
 
 
-def view(folder: Path, /, *, out: out_in("picture.png in place of "
-                                         "a window; .gif, .mp4 or .html for the last cycle") = None,
+def view(folder: Path, /, *, out: out_in("file to write instead of opening a window: picture.png for one frame; .gif, "
+                                         ".mp4 or .html for the last cycle") = None,
          frame: Frame = None,
          magnify: Annotated[float | None, Parameter(help="magnification of displacements, such as 1000")] = None):
     """Show the pressed pieces of a results folder in a window, or draw them into a picture or a film.
@@ -50,8 +51,9 @@ def view(folder: Path, /, *, out: out_in("picture.png in place of "
         print(told)
 
 
-def report(*folders: Path, out: out_in("page to write; unless given report.html in the current folder") = None,
-           measured: Annotated[Path | None, Parameter(help="measured data to plot over the runs: a laboratory file, or "
+def report(*folders: Path, out: out_in("page to write; default: report.html in the current folder") = None,
+           measured: Annotated[Path | None, Parameter(help="measured data to plot in the same charts as the runs: a "
+                                                           "laboratory file, or "
                                                            "a table written by `import`")] = None):
     """Show the results folders of several runs, or of several sweeps over the same keys, side by side on one page. For
     a single sweep, rebuild its page.

@@ -14,21 +14,23 @@ from .shared import Json, Refused, Units, flag, note, out_in, pair, quantity, wo
 
 def profile(file: Path, /, *more: Path,
             cutoff: word('wavelength that separates roughness from waviness (L-filter), such as "0.25 mm"') = "",
-            form: word("form to subtract first: a degree from 1 (line or plane) to 9 such as 2, or cylinder") = "1",
-            s_filter: word('wavelength below which waves are removed first, such as "2.5 um"') = "",
+            form: word("form to subtract first: a polynomial, given by its degree from 1 (line or plane) to 9, such "
+                       "as 2; or `cylinder`") = "1",
+            s_filter: word('wavelength of the S-filter, such as "2.5 um"; shorter waves are removed first') = "",
             level: word('height above the mean line at which the material ratio is computed, such as "0.5 '
                         'um"') = "0 um",
             ratios: word('two material ratios in percent, such as "10,90"; the height difference between them is '
                          'computed') = "10,90",
             window: word('part to evaluate, between two positions such as "468 um,733 um"; a scan needs four '
-                         'positions, those in x first') = "",
-            tip: word('radius of the stylus tip, to check whether it reaches the valleys, such as "12.5 um"') = "",
+                         'positions, first the two in x, then the two in y') = "",
+            tip: word('radius of the stylus tip, for a check whether the tip reaches the valleys, such as "12.5 '
+                      'um"') = "",
             units: Units = "",
             out: out_in("folder for a page, a table of the parameters and the levelled heights, such as "
                         "out/trace") = None, json_: Json = False,
             verbose: flag("print the definition of each parameter", "-v", "--verbose") = False):
-    """Print roughness parameters of each FILE with the intervals that one trace allows; for several files also their
-    means.
+    """Print the roughness parameters of each FILE, with intervals estimated from this one file. For several files,
+    print also the mean of each parameter.
 
     Example: patchfem profile trace.csv --cutoff "0.25 mm"
     """

@@ -28,10 +28,10 @@ from .shared import (
 
 
 def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False,
-        resume: flag("continue an interrupted run that has [wear] or is integrated in time") = False,
-        fresh: flag("compute the stiffness of the pieces again, without the cache") = False,
+        resume: flag("continue an interrupted run, if it has [wear] or is integrated in time") = False,
+        fresh: flag("compute the stiffness of the pieces again instead of taking it from the cache") = False,
         no_page: NoPage = False, quiet: Quiet = False,
-        verbose: flag("print also the time of each part of the run", "-v", "--verbose") = False):
+        verbose: flag("print also the computing time of each part of the run", "-v", "--verbose") = False):
     """Run SCENE and write its results folder, by default out/<scene name>.
 
     Example: patchfem run rig.toml --set "drive.acceleration=6 g" -o out/six
@@ -101,6 +101,6 @@ def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
         print(f"fields: {target / 'fields.vtkhdf'} for ParaView 5.13 or newer; for older versions run `patchfem export "
               f"{place} -o {shlex.quote(str(target / 'fields.pvd'))}`")
     if inside := sorted(target.glob("interfaces/*")):
-        print(f"fields: of every interface in {target / 'interfaces'}; show them by `patchfem view "
+        print(f"fields: those of every interface are in {target / 'interfaces'}; to show them, run `patchfem view "
               f"{shlex.quote(str(inside[0]))}`")
     sys.stdout.flush()

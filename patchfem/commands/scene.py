@@ -21,8 +21,8 @@ from .sweep import Over
 
 
 def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
-    """Name every mistake in SCENE and in its files without computing. A [sweep] in which every case is invalid counts
-    as a mistake.
+    """List every mistake in SCENE and in the files that it names; nothing is computed. A table [sweep] in which every
+    case is invalid counts as a mistake.
 
     Example: patchfem check rig.toml
     """
@@ -55,10 +55,10 @@ def _faults(tables, folder: Path, whole: bool, notes: list) -> list:
 
 
 def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Json = False,
-         probe: flag("measure the speed of this machine, and solve the static patch for its stiffness") = False,
+         probe: flag("measure the speed of this machine, and compute the stiffness of the static patch") = False,
          verbose: flag("list also the effects that the scene does not name", "-v", "--verbose") = False):
-    """Print what SCENE would run: size, cost, stiffness chain and dimensionless groups. With --over, or a table
-    [sweep], plan the whole sweep.
+    """Print what a run of SCENE would compute: sizes, cost, the stiffnesses in series and dimensionless groups. With
+    --over, or if SCENE has a table [sweep], plan the whole sweep.
 
     Example: patchfem plan rig.toml --over "contact.tilt.angle=1e-6 rad..1e-2 rad:9"
     """
@@ -66,7 +66,8 @@ def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Js
     read = scene_of(scene, set_) if over is None else None
     if over is not None or read.sweep:
         if probe:
-            raise Refused("--probe works for one case; choose its values with --set and leave out the sweep")
+            raise Refused("--probe works for a single case, not for a sweep; give the values of this case with --set "
+                          "and leave out the sweep")
         _plan_sweep(scene, set_, over or Over(), json_, verbose)
         return
     found = plans.plan(read)
@@ -91,10 +92,12 @@ def _plan_sweep(scene: Path, sets, what: Over, json_: bool, verbose: bool) -> No
         print(json.dumps(answer))
         return
     print("case     " + ", ".join(f"{key} {brief(text)}" for key, text in answer["case"].items())
-          + ", the first; the lines below refer to this case, except the cost and the last line")
+          + " (the first case); the lines below describe this case, except that `cost` and `sweep` are for the whole "
+            "sweep")
     _print_plan(answer, False, verbose)
     print(f"sweep    {answer['cases']} cases of " + ", ".join(f"{n} {key}" for key, n in answer["values"].items())
-          + f"; about {answer['seconds_per_case']:.2g} s each on one core, {answer['disk_bytes'] / 1e6:.2g} MB on disk")
+          + f"; about {answer['seconds_per_case']:.2g} s for each case on one core, {answer['disk_bytes'] / 1e6:.2g} "
+            f"MB on disk for all cases")
 
 
 def _print_plan(answer: dict, probe: bool, verbose: bool) -> None:
@@ -119,7 +122,7 @@ def _print_plan(answer: dict, probe: bool, verbose: bool) -> None:
     for name, value in answer["groups"].items():
         print(f"group    {_group(value, name)}")
     if verbose:
-        print(f"not on   {', '.join(shown_absent(answer['not_in_scene'], answer['engine']))}")
+        print(f"absent   {', '.join(shown_absent(answer['not_in_scene'], answer['engine']))}")
 
 
 def _words(name: str) -> str:
@@ -136,7 +139,7 @@ def _group(value: float, name: str) -> str:
 
 def mesh(scene: Path, /, *, out: Annotated[Path, Parameter(name=["-o", "--out"], help="mesh.msh or mesh.vtu")],
          set_: Sets = ()):
-    """Write the tagged mesh of SCENE.
+    """Write the mesh of the pieces of SCENE, with its tags.
 
     Example: patchfem mesh rig.toml -o pieces.vtu
     """

@@ -37,8 +37,8 @@ Sets = texts('change a value of the scene, such as "contact.load=30 lbf"; may be
 Json = flag("print the answer as one JSON object", "--json")
 Out = out_in("folder of the results, such as out/mine")
 Quiet = flag("print only errors", "-q", "--quiet")
-Units = word('units of x and z if a file gives none or wrong ones, such as "mm,um"; for a matrix of heights the pixel '
-             'size and the unit of z, such as "0.8 um,nm"')
+Units = word('units of x and z if a file gives none or wrong ones, such as "mm,um"; for a matrix of heights: pixel '
+             'size and unit of z, such as "0.8 um,nm"')
 NoPage = flag("leave out report.html", "--no-page")
 
 

@@ -33,7 +33,8 @@ def new(kind: str = "", /, *, out: out_in("file to write, such as mine.toml; def
 
 
 def demo(*, out: Out = None, no_page: NoPage = False):
-    """Run the scene that comes with the program, the rig of the 1985 report at 143 Hz and 5 g, into out/demo.
+    """Run the scene that comes with the program: the rig of the 1985 report at 143 Hz and 5 g. Write the results to
+    out/demo.
 
     Example: patchfem demo
     """
@@ -57,8 +58,8 @@ def schema(*, out: out_in("file to write, such as scene.json; default: the scree
 
 
 def doctor(*, json_: Json = False):
-    """Print what is installed: versions, kept compiled code, pictures, threads, optional packages and how to install
-    each.
+    """Print what is installed: versions, size of the cache of compiled code, support for pictures, usable cores, and
+    optional packages with the command that installs each.
 
     Example: patchfem doctor
     """
@@ -72,7 +73,8 @@ def doctor(*, json_: Json = False):
 
 
 def cite(scene: Path | None = None, /):
-    """Print BibTeX of the report and of this program; with SCENE also of the papers that its effects stand on.
+    """Print BibTeX entries for the 1985 report and for this program. With SCENE, print also entries for the papers on
+    which the effects of this scene are based.
 
     Example: patchfem cite rig.toml
     """

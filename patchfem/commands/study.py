@@ -36,7 +36,8 @@ from .shared import (
 def cost(scene: Path, /, *, over: word("vary only one setting: element_size, steps_per_cycle, shear_modes or "
                                        "jumps") = "",
          out: Out = None, set_: Sets = (), json_: Json = False, quiet: Quiet = False):
-    """Measure error against CPU seconds of SCENE for one accuracy setting, or for all that it has.
+    """Measure how the error of SCENE depends on computing time (CPU seconds), for one accuracy setting or for all
+    settings that SCENE has.
 
     Example: patchfem cost rig.toml --over steps_per_cycle
     """
@@ -63,15 +64,16 @@ def cost(scene: Path, /, *, over: word("vary only one setting: element_size, ste
 ALL = "all"  # of the ways of a backbone
 
 
-def backbone(scene: Path, /, *, mode: word("mode, by its name such as axial or, in a rig of masses, by its number; "
-                                           "default: the first") = "",
+def backbone(scene: Path, /, *, mode: word("name of the mode, such as axial, or its number in a rig of masses; "
+                                           "default: the first mode") = "",
              amplitudes: word('amplitudes (half peak-to-peak at the output), such as "1 um..1 mm:25"; default: around '
                               'the onset of slip') = "",
              method: Annotated[Literal["balance", "decay", "quasi-static", "all"], Parameter(
                  help="method that computes the motion, "
                       "such as balance; default: all methods, compared with each other")] = ALL,
              out: Out = None, set_: Sets = (), no_page: NoPage = False, json_: Json = False, quiet: Quiet = False):
-    """Compute frequency and damping of a mode of SCENE against its amplitude, contact included and without the drive.
+    """Compute frequency and damping ratio of a mode of SCENE against its amplitude. The contact is included; the drive
+    is left out.
 
     Example: patchfem backbone rig.toml --mode axial --amplitudes "0.1 um..1 mm:25"
     """
@@ -101,37 +103,40 @@ EXACT = 1e-12  # of a value, below which an error is round-off
 class Rows:
     """Options of a fit of a rig to rows."""
 
-    leave_out: word("cross-validation: refit without each value of a column such as frequency, input or run, and score "
-                    "the rows left out") = ""
+    leave_out: word("column for cross-validation, such as frequency, input or run: each value of the column is left "
+                    "out in turn, and the fit to the other rows is scored on the rows left out") = ""
     starts: Annotated[int | None, Parameter(
-        help="number of random starts inside the ranges, such as 20; the best is used; default: 8, or 3 for a curve "
-             "over the amplitude")] = None
-    seed: Annotated[int, Parameter(help="seed seed of the random starts, such as 1")] = 0
+        help="number of random starts inside the ranges, such as 20; the best result is used; default: 8, or 3 for a "
+             "curve of frequency and damping against amplitude")] = None
+    seed: Annotated[int, Parameter(help="seed of the random starts, such as 1")] = 0
     unstable: Annotated[Literal["bound", "out", "read"], Parameter(
-        help="how the fit uses rows flagged U: as lower bounds, not at all, or as read, such as out")] = "bound"
+        help="how the fit uses rows with the flag U, such as out: bound (as lower bounds), out (not at all) or read "
+             "(like all other rows)")] = "bound"
     placebo: texts('repeat the fit with each of these values, such as "structure.mode.yaw.frequency=110 Hz,138 Hz", to '
-                   "see whether the rows prefer the value in the scene") = ()
-    resume: flag("continue an interrupted fit; the starts that it finished are kept") = False
+                   "check whether the value in the scene fits the measured rows best") = ()
+    resume: flag("continue an interrupted fit; starts already finished are not repeated") = False
 
 
 def fit(scene: Path, /, *, to: word(
-            'measured file: loop.csv for a scene with [slide] ("time [s],displacement [um],force [N]", or what export '
-            'writes), rows.csv or decay.csv (import --decay) for a rig, compare.json or "worn_depth_max=2.5 um..3.5 '
-            'um" for a scene with [wear]') = "",
-        free: texts('a key to fit and its range, such as "friction.static=0.1..0.6"; may be repeated') = (),
+            'measurements; for a scene with [slide]: loop.csv with the columns "time [s],displacement [um],force [N]", '
+            'or a loop written by export; for a rig: rows.csv, or decay.csv written by import --decay; for a scene '
+            'with [wear]: compare.json, or a depth such as "worn_depth_max=2.5 um..3.5 um"') = "",
+        free: texts('key to fit and its range, such as "friction.static=0.1..0.6"; may be repeated') = (),
         from_patch: flag("in place of --to and --free: fit lumped Iwan, Bouc-Wen and elastic-plastic laws to the loops "
                          "of the scene's own patch; each law is written as a scene, with the error of the law") = False,
         amplitudes: word('with --from-patch: amplitudes of the slide (half peak-to-peak), such as "0.1 um..10 um:25"; '
-                         'default: from the onset of slip on') = "",
-        hold: texts('rows held out: predicted but not fitted, such as "frequency=135 Hz,150 Hz"') = (),
-        offset: texts("for a loop: offsets to fit as well, such as force (constant over the record) or displacement "
-                      "(of the first row from the unstressed position)") = (),
+                         'default: amplitudes from the onset of slip upwards') = "",
+        hold: texts('rows to hold out: the fit predicts them but does not use them, such as "frequency=135 Hz,150 '
+                    'Hz"') = (),
+        offset: texts("for a loop: offset to fit as well, such as force (constant over the record) or displacement "
+                      "(of the first row from the position without stress); may be repeated") = (),
         warm_up: flag("for a loop: run the whole cycles of the record once before the cycles that are fitted") = False,
         rows: Annotated[Rows, Parameter(name="*")] = Rows(),
         out: Out = None, set_: Sets = (), json_: Json = False, quiet: Quiet = False):
-    """Fit values of keys of SCENE to measurements: a bench to a friction loop; a rig to rows of frequency, input,
-    acceleration and displacement, or to frequency and damping over amplitude; the wear coefficient to a measured wear
-    depth; or lumped laws to the loops of the scene's own patch.
+    """Fit values of keys of SCENE to measurements. A bench is fitted to a friction loop. A rig is fitted to rows of
+    frequency, input, acceleration and displacement, or to frequency and damping against amplitude. For a scene with
+    [wear], the wear coefficient is fitted to a measured wear depth. With --from-patch, lumped laws are fitted to the
+    loops of the scene's own patch.
 
     Example: patchfem fit bench.toml --to loop.csv --free "friction.static=0.1..0.6"
     """

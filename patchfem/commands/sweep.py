@@ -26,15 +26,19 @@ TABLE = 1000  # bytes of a lumped case in sweep.csv and sweep.nc
 class Over:
     """Which cases."""
 
-    over: texts("table.key=v1,v2,... or table.key=1 mm..9 mm:9 (:9log, :9lin), may be repeated", "--over") = ()
-    cases: Annotated[Path | None, Parameter(name="--cases", help="file of cases, such as cases.csv: a column "
-                                                                 "`table.key [unit]` per key, a row per case")] = None
+    over: texts("key and its values: table.key=v1,v2,... or, for 9 values in a range, table.key=1 mm..9 mm:9 (:9log "
+                "or :9lin fixes the spacing); may be repeated", "--over") = ()
+    cases: Annotated[Path | None, Parameter(name="--cases", help="file of cases, such as cases.csv: one column "
+                                                                 "`table.key [unit]` for each key, one row for each "
+                                                                 "case")] = None
     random: Annotated[int, Parameter(name="--random", show_default=False, help=
-                                     "number of random cases, such as 200, drawn from ranges such as 1 mm..9 mm")] = 0
-    sobol: Annotated[int, Parameter(name="--sobol", show_default=False, help="number of cases by Sobol's sequence, "
-                                                                             "such as 256; best a power of 2")] = 0
-    seed: Annotated[int, Parameter(name="--seed", help="seed seed of the draws, such as 1")] = 0
-    of: word("measure that the answer and the page begin with, such as equivalent_damping", "--of") = ""
+                                     "number of random cases, such as 200, drawn from the ranges in --over, such as 1 "
+                                     "mm..9 mm")] = 0
+    sobol: Annotated[int, Parameter(name="--sobol", show_default=False, help="number of cases from Sobol's sequence, "
+                                                                             "such as 256; a power of 2 is best")] = 0
+    seed: Annotated[int, Parameter(name="--seed", help="seed of the random cases, such as 1")] = 0
+    of: word("measure that the answer and the first picture of the page are about, such as equivalent_damping",
+             "--of") = ""
 
     def given(self) -> bool:
         """Whether any case is asked for."""
@@ -48,11 +52,11 @@ class Over:
     def request(self):
         """The request; Refused where its parts do not stand together."""
         if self.random and self.sobol:
-            raise Refused("--random and --sobol: use one of them to draw the cases")
+            raise Refused("--random and --sobol: use only one of them")
         if min(self.random, self.sobol, self.seed) < 0:
             raise Refused("--random, --sobol and --seed must be whole numbers >= 0")
         if (self.random or self.sobol) and not self.over:
-            raise Refused("--random and --sobol need --over table.key=low..high to draw from")
+            raise Refused("--random and --sobol draw values from ranges; give each range by --over table.key=low..high")
         return ask.Request(self.over, self.cases, self.random or self.sobol, bool(self.sobol), self.seed,
                            self.of)
 
@@ -63,11 +67,13 @@ class By:
     """Who works, and on which part."""
 
     jobs: Annotated[int, Parameter(name=["-j", "--jobs"], help="number of processes on this machine, such as 4")] = 1
-    executor: word("dask (a cluster on this machine) or dask:ADDRESS, such as dask:tcp://10.0.0.2:8786",
+    executor: word("where the cases run: dask (a cluster on this machine) or dask:ADDRESS, such as "
+                   "dask:tcp://10.0.0.2:8786",
                    "--executor") = ""
-    shard: word("run only one part, such as 3/40, into a folder that all parts share", "--shard") = ""
-    collect: flag("only write the tables of a sweep after all its cases are done", "--collect") = False
-    device: word("processor for batches of cases, such as cpu (the only one so far)", "--device") = "cpu"
+    shard: word("run only one part of the cases, such as 3/40 for the third of 40 parts; all parts write into the "
+                "same folder", "--shard") = ""
+    collect: flag("run no case, only write the tables of a sweep whose cases are all done", "--collect") = False
+    device: word("processor for batches of cases, such as cpu (the only choice so far)", "--device") = "cpu"
 
     def __post_init__(self):
         if self.device != "cpu":
@@ -80,24 +86,25 @@ class By:
             return None
         i, _, n = self.shard.partition("/")
         if not (i.isdecimal() and n.isdecimal() and 1 <= int(i) <= int(n)):
-            raise Refused(f"--shard {self.shard}: i/n with i from 1 to n is needed, such as 3/40")
+            raise Refused(f"--shard {self.shard}: must be i/n with i from 1 to n, such as 3/40")
         return int(i), int(n)
 
 
 def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out: Out = None, set_: Sets = (),
           resume: flag("continue an interrupted sweep in this folder") = False,
           keep: Annotated[Literal["none", "summaries", "results", "pages"] | None, Parameter(
-              help="what to keep of each case besides its row: summaries, results, pages (results with report.html) or "
-                   "none, such as results; default: summaries for up to 1000 cases")] = None,
+              help="files to keep of each case besides its row in the tables: none, summaries, results, or pages "
+                   "(results with report.html), such as results; default: summaries for up to 1000 cases, none for "
+                   "more")] = None,
           no_page: NoPage = False, json_: Json = False, quiet: Quiet = False):
-    """Run SCENE for all combinations of the values in --over, or in its table [sweep]. Write sweep.csv, sweep.nc and
-    report.html, by default into out/<scene name>-sweep.
+    """Run SCENE for all combinations of the values in --over, or of the values in its table [sweep]. Write sweep.csv,
+    sweep.nc and report.html; the default folder is out/<scene name>-sweep.
 
     Example: patchfem sweep rig.toml --over "contact.tilt.angle=1e-6 rad..1e-2 rad:9" -j 2
     """
     if no_page and keep == "pages":
-        raise Refused("sweep: --no-page leaves out every report.html, --keep pages writes one for each case; use one "
-                      "of them")
+        raise Refused("sweep: --no-page leaves out every report.html, but --keep pages writes one for each case; use "
+                      "only one of these options")
     by = by or By()
     begin, part = perf_counter(), by.part()
     target, tells = placed(out, f"{scene.stem}-sweep"), "json" if json_ else "faults" if quiet else "words"

@@ -19,8 +19,8 @@ WAYS = {"balance": "The curve belongs to the periodic motion that the rig would 
                    "slow decay follows this motion, and so does a test in phase resonance.",
         "decay": "The curve belongs to a free decay from the largest amplitude; frequency and damping are evaluated "
                  "from one turning point to the next.",
-        "quasi-static": "The curve is computed from one static force, with the shape of the mode while the contact "
-                        "sticks, and from the loops of the friction law."}
+        "quasi-static": "The frequency follows from a static force that is distributed like the mode with the contact "
+                        "stuck, the damping from the loops of the friction law."}
 COLOURS = {"balance": "accent", "decay": "warm", "quasi-static": "#2f9e63"}
 LISTED, MOST_LISTED = 9, 25  # amplitudes in the table on the screen of a curve of more, and the most of others
 
@@ -97,15 +97,16 @@ def page(found: Backbone, title: str) -> str:
                     for one in made)
     first, *more = sentences(found)
     told = f"<div class=verdict><b>{escape(first)}</b>{''.join(f'<p>{escape(text)}</p>' for text in more)}</div>"
-    sections = [Section("curves", "Frequency and damping over the amplitude",
-                        f"<figure><div class=row>{cells}</div><figcaption>Bars are numerical errors.</figcaption>"
+    sections = [Section("curves", "Frequency and damping against amplitude",
+                        f"<figure><div class=row>{cells}</div><figcaption>The bars show the numerical "
+                        f"errors.</figcaption>"
                         "</figure>" if made else "<p>No curve was found.</p>"),
-                Section("ways", "How they were found", table(("", ""), [
+                Section("ways", "How the curves were computed", table(("", ""), [
                     [escape(way), escape(text if way in found.curves else f"not known: {found.missing[way]}")]
                     for way, text in WAYS.items() if way in found.curves or way in found.missing]) + "".join(
                         f"<p>{escape(text[0].upper() + text[1:])}.</p>" for text in found.notes)),
                 Section("values", "Values", _values(found))]
-    title = f"Mode {found.mode} over its amplitude" + f": {title}" * bool(title)
+    title = f"Mode {found.mode}: frequency and damping against amplitude" + f": {title}" * bool(title)
     return document(title, told, sections, {"charts": made} if made else None,
                     ("figures.js", "curves.js") if made else ())
 
@@ -131,7 +132,7 @@ def _held(found: Backbone) -> str:
 
 def sentences(found: Backbone) -> list:
     """The answer in sentences: frequency and damping ratio at both ends of the amplitudes first."""
-    held = "" if found.stuck is None else f", and {_held(found)} while the contact holds"
+    held = "" if found.stuck is None else f", and {_held(found)} while the contact sticks"
     free = scales.short(found.free, "Hz", 5)
     out = [f"The natural frequency of mode {found.mode} is {free} without the contact{held}."]
     best = next((found.curves[way] for way in ("balance", "quasi-static", "decay") if way in found.curves), None)
@@ -150,7 +151,8 @@ def sentences(found: Backbone) -> list:
     if powers:
         out.append(f"The energy that the contact dissipates per cycle grows with the amplitude {' and '.join(powers)}.")
     if found.flutter is not None:
-        out.append(f"Beyond {scales.short(found.flutter, 'm', 3)} the mode gains energy, because friction no longer "
+        out.append(f"At amplitudes above {scales.short(found.flutter, 'm', 3)} the mode gains energy, because "
+                   f"friction no longer "
                    "dissipates enough.")
     return out
 

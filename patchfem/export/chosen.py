@@ -33,7 +33,7 @@ def export(folder: Path, out: Path, frame: int | None = None, histories: bool = 
                             "component")
     if out.suffix == ".py":
         if frame is not None:
-            raise PatchfemError("--frame: a script plays the whole last cycle")
+            raise PatchfemError("--frame: cannot be used with a script, which plays the whole last cycle")
         return paraview.write_script(folder, out, of or "von_mises")
     return vtu.export(folder, out, frame)
 
@@ -44,5 +44,6 @@ def view(folder: Path, out: Path | None, frame: int | None = None, magnify: floa
         viewer.view(folder, out, frame, magnify)
         return ""
     if frame is not None or magnify is not None:
-        raise PatchfemError("--frame, --magnify: a page shows the last cycle and has sliders for both")
+        raise PatchfemError("--frame, --magnify: cannot be used with a page, which shows the last cycle and has "
+                            "sliders for frame and magnification")
     return player.write_page(folder, out)

@@ -27,10 +27,11 @@ from .results import PAGE, STARTS, Folder
 
 LOOP, ROWS = ("offset", "warm_up"), ("leave_out", "seed", "unstable", "placebo", "resume")
 STARTED = {"rows": 8, "curve": 3}  # starts of a search, unless given
-BELONG = {"hold": "a loop under a prescribed slide "
-                  "or to rows of a rig", **dict.fromkeys(LOOP, "a loop under a prescribed slide"),
-          "starts": "rows of a rig or to its curve over the amplitude", **dict.fromkeys(ROWS, "rows of a rig"),
-          "amplitudes": "--from-patch"}
+BELONG = {"hold": "fits to a loop under a prescribed slide "
+                  "or to rows of a rig", **dict.fromkeys(LOOP, "fits to a loop under a prescribed slide"),
+          "starts": "fits to rows of a rig or to its curve of frequency and damping against "
+                    "amplitude", **dict.fromkeys(ROWS, "fits to rows of a rig"),
+          "amplitudes": "fits with --from-patch"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -108,10 +109,11 @@ def _refuse(kind: str, options: Options, named: Callable) -> None:
     here = {"loop": ("hold", *LOOP), "rows": ("hold", "starts", *ROWS), "curve": ("starts",),
             "patch": ("from_patch", "amplitudes")}.get(kind, ())
     is_ = {"loop": "a bench", "rows": "a rig", "wear": "one with [wear]",
-           "curve": "a rig, fitted to a curve over the amplitude", "patch": "fitted to its own patch"}[kind]
+           "curve": "a rig, fitted to a curve of frequency and damping against amplitude", "patch": "fitted to its "
+                                                                                                    "own patch"}[kind]
     others = [name for name in options.given() if name not in here]
     if others:
-        belong = "; ".join(f"{named(name)} belongs to {BELONG[name]}" for name in others)
+        belong = "; ".join(f"{named(name)} applies only to {BELONG[name]}" for name in others)
         raise PatchfemError(f"{belong}; this scene is {is_}, leave {'it' if len(others) == 1 else 'them'} out")
     for name, least in (("starts", 1), ("seed", 0)):
         value = getattr(options, name)
@@ -142,4 +144,4 @@ def lines_of(answer: dict) -> list:
         own = {"rows": written, "decay": fitted_decay, "patch": fitted_patch}
         return own.get(answer["quantity"], loop_lines).lines_of(answer)
     value, low, high = (scales.plain(number, 4) for number in (one["value"], *one["interval"]))
-    return [f"{wear_coefficient.KEY} {value} {one['unit']}, {low} to {high} by the interval of {answer['quantity']}"]
+    return [f"{wear_coefficient.KEY} {value} {one['unit']}, {low} to {high} from the interval of {answer['quantity']}"]

@@ -116,7 +116,8 @@ def lines_of(answer: dict) -> list:
     if answer["mesh"] is not None:
         stiff, loss = (answer["mesh"][part] for part in PARTS)
         out.append(f"  A mesh coarser than the present one ({answer['mesh']['nodes']} interface nodes) changes the "
-                   f"stiffness of the patch by at most {_percent(abs(stiff['largest']))}, and its loss by at most "
+                   f"stiffness of the patch by at most {_percent(abs(stiff['largest']))}, and the energy dissipated "
+                   f"per cycle by at most "
                    f"{_percent(abs(loss['largest']))} (at {short(loss['at'], 'm', 3)}) and by {_percent(loss['rms'])} "
                    "rms.")
     return out
@@ -130,8 +131,8 @@ def sentences(law: str, answer: dict) -> list:
             f"most {_percent(abs(stiff['largest']))} (at {at}) and by {_percent(stiff['rms'])} rms.",
             f"The energy that this law dissipates per cycle is up to {_percent(abs(loss['largest']))} "
             f"{'larger' if loss['largest'] > 0 else 'smaller'} than that of the patch (at {there}) and differs by "
-            f"{_percent(loss['rms'])} rms; a loss below a thousandth of 4 x force x slide is compared as if it were "
-            "that large.",
+            f"{_percent(loss['rms'])} rms; where this energy is below a thousandth of 4 x force x slide, the "
+            f"difference is given relative to that thousandth.",
             "The error of a mode's frequency is then at most about half that of the stiffness; the error of its "
             "friction damping is at most the sum of both."]
 

@@ -62,7 +62,8 @@ def sentence(measures: dict, tolerance, where) -> str:
     count, case, others = int(lost[name].sum()), int(np.argmax(share)), len(lost) - 1
     known = f"{plain(100 * share[case], 2)} % of its value" if share[case] <= ZERO else "larger than the value"
     called = LONGER.get(name) or label(name)
-    more = f"; {others} other measure{'s' * (others > 1)} miss{'es' * (others == 1)} it in some case" if others else ""
+    more = (f"; {others} other measure{'s' * (others > 1)} miss{'es' * (others == 1)} the tolerance in some cases"
+            if others else "")
     return (f"{count} of {number} cases miss{'es' * (count == 1)} {asked} in {called}; the largest error is at "
             f"{where(case)}: {known}{more}.")
 

@@ -30,20 +30,20 @@ LONG = {
                            "slip"),
     "yaw_moment": ("N m", "moment about +z of the friction on the upper piece, sum of y f_x - x f_y"),
     "normal_load": ("N", "normal load on the interface"),
-    "friction_work": ("J", "work done against friction since the start"),
+    "friction_work": ("J", "work done against friction since the start of the run"),
     "energy_stored": ("J", "elastic energy of the interface"),
-    "energy_dissipated": ("J", "energy dissipated by friction since the start"),
-    "energy_created": ("J", "energy created since the start by a law that is not passive"),
+    "energy_dissipated": ("J", "energy dissipated by friction since the start of the run"),
+    "energy_created": ("J", "energy created since the start of the run by a friction law that is not passive"),
     "output_displacement": ("m", "displacement of the output relative to the base"),
     "output_velocity": ("m s-1", "velocity of the output relative to the base"),
     "modal_coordinate": ("m", "modal coordinate"),
     "normal_stress": ("Pa", "normal stress at the nodes, compression positive"),
     "strip_normal_stress": ("Pa", "normal stress at the nodes of every strip, compression positive"),
-    "gap": ("m", "remaining gap"),
+    "gap": ("m", "gap that remains between the loaded surfaces"),
     "shear_stress": ("Pa", "frictional shear stress, positive when it opposes positive slip"),
     "slip": ("m", "irreversible local slip"),
-    "worn_depth": ("m", "worn depth, both pieces together"),
-    "weight": ("m2", "area that belongs to a node, all pairs together"),
+    "worn_depth": ("m", "worn depth, sum of both pieces"),
+    "weight": ("m2", "area of the interface that belongs to a node, summed over all pairs of pieces"),
     "unloaded_gap": ("m", "gap of the unloaded surfaces, wear included"),
 }
 
@@ -141,7 +141,8 @@ def with_events(data: Contents, time, interface, kind, slide, count: int, meanin
     time [s]; interface: its number from 1, 0 for a border of the drive; kind: a flag of `meanings`; slide [m]; count:
     how many there were, the last of them are kept.
     """
-    flags = {"long_name": "kind of event; up means towards positive slip", "flag_meanings": " ".join(meanings),
+    flags = {"long_name": "kind of event; `up` in a name means towards positive slip", "flag_meanings": " "
+                                                                                                        "".join(meanings),
              "flag_values": np.arange(len(meanings), dtype=np.int8)}
     about = {"long_name": "time of the event", "units": "s", "source": source, "total_count": count}
     return data.also({
@@ -157,8 +158,8 @@ def with_events(data: Contents, time, interface, kind, slide, count: int, meanin
 READ = {"amplitude": ("m", "half peak-to-peak at the output"),
         "acceleration_peak": ("m s-2", "largest absolute acceleration"),
         "acceleration_fundamental": ("m s-2", "first harmonic of the absolute acceleration"),
-        "acceleration_distortion": ("1", "third harmonic of the absolute "
-                                         "acceleration divided by the first")}  # off a curve
+        "acceleration_distortion": ("1", "third harmonic of the absolute acceleration divided by its first "
+                                         "harmonic")}  # off a curve
 
 
 def with_curve(data: Contents, curve: dict) -> Contents:

@@ -18,7 +18,7 @@ SETTLED = ("steady", "stuck", "done")
 DASH = "&ndash;"
 ROOM = 700_000  # characters that the numbers of all charts may take: with library and player below 3 MB
 FILES = (("fields.vtkhdf", "fields of both pieces and their interface, frame by frame (ParaView 5.13 or newer)"),
-         ("interfaces", "such fields of every interface that has a patch of its own"),
+         ("interfaces", "fields, in the same format, of every interface that has a patch of its own"),
          ("summary.json", "measures, outcome, warnings, effects and numerics"),
          ("result.nc", "histories and fields along the interface (xarray, MATLAB, ncdump)"),
          ("scene.resolved.toml", "the scene in SI with every default"))
@@ -115,8 +115,9 @@ def _spectra(data: dict) -> Picture | None:
         " The peak of H1, marked by a ring, belongs to a mode at {} ({}) with a damping ratio of {} ({}), friction "
         "included.".format(
             *of_records("response_frequency", found), *of_records("response_damping", found)))
-    return Picture(charts.spectra, (data["spectra"], at), "One-sided spectral densities of "
-                   "output and drive, and H1, displacement of the output over acceleration of the base; H1 is drawn "
+    return Picture(charts.spectra, (data["spectra"], at), "One-sided spectral densities of output and drive, and H1, "
+                                                          "the displacement of the output divided by the acceleration "
+                                                          "of the base; H1 is drawn "
                    f"faint where the coherence is below {charts.COHERENT:g}.{told}")
 
 
@@ -162,7 +163,8 @@ def _interface(data: dict) -> Picture | None:
     fields, caption = data["fields"], "Normal stress of the pressed pieces"
     if np.any(fields.get("shear_stress", 0.0)):
         span = "the last cycle" if data["summary"]["kind"] == "rig" and not part_of_cycle(data) else "the run"
-        caption += f"; shear stress in {len(fields['time']) - 1} frames of {span}, the largest resultant in colour"
+        caption += (f"; shear stress in {len(fields['time']) - 1} frames of {span}, with the largest resultant force "
+                    "in colour")
     if charts.part_in_contact(data["x"], fields["normal_stress"][0]):
         length, scale = scales.axis_unit(data["x"], "m")
         caption += (". Only the part in contact is drawn; the whole length is "
@@ -175,13 +177,13 @@ def _faces(data: dict) -> Picture | None:
     part = any(charts.part_in_contact(x, fields["normal_stress"][0]) for x, fields, _ in found)
     shear = any(np.any(fields.get("shear_stress", 0.0)) for _, fields, _ in found)
     return Picture(charts.faces, (found[:MOST],), "Normal stress of the pressed patch of each interface"
-                   f"{'; shear stress in frames of the last cycle, the largest resultant in colour' * shear}."
+                   f"{'; shear stress in frames of the last cycle, the largest resultant force in colour' * shear}."
                    f"{' Only the part in contact is drawn.' * part}{_first(found)}") if found else None
 
 
 def _first(found: list) -> str:
     """The sentence on charts that are left out, behind a caption."""
-    return f" The first {MOST} of {len(found)} are shown." if len(found) > MOST else ""
+    return f" Only the first {MOST} of {len(found)} interfaces are shown." if len(found) > MOST else ""
 
 
 def _bodies(data: dict) -> Picture | None:
@@ -195,7 +197,7 @@ def _bodies(data: dict) -> Picture | None:
     largest = max(float(np.max(part)) for part in mises)
     unit, scale = scales.axis_unit([largest], "Pa")
     return Picture(charts.bodies, (data["x"], data["bodies"]["depth"], mises, data["fields"]["normal_stress"][0]),
-                   f"Both pieces {coated}{cause}{alone}. The largest value of a cell is {largest * scale:.3g} "
+                   f"Both pieces {coated}{cause}{alone}. The largest stress in a cell is {largest * scale:.3g} "
                    f"{unit}{_at_corner(data['bodies'])}.")
 
 
@@ -244,7 +246,8 @@ def _histories(data: dict) -> Picture | None:
     title = f"The run's {count:.2g} cycles" if count >= data.get("cycles") - 1e-6 else f"Last {count:.2g} cycles"
     title = f"The run: {count:.2g} of a cycle" if part_of_cycle(data) else title
     bodies = "output and base" if np.any(window["base"]) else "the output"
-    caption = f"Displacement over the whole run; displacement, and acceleration of {bodies}, at its end.{_under(data)}"
+    caption = ("Displacement over the whole run. At the end of the run: displacement, and acceleration of "
+               f"{bodies}.{_under(data)}")
     begin, swings = charts.whole_from(history["time"], period, w["time"][0]), bool(data.get("released"))
     kept = int(np.sum(history["time"] < begin))
     if kept:
@@ -274,11 +277,12 @@ def _measured(data: dict) -> Picture | None:
         one = found.get(name, {"value": None})
         points.append(None if one["value"] is None else
                       (one["value"] * gain, None if one["error"] is None else one["error"] * gain))
-    factor = "".join(f" (reading factor of {name} {gain:g})" for name, gain in
+    factor = "".join(f" (computed {name} multiplied by the reading factor {gain:g})" for name, gain in
                      zip(("acceleration", "displacement"), m["gains"]) if gain != 1)
-    factor += f" (read as {m['reading']}, {m['share']:.4g} of the peak)" if m.get("reading", "peak") != "peak" else ""
+    if m.get("reading", "peak") != "peak":
+        factor += f" (readings are taken as {m['reading']}, which is {m['share']:.4g} of the peak)"
     return Picture(charts.measured, (m["rows"], m["frequency"], m["input"], *points),
-                   f"Measured responses at the drive frequency and the computed point{factor}.{_unsettled(data)}")
+                   f"Responses measured at the drive frequency, and the computed response{factor}.{_unsettled(data)}")
 
 
 # in the order of the page
@@ -343,7 +347,7 @@ def _table_of_levels(levels: list) -> Section:
         rows.append([str(number), drive, *cells, *([escape(one["outcome"])] if judged else []),
                      "stuck" if one["stuck"] else "slips"])
     sized = "force" if any(one.get("unit") == "N" for one in levels) else "base acceleration"
-    texts = ("half peak-to-peak", "peak acceleration", "its first harmonic", "third over first")
+    texts = ("half peak-to-peak", "peak acceleration", "its first harmonic", "third / first harmonic")
     heads = [">level", f">{sized}", *(f">{linked(text, name)}" for text, (name, _) in zip(texts, OF_LEVELS)),
              *(["outcome"] if judged else []), "interface"]
     return Section("levels", "Levels", table(heads, rows))
@@ -368,9 +372,9 @@ def _measures(data: dict) -> Section:
             error = error or ("unknown" if m["error"] is None else DASH)
             cells += [error, f"<td class=v>{escape(unit)}</td>", escape(others(name, m))]
         others_lie = of_records(name, found)[1]
-        text = means.get(name, "") + (f"; {others_lie} over records of the drive" if others_lie else "")
+        text = means.get(name, "") + (f"; {others_lie} for other records of the random drive" if others_lie else "")
         rows.append([*cells, f"<td class=soft>{escape(text)}</td>"])
-    note = (f"<p class=soft>The run holds {data['cycles']:.2g} of a cycle, so measures per cycle do not cover a "
+    note = (f"<p class=soft>The run covers only {data['cycles']:.2g} of a cycle, so measures per cycle do not cover a "
             "whole cycle.</p>") if part_of_cycle(data) else ""
     heads = ("measure", ">value", ">error (±)", "unit", "in customary units", "what it is")
     return Section("measures", "Measures", table(heads, rows, "across many")
@@ -402,6 +406,6 @@ def _origin(data: dict) -> Section:
         f"<p>To repeat the run, in the folder of its scene:</p><pre>{escape(data['command'])}</pre>"
     return Section("origin", "Scene and files", f"{again}<p>Files beside this page:</p><ul>{files}</ul>"
                    f"<details><summary>Scene</summary><pre>{escape(data['scene'])}</pre></details>"
-                   "<details><summary>Scene in SI, every default written out</summary><pre>"
+                   "<details><summary>Scene in SI, with the value of every default</summary><pre>"
                    f"{escape(data['resolved'])}</pre></details><details><summary>Versions</summary>"
                    f"<p class=soft>patchfem {escape(data['summary']['patchfem'])}, {escape(versions)}</p></details>")

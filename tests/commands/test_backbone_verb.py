@@ -41,7 +41,7 @@ def test_exact_files_and_the_answer_hold_the_same_numbers(scene, capsys):
         assert data.attrs["stuck_frequency"] == answer["stuck_frequency"]
     assert json.loads((folder / "backbone.json").read_text("utf-8")) == answer
     page = (folder / "report.html").read_text("utf-8")
-    assert "Frequency and damping over the amplitude" in page
+    assert "Frequency and damping against amplitude" in page
     ends = [f"{scales.told(one['frequency'][k], one['frequency_error'][k], unit='Hz')}, damping ratio "
             f"{scales.told(one['damping'][k], one['damping_error'][k])}" for one in [curve] for k in (0, -1)]
     assert f"<div class=verdict><b>Mode axial at 10 um: {ends[0]}; at 1 mm: {ends[1]}.</b>" in page

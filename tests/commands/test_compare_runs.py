@@ -134,8 +134,9 @@ def test_always_the_story_of_the_guide_runs_and_says_its_verdict(tmp_path, monke
 
 
 @pytest.mark.parametrize("names, told", [
-    (("worn", "half"), "half; give the less worn run first"),
-    (("half", "new"), "new: this run has no [wear], so nothing was worn; give the worn run second"),
+    (("worn", "half"), "half; give the less worn run as the first folder"),
+    (("half", "new"), "new: this run has no [wear], so nothing wore off; give the run with "
+                      "[wear] as the second folder"),
     (("other", "worn"), "worn: these are two different patches: contact.tilt differ"),
     (("new", "point"), "point: a run without [contact] has no surfaces to compare"),
     (("new", "nowhere"), "nowhere: there is no such folder"), (("empty", "worn"), "empty: not a results folder"),

@@ -104,7 +104,7 @@ def test_always_a_scene_is_pressed_with_both(files, tmp_path):
     peak, share = (found["measures"][name] for name in ("pressure_peak", "contact_fraction"))
     assert peak["after"]["value"] < 0.6 * peak["before"]["value"]  # worn plateaus carry more of the load
     assert share["after"]["value"] > share["before"]["value"]
-    assert any(text.startswith("energy of the friction loop per cycle: not computed by this scene") for text in
+    assert any(text.startswith("energy dissipated by friction per cycle: not computed") for text in
                found["lacking"])
     page = (out / "report.html").read_text()
     assert page.count("<figure>") == 4 and "Pressure along the patch" in page
@@ -161,7 +161,7 @@ def test_refuses_a_scene_without_a_patch(files, tmp_path):
 
 
 @pytest.mark.parametrize("words, says", [
-    (("--direction", "z"), "compare --direction z: x or y is needed"),
+    (("--direction", "z"), "compare --direction z: the direction must be x or y"),
     (("third.csv",), "compare: 3 files; two files are needed, or four"),
 ])
 def test_refuses_with_exit_code_2(files, words, says):

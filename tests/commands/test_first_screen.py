@@ -56,7 +56,7 @@ def test_exact_the_numbers_are_those_of_the_summary(tmp_path):
     amplitude = pair("relative_displacement_amplitude", measures["relative_displacement_amplitude"])
     assert lines[2].startswith(f"Displacement amplitude at the output {amplitude} (half peak-to-peak); peak "
                                "acceleration ")
-    assert lines[3] == f"Every measure with an error meets the tolerance 0.001; {SHARP}."
+    assert lines[3] == f"Every measure with an error estimate meets the tolerance 0.001; {SHARP}."
     shown = dict(line.split(None, 1) for line in lines if line.startswith("  "))
     assert set(shown) == set(measures)
     for name, text in shown.items():
@@ -77,7 +77,7 @@ def test_always_every_measure_has_its_group():
 
 def test_always_what_misses_the_tolerance_is_said_before_the_table(tmp_path):
     answer = run(tmp_path, "bench", accuracy__steps_per_cycle=100)
-    said = [line for line in answer.err.splitlines() if not line.startswith("compiling the time loop")]  # empty caches
+    said = [line for line in answer.err.splitlines() if not line.startswith("compiling the code of")]  # empty caches
     assert said[0].startswith("warning: ") and "set accuracy.steps_per_cycle = " in answer.err
     assert "meets the tolerance" not in answer.out
 
@@ -162,8 +162,8 @@ def test_exact_a_level_between_two_others_does_not_claim_the_tolerance():
         return least_known(SimpleNamespace(plan=SimpleNamespace(model=model), measures=measures))
 
     jump, fine = Measure(5 * 9.80665, "m s-2", 9.80665, 9.80665), Measure(2.0, "J", 1e-2)
-    between = "jump_level, 5.0 ± 1.0 g, has an error of the step between drive levels"
-    assert said(jump_level=jump, loop_area=fine) == "Every measure with an error meets the tolerance 0.01; " \
+    between = "jump_level, 5.0 ± 1.0 g, has an error of one step between drive levels"
+    assert said(jump_level=jump, loop_area=fine) == "Every measure with an error estimate meets the tolerance 0.01; " \
         f"closest to the tolerance is loop_area, 2.000 ± 0.010 J; {between}, which the scene sets."
     assert said(jump_level=jump) == f"{between}."
     assert said(loop_area=fine).endswith("closest to the tolerance is loop_area, 2.000 ± 0.010 J.")

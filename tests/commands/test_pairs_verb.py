@@ -97,7 +97,7 @@ def test_refuses_a_table_that_is_none(tmp_path, text, says):
 @pytest.mark.parametrize("words, code, says", [
     (("--pairs", "nowhere.csv"), 4, "nowhere.csv: no such table"),
     (("a.csv", "b.csv", "--pairs", "pairs.csv"), 2, "give the table alone, without other files"),
-    (("a.csv",), 2, "compare: BEFORE and AFTER are needed, or --pairs"),
+    (("a.csv",), 2, "compare: give two files BEFORE and AFTER, or a table of pairs with --pairs"),
     (("--pairs", "pairs.csv", "--scene", "rig.toml"), 2, "give the table alone, without --scene"),
 ])
 def test_refuses_with_the_exit_code_of_the_contract(tmp_path, monkeypatch, words, code, says):

@@ -89,7 +89,7 @@ def test_exact_a_refused_case_is_a_row_with_its_message(swept):
     assert f"page: {out / 'report.html'}\nresults: {out / 'sweep.csv'}" in answer.out
     assert (out / "report.html").is_file()
     found = [float(row["relative_displacement_amplitude"]) for row in rows(out)[:4] if row["outcome"] != "transient"]
-    assert len(found) == 2 and f"runs from 0 to {max(found) * 1e6:.4g} um" in answer.out
+    assert len(found) == 2 and f"ranges from 0 to {max(found) * 1e6:.4g} um" in answer.out
     assert "case 5 and 1 more: normal.load: must be >= 0" in answer.err
 
 
@@ -169,7 +169,8 @@ def test_exact_an_interrupt_keeps_what_is_done(swept, scene, tmp_path, monkeypat
     assert 2 <= held < 6 and sum(row["outcome"] != "" for row in rows(out)) == held  # its tables have what there is
     told = json.loads((out / "sweep.json").read_text())
     assert told["cases"]["unfinished"] == 6 - held
-    assert told["answer"].startswith(f"{6 - held} of 6 cases have no answer yet; what follows covers the others.")
+    assert told["answer"].startswith(f"{6 - held} of 6 cases have no result yet; the sentences below describe "
+                                     "the other cases.")
     assert (out / "report.html").is_file()
     monkeypatch.setattr(many, "answers", real)
     text = "cases already have an answer from an interrupted sweep"
@@ -225,9 +226,9 @@ def test_exact_one_object_on_stdout(scene, tmp_path):
     (["--over", "normal.load=1 lb", "--set", "drive.cycles=0"], ["'lbf'", "drive.cycles: must be > 0"]),
     (["--over", "normal.load=-1 N,-2 N"], ["-1 N", "-2 N"]),
     (["--set", "drive.cycles=0", "--over", "normal.load=1 N,2 N"], ["drive.cycles: must be > 0"]),
-    ([], ["nothing to sweep over"]),
+    ([], ["no key to sweep is given"]),
     (["--over", "normal.load=1 N,2 N", "--device", "cuda"], ["--device cuda: batches of cases run only on"]),
-    (["--over", "friction.static=0.1..0.2:4000", "--over", "normal.load=1 N..2 N:4000"], ["16000000 cases are more "
+    (["--over", "friction.static=0.1..0.2:4000", "--over", "normal.load=1 N..2 N:4000"], ["16000000 cases, more "
                                                                                           "than"]),
 ])
 def test_refuses_before_anything_runs(scene, tmp_path, words, says):
@@ -248,7 +249,7 @@ def test_refuses_a_table_whose_cases_are_all_refused(tmp_path):
 
 def test_refuses_to_probe_many_cases(scene):
     answer = cli("plan", scene, *OVER, "--probe")
-    assert answer.code == 2 and "--probe works for one case" in answer.err
+    assert answer.code == 2 and "--probe works for a single case" in answer.err
 
 
 def test_refuses_a_folder_of_others(scene, tmp_path):
@@ -364,7 +365,7 @@ def test_exact_pages_of_cases_that_are_there_are_drawn(scene, tmp_path):
 def test_refuses_a_mode_by_its_name_and_by_its_number(scene, tmp_path):
     over = ("--over", "structure.mode.axial.frequency=100 Hz,110 Hz", "--over", "structure.mode.0.frequency=120 Hz")
     answer = cli("sweep", scene, *over, "-o", tmp_path / "a")
-    assert answer.code == 2 and "structure.mode.0.frequency: this key is given twice, also as structure.mode.axial" \
+    assert answer.code == 2 and "structure.mode.0.frequency: this key is the same as structure.mode.axial" \
         in answer.err and not (tmp_path / "a").exists()
 
 
@@ -397,15 +398,16 @@ def test_refuses_a_key_of_the_file_and_of_the_line(scene, tmp_path):
     table = tmp_path / "cases.csv"
     table.write_text("normal.load [N],friction.static\n10,0.3\n", encoding="utf-8")
     answer = cli("sweep", scene, "--cases", table, "--over", "friction.static=0.1,0.2", "-o", tmp_path / "a")
-    assert answer.code == 2 and answer.err == f"--over friction.static: this key is also in {table}\n"
+    assert answer.code == 2 and answer.err == \
+        f"--over friction.static: {table} sets this key already; remove the key from one of the two\n"
 
 
 @pytest.mark.parametrize("words, says", [
-    (["--random", "4"], "need --over"),
+    (["--random", "4"], "give each range by --over"),
     (["--random", "4", "--sobol", "4", "--over", "friction.static=0.1..0.2"], "one of them"),
     (["--random", "4", "--over", "friction.static=0.1..0.2:3"], "leave out :3"),
     (["--over", "friction.static=0.1,0.2", "--shard", "5/4"], "--shard 5/4"),
-    (["--over", "friction.static=0.1,0.2", "-j", "0"], "at least one process"),
+    (["--over", "friction.static=0.1,0.2", "-j", "0"], "the number of processes must be"),
     (["--over", "friction.static=0.1,0.2", "--of", "equivalent_dampin"], "did you mean 'equivalent_damping'?"),
     (["--over", "friction.static=0.1,0.2", "--of", "zzz"], "--of zzz: unknown measure; use a name that"),
     (["--over", "friction.static=0.1,0.2", "--executor", "slurm"], "--executor slurm: unknown"),
@@ -490,7 +492,7 @@ def test_exact_the_plan_of_a_sweep_names_the_case_whose_values_it_prints(scene):
     told = json.loads(cli("plan", scene, *swept, "--json").out)
     assert told["case"] == {"friction.static": "0.41"}
     assert told["groups"] == json.loads(cli("plan", scene, "--set", "friction.static=0.41", "--json").out)["groups"]
-    assert cli("plan", scene, *swept).out.startswith("case     friction.static 0.41, the first; ")
+    assert cli("plan", scene, *swept).out.startswith("case     friction.static 0.41 (the first case); ")
 
 
 def test_always_a_sweep_says_how_long_its_first_case_takes(capsys, monkeypatch):

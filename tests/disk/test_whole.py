@@ -179,7 +179,7 @@ def test_exact_who_is_interrupted_says_what_was_replaced(tmp_path, monkeypatch, 
     said = []
     monkeypatch.setattr("patchfem.__main__.say", said.append)
     assert cli("schema", "-o", "a.json").code == 130
-    assert said == ["interrupted; already complete: a.json" if after else "interrupted; nothing was replaced"]
+    assert said == ["interrupted; already complete: a.json" if after else "interrupted; no file was replaced"]
     assert (Path("a.json").read_text() == "older") != after and [one.name for one in tmp_path.iterdir()] == ["a.json"]
 
 

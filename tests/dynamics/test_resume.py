@@ -75,7 +75,7 @@ def test_exact_an_interrupted_march_goes_on_to_the_same_bits(tmp_path, often, ki
         often.saved.clear()
         often.stop = stop
         answer = cli(*words, out, *["--resume"] * partial.is_dir())
-        assert answer.code == 130 and "out.partial continues with --resume" in answer.err, answer.err
+        assert answer.code == 130 and "out.partial, add --resume to the command" in answer.err, answer.err
         assert partial.is_dir() and all(is_state(one.name) for one in partial.iterdir())
     often.saved.clear()
     often.stop = 0
@@ -98,7 +98,7 @@ def test_refuses_the_state_of_another_march(tmp_path, often):
     state = tmp_path / "out.partial" / "march_1.npz"
     for change in ("friction.static=0.31", "drive.cycles=20", "accuracy.steps_per_cycle=80"):
         answer = cli(*words, "--set", change)
-        assert answer.code == 2 and "belongs to another scene or version" in answer.err
+        assert answer.code == 2 and "belongs to another scene or to another version" in answer.err
     data = state.read_bytes()
     for harm in (data[:-100], b"", b"PK nothing", data[:2000]):
         state.write_bytes(harm)
@@ -148,8 +148,8 @@ def test_exact_a_batch_queue_may_end_it_and_it_goes_on(tmp_path, number):
         assert run.returncode == -9 and left == {"out.partial", ".out.writer"}
     else:
         assert run.returncode == 130 and left == {"out.partial"}
-        assert said.strip().startswith("interrupted; nothing was replaced; ")
-        assert said.strip().endswith("out.partial continues with --resume") and len(said.splitlines()) == 1
+        assert said.strip().startswith("interrupted; no file was replaced; ")
+        assert said.strip().endswith("out.partial, add --resume to the command") and len(said.splitlines()) == 1
     assert cli("run", scene, "--no-page", "-q", "-o", out, "--resume").code == 0
     assert {one.name for one in tmp_path.iterdir()} == {"scene.toml", "out"}
     assert os.path.getsize(out / "result.nc") > 10_000

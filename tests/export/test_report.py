@@ -328,4 +328,4 @@ def test_exact_a_stress_without_bound_is_named_where_it_is_the_largest(cell, sai
     data = patch()
     data["bodies"]["mises"][1][cell] = 1e9
     caption = report.picture("bodies", data).caption
-    assert "largest value of a cell is 1 GPa" in caption and (said in caption if said else "bound" not in caption)
+    assert "largest stress in a cell is 1 GPa" in caption and (said in caption if said else "bound" not in caption)

@@ -41,8 +41,8 @@ def test_exact_the_first_row_is_the_rms_with_the_interval_of_records(found, tmp_
     lines = cli("run", path, "-o", tmp_path / "out").out.splitlines()
     first = lines[lines.index("motion") + 1]
     value, scatter = (1e6 * found.measures[name].value for name in (RMS, f"{RMS}_scatter"))
-    told = re.fullmatch(rf"  {RMS} +([\d.]+)(?: ± [\d.]+)? um \((?:± of the numerics; )?95 % interval ([\d.]+) to "
-                        r"([\d.]+) um over records\)", first)
+    told = re.fullmatch(rf"  {RMS} +([\d.]+)(?: ± [\d.]+)? um \((?:± is the numerical error; )?95 % "
+                        r"interval ([\d.]+) to ([\d.]+) um for other records\)", first)
     assert [float(one) for one in told.groups()] == pytest.approx([value, value - scatter, value + scatter], rel=5e-3)
     assert not any("_scatter" in line for line in lines)
     head = next(line for line in lines if line.startswith("The output moves"))

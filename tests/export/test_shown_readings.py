@@ -48,7 +48,7 @@ def test_exact_the_gauge_has_a_factor_of_its_own(tmp_path):
     found = run(scene_of(tmp_path, "measured.displacement_gain=0.8"))
     seen = found.measures["relative_displacement_amplitude"].value / 25.4e-6
     assert f"<td>{0.8 * seen:.3g} mil</td>" in page_of(found, {}).replace(" class=n", "")
-    assert "(reading factor of displacement 0.8)" in page_of(found, {})
+    assert "(computed displacement multiplied by the reading factor 0.8)" in page_of(found, {})
 
 
 def test_a_reading_is_an_effect_beside_its_rows(tmp_path):

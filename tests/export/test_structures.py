@@ -106,11 +106,11 @@ LEVELS = '[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "100 Hz"\nlev
 
 @pytest.mark.parametrize("text, says", [
     (RUB, "1 coordinate, 1 friction element\n"),
-    (RUB + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n', "; not written: [wear]\n"),
-    (RUB.replace("[structure]", '[structure]\ntravel = "5 mm"'), "; not written: structure.travel\n"),
+    (RUB + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n', "; not in the file: [wear]\n"),
+    (RUB.replace("[structure]", '[structure]\ntravel = "5 mm"'), "; not in the file: structure.travel\n"),
     (RUB.replace("[drive]", '[structure.start]\ndisplacement = ["5 um"]\n[drive]'),
-     "; not written: the initial motion\n"),
-    (HEAD + LEVELS, "; Fex1 is the excitation for 1 m/s^2, not for waveform = 'levels'\n")])
+     "; not in the file: the initial motion\n"),
+    (HEAD + LEVELS, "; Fex1 is the excitation for an amplitude of 1 m/s^2, not for waveform = 'levels'\n")])
 def test_always_the_line_says_what_the_file_has_not(tmp_path, text, says):
     (tmp_path / "rig.toml").write_text(text)
     answer = cli("export", tmp_path / "rig.toml", "-o", tmp_path / "rig.npz")

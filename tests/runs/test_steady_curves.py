@@ -153,7 +153,7 @@ def test_exact_the_file_and_the_page_hold_accelerations_and_levels(tmp_path):
     page = (tmp_path / "out" / "report.html").read_text()
     row = page[page.index("<th class=n>level"):].split("</tr>")[2]
     assert "<td>steady</td><td>slips</td>" in row and row.count(" g") == 3
-    assert "Its absolute acceleration" in page and "first harmonic" in page
+    assert "Absolute acceleration at the output" in page and "first harmonic" in page
 
 
 LOCKED = POINT + '[friction]\nlaw = "elastic-plastic"\nstatic = 0.05\nbond_length = "20 um"\n' + MODE + \

@@ -358,7 +358,7 @@ def curve(found: dict) -> list:
         lines = [line(along, np.asarray(found[f"acceleration_{key}"]) / G_N, colour, text, dash=dash)
                  for key, colour, text, dash in (("peak", "accent", "largest", "solid"),
                                                  ("fundamental", "warm", "first harmonic", "dashed"))]
-        out.append(chart("Its absolute acceleration", axis(what, unit), axis("acceleration", "g"), lines))
+        out.append(chart("Absolute acceleration at the output", axis(what, unit), axis("acceleration", "g"), lines))
     return out
 
 
@@ -453,4 +453,4 @@ def wear(x, cycles, pressure, depth, history: dict) -> list:
     over = [line(history["cycle"], history[name] / history[name][0], colour, text)
             for colour, (name, text) in zip(COLOURS, WORN.items())
             if history.get(name) is not None and history[name][0]]
-    return [*out, chart("Over the cycles", axis("cycles"), axis("over its first value"), over)]
+    return [*out, chart("Change with wear", axis("cycles"), axis("value divided by first value"), over)]

@@ -84,10 +84,10 @@ class Series:
     def _open(self) -> None:
         self.root = self.file["VTKHDF"]
         if self.root.attrs["Type"] == b"UnstructuredGrid":
-            raise PatchfemError(f"{self.path}: written by an older patchfem, without blocks; run its scene again")
+            raise PatchfemError(f"{self.path}: written by an older version of patchfem; run the scene again")
         self.times = self.root["Steps/Values"][:]
         wanted(self.times.ndim == 1 and self.times.size and numeric(self.times) and np.isfinite(self.times).all(),
-               "Steps/Values are no times")
+               "Steps/Values are not valid times")
         texts = self.root["lower/FieldData/units"][:]
         self.units = dict(text.decode().rstrip("]").split(" [", 1) for text in texts)
         self.parts = [name for name in PARTS if name in NAMES or name in self.root]
@@ -98,7 +98,7 @@ class Series:
         """ValueError for a block whose cells or arrays are not those of its points in every frame."""
         points, nodes, ends, types = (group[one][:] for one in ("Points", "Connectivity", "Offsets", "Types"))
         wanted(points.ndim == 2 and points.shape[1] == 3 and len(points) and numeric(points)
-               and np.abs(points).max() < HUGE, f"{name}/Points are no places")  # NaN is not below it
+               and np.abs(points).max() < HUGE, f"{name}/Points are not valid positions")  # NaN is not below it
         wanted(all(one.ndim == 1 and one.size and one.dtype.kind in "iu" for one in (nodes, ends, types)),
                f"{name}: its cells are not whole numbers")
         sizes = np.diff(ends.astype(np.int64))
@@ -113,7 +113,7 @@ class Series:
                 wanted(rows.dtype.kind in "iuf" and rows.shape[1:] == TAILS.get(one, ()),
                        f"{name}/{kind}/{one} contains {rows.ndim}-dimensional {rows.dtype}")
                 wanted(first.shape == self.times.shape and first.dtype.kind in "iu" and first.min() >= 0
-                       and first.max() + size <= len(rows), f"{name}/{kind}/{one} does not reach the last frame")
+                       and first.max() + size <= len(rows), f"{name}/{kind}/{one} has no values for the last frames")
 
     def __enter__(self) -> "Series":
         return self

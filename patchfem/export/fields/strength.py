@@ -37,7 +37,7 @@ def beyond_yield(asked, bodies: dict) -> list:
 def _told(name: str, highest: tuple, pieces: int) -> str:
     stress, side, (x, y) = highest
     known = YIELD[name]
-    both = ", which the other piece exceeds too" * (pieces > 1)
+    both = "; the other piece exceeds its yield strength too" * (pieces > 1)
     return (f"the von Mises stress reaches {stress / 1e6:.4g} MPa in the {name} of the {side} piece, at x = {say(x)} "
             f"and {say(abs(y))} from the interface; the yield strength is {known.strength / 1e6:g} MPa "
             f"({known.source[:-1]}){both}; the run is elastic and neglects yielding")

@@ -69,9 +69,10 @@ def _left_out(model: Model) -> str:
     out = ["[wear]"] * (model.wear is not None) + ["structure.travel"] * (rig.travel < BEYOND)
     out += ["the initial motion"] * (rig.start is not None)
     unit = "" if isinstance(rig.drive, BaseSine) or rig.kind == "free" else \
-        (f"; Fex1 is the excitation for {'1 N' if rig.kind == 'force' else '1 m/s^2'}, not for waveform = "
+        (f"; Fex1 is the excitation for an amplitude of {'1 N' if rig.kind == 'force' else '1 m/s^2'}, not for "
+         f"waveform = "
          f"'{rig.waveform}'")
-    return unit + ("; not written: " + ", ".join(out) if out else "")
+    return unit + ("; not in the file: " + ", ".join(out) if out else "")
 
 
 def matrices_of(model: Model) -> dict:

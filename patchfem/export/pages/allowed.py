@@ -246,16 +246,18 @@ def table(limits: Limits, measures: dict) -> str:
             far = f"between {bare(at(one.inside), at(one.beyond))} and {at(one.beyond)}" + (
                 f", at about {_at(limits, one)}" if isfinite(one.about) else "")
         else:
-            far = "in no case" if one.whole else f"not up to {at(one.inside)}; no case beyond shows the limit"
+            far = "in no case" if one.whole else \
+                f"not up to {at(one.inside)}; no case with a larger value shows the limit"
         by = f"{100 * WITHIN:g} %" if abs(one.change) < 1 else "double"
         first = short(one.first, measures[one.name][2], 4, zero_below(one.name))
         rows.append([linked(label(one.name), one.name), escape(first), _change(one.changed), by, escape(far)])
     several = int(np.sum(np.asarray(key["values"], float) == np.min(np.asarray(key["values"], float)))) > 1
-    least = " The other keys have the values that allow the smallest change." if several else ""
+    least = (" If other keys change too, each limit is for the values of these keys that give the smallest limit."
+             if several else "")
     return (f"<p class=soft>{escape(key['name'])} grows from {escape(at(limits.found[0].start))}. A measure counts as "
-            "changed if it differs from its value in the first case by this much and by more than both numerical "
-            "errors. Cases that miss their tolerance do not count, nor do unsettled cases if settled cases have the "
-            f"measure.{least}</p>"
+            "changed if the difference from its value in the first case exceeds the amount under &ldquo;changed "
+            "by&rdquo; by more than the sum of both numerical errors. Cases that miss their tolerance do not count, "
+            f"nor do unsettled cases if settled cases have the measure.{least}</p>"
             + document.table(("measure", ">first case", ">change between the first and the last "
                                                         "case", "changed by", "where"), rows, "wide"))
 

@@ -209,7 +209,7 @@ def _differences(runs: list, names: list) -> str:
     keys = [key for key in dict.fromkeys(key for one in flat for key in one)
             if any(one.get(key) != flat[0].get(key) for one in flat)]
     if not keys:
-        return "<p>Nothing: the resolved scenes are the same.</p>"
+        return "<p>There is no difference: the resolved scenes are the same.</p>"
     rows = [[escape(key), *(_written(one.get(key)) for one in flat)] for key in keys]
     return ("<p class=soft>The table lists the keys whose values differ between the resolved scenes, in SI.</p>"
             + table(("key", *map(escape, names)), rows))
@@ -227,9 +227,10 @@ def _measures(runs: list, names: list) -> str:
         found = [run.summary["measures"].get(name) for run in runs]
         rows.append([linked(label(name), name),
                      *(_cell(name, one, found[0] if number else None) for number, one in enumerate(found))])
-    return ("<p class=soft>Value and estimated numerical error. Bold values differ from the first run by more than "
-            "both errors together; the change is in per cent, from ten times on as a factor, and a dash if the first "
-            "value is smaller than its error.</p>"
+    return ("<p class=soft>Each cell shows a value and its estimated numerical error. Bold values differ from the "
+            "first run by more than the sum of both errors. The change from the first run is in brackets: in per "
+            "cent; as a factor if the value is ten times the first value or more; as a dash if the first value is "
+            "smaller than its error.</p>"
             + table(("measure", *(f">{escape(name)}" for name in names)), rows, "across side"))
 
 

@@ -59,8 +59,8 @@ def _of_grid(table: dict, first: str | None, most: int) -> Drawn:
     there = np.all([np.isin(place, some) for some, (_, place) in zip(chosen, along)], axis=0)
     of = ", ".join(f"{some.size} of {values.size} values of {one['name']}" for one, some, (values, _) in
                    zip(table["keys"], chosen, along) if some.size < values.size)
-    told = "" if not ends else f"; the one with the largest {label(first)} is among them" if not there[ends[0]] else \
-        f"; those with the largest and the smallest {label(first)} are among them"
+    told = "" if not ends else f"; the case with the largest {label(first)} is among them" if not there[ends[0]] else \
+        f"; the cases with the largest and the smallest {label(first)} are among them"
     return Drawn(np.flatnonzero(there), f"{int(there.sum())} of {number} cases are drawn: {of}{told}.")
 
 

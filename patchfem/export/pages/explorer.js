@@ -250,7 +250,7 @@
     const away = every.filter((i) => !cases.includes(i));
     const value = (i) => `${within(m.values[i], m.errors[i], m.least)} ${m.unit}`.trim();
     const zero = !away.length ? "" : ` Not drawn on a logarithmic axis: ${away.length === 1 ?
-      `the case at ${x.label} ${x.texts[away[0]]}, ${value(away[0])}` : `${away.length} cases at 0 or below`}.`;
+      `the case at ${x.label} ${x.texts[away[0]]}, ${value(away[0])}` : `${away.length} cases with values of 0 or below`}.`;
     const words = told(cases, x, beside, m) + zero;
     at("means").textContent = `${m.means ? `${m.means[0].toUpperCase()}${m.means.slice(1)}. ` : ""}${words}`;
     at("chart").setAttribute("aria-label", `${m.label}: ${words}`);

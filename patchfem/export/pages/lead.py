@@ -91,12 +91,13 @@ def _left(table: dict, outcome: np.ndarray) -> str:
     """What holds of all that follows: how many cases of an interrupted sweep have no answer, and that of those that run
     none has settled; "" where neither is so."""
     count, ran = int(np.sum(outcome == "")), outcome[(outcome != "") & (outcome != FAILED)]
-    said = f"{count} of {outcome.size} cases have no answer yet; what follows covers the others." if count else ""
+    said = (f"{count} of {outcome.size} cases have no result yet; the sentences below describe the other cases."
+            if count else "")
     if ran.size and not np.isin(ran, SETTLED).any():
-        said += " No case has settled; what follows describes the motions as they ended."
+        said += " No case has settled; the sentences below describe the end of each run."
     first = table.get("first", "")
     if first and not np.isfinite(table["measures"].get(first, {"values": ()})["values"]).any():
-        said += f" No case has a value of {label(first)}; what follows describes other measures."
+        said += f" No case has a value of {label(first)}; the sentences below describe other measures."
     return said.strip()
 
 
@@ -117,7 +118,7 @@ def span(measures: dict, trusted: dict, settled: np.ndarray, names: Sequence = F
         values, errors, unit = (part if isinstance(part, str) else np.asarray(part, float)[there]
                                 for part in measures[name])
         low, high = (short(one, unit, 4, zero_below(name)) for one in (values.min(), values.max()))
-        ran = f"is {high} throughout" if low == high else f"runs from {low} to {high}"
+        ran = f"is {high} throughout" if low == high else f"ranges from {low} to {high}"
         known = np.isfinite(errors) & (errors > 0) & (np.abs(values) > zero_below(name))  # 0 is known absolutely
         share = float(np.max(errors[known] / np.abs(values[known]))) if known.any() else 0.0
         band = f", with errors of at most {plain(100 * share, 1)} %" if share > EXACT else ""
@@ -167,7 +168,7 @@ def least(keys: list, measures: dict, trusted: dict, shown: dict) -> str:
     peak = measures.get("peak_frequency")
     if peak is not None and np.isfinite(peak[0][best]):
         told += f", at its peak frequency of {plain(peak[0][best], 4)} Hz"
-    return f"{told} (next cases: {before} and {after})."
+    return f"{told} (neighbouring cases: {before} and {after})."
 
 
 def columns(table: dict) -> dict:

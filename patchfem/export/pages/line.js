@@ -114,11 +114,11 @@
     drawMap();
     const found = drawCut(), depths = finite(found.depth), [a, b, c, d] = state.line.map(short);
     const mean = depths.reduce((sum, v) => sum + v, 0) / depths.length;
-    const deep = depths.length ? `depth ${short(mean)} ${told.unit} in the mean, from ${short(Math.min(...depths))} to ${short(Math.max(...depths))} ${told.unit}` : "no depth, as a height is missing everywhere";
+    const deep = depths.length ? `depth ${short(mean)} ${told.unit} on average, from ${short(Math.min(...depths))} to ${short(Math.max(...depths))} ${told.unit}` : "no depth, because a height is missing everywhere";
     const less = found.depth.length - depths.length;
-    at("stage-told").textContent = `Line from x ${a} mm, y ${b} mm to x ${c} mm, y ${d} mm: ${deep}${less && depths.length ? `; ${less} of ${found.depth.length} places have none` : ""}.`;
+    at("stage-told").textContent = `Line from x ${a} mm, y ${b} mm to x ${c} mm, y ${d} mm: ${deep}${less && depths.length ? `; ${less} of ${found.depth.length} places have no depth` : ""}.`;
     at("cut-angle-told").textContent = `${at("cut-angle").value}°`;
-    at("cut-place-told").textContent = `${short(at("cut-place").value * reach(turn()))} mm off the middle`;
+    at("cut-place-told").textContent = `${short(at("cut-place").value * reach(turn()))} mm from the middle`;
     at("stage-map").setAttribute("aria-label", `Map of the ${maps[at("cut-map").value][1]} with the line. ${at("stage-told").textContent}`);
     at("stage-cut").setAttribute("aria-label", `Heights before and after along the line. ${at("stage-told").textContent}`);
   }

@@ -159,7 +159,7 @@ def _lost(peaks: list, others: bool) -> str:
     held = f" with {peaks[0].held}{more}" if peaks[0].held else ""
     what = "it" if others else label(peaks[0].name)
     return (f"Where {what} peaks{held} is not known: cases next to the largest value have not settled or miss the "
-            "tolerance; raise drive.cycles so that they settle.")
+            "tolerance; raise drive.cycles so that these cases settle.")
 
 
 def _known(peaks: list) -> str:

@@ -144,6 +144,7 @@ def section(film: dict) -> Section:
     sample = (f"; only a sample of {' and '.join(less)} is drawn, each cell with the mean of the cells that it "
               "replaces") if less else ""
     text = f"{still}{sample}. Motion and gap are magnified by one factor"
-    text += (", the slide of the upper piece as a whole by another; colours and scales are the same in every frame. "
+    text += (", the slide of the upper piece as a whole by another factor; colours and scales are the same in every "
+             "frame. "
              "Press space to play and the arrow keys to step.") if frames > 1 else "."
     return Section("player", "The pieces, frame by frame", own("player.html").replace("CAPTION", text))

@@ -59,7 +59,7 @@ def sentence(ranks: dict, left: int = 0, moves: bool = True) -> str:
     if name is None:
         return ""
     first, *others = ranks[name]
-    said = [f"depends most on {first.key}, which contributes to {percent(first)} of its variance{_between(first)}"]
+    said = [f"depends most on {first.key}, which is involved in {percent(first)} of its variance{_between(first)}"]
     said += [f"then on {one.key} ({percent(one)})" for one in others[:NAMED - 1]]
     if len(others) >= NAMED:
         said.append(f"least on {others[-1].key} ({percent(others[-1])})")
@@ -101,8 +101,8 @@ def scatter(found: dict, of: int, settled: bool = True, names: tuple = SPREAD) -
     said, most = [], max((found[name][2] for name in names if name in found), default=0)
     if most and most < SETTLED * of:
         missed = "have not settled within the tolerance" if settled else "have no value"
-        return (f"{of - most} of {of} random cases {missed}, perhaps the cases that move most, so the scatter of the "
-                "results is not known.")
+        return (f"{of - most} of {of} random cases {missed}, perhaps those with the largest motion, so the scatter of "
+                "the results is not known.")
     for name in [name for name in names if name in found]:
         unit, (low, _, high), count, misses = found[name]
         low, high = (short(one, unit, 3, zero_below(name)) for one in (low, high))

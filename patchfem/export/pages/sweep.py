@@ -94,7 +94,7 @@ def _explorer(said: str) -> str:
     """The choices and the place of the picture; `explorer.js` fills both; said: which cases are drawn, "" for all."""
     thinned = said and f"<p class=soft>{escape(said)}</p>"
     return ("<div class=choices><label>Measure<select id=measure></select></label>"
-            "<label>Along the axis<select id=along></select></label>"
+            "<label>Key on the axis<select id=along></select></label>"
             "<label>Logarithmic axis<input type=checkbox id=log-along></label>"
             "<label>Second key<select id=beside></select></label>"
             "<label>Shown as<select id=shown><option value=lines>lines</option><option value=map>map</option></select>"
@@ -148,7 +148,8 @@ def _cases(table: dict) -> str:
         rows.append(("" if outcome in SETTLED else " class=bad",
                      [*(escape(brief(str(one["texts"][i]))) for one in table["keys"]), said, *numbers]))
     number = len(table["outcome"])
-    more = f"<p class=soft>The first {LISTED} of {number} cases; sweep.csv has all.</p>" if number > LISTED else ""
+    more = (f"<p class=soft>The first {LISTED} of {number} cases; sweep.csv contains all cases.</p>"
+            if number > LISTED else "")
     named = "<a href=sweep.csv>sweep.csv</a>, <a href=sweep.nc>sweep.nc</a>" if table.get("tabled", True) else \
         "sweep.csv and sweep.nc (run the same command with --collect to write them)"
     files = f"<p class=soft>Every case with every measure and its error: {named}.</p>" if table.get("own", True) else ""

@@ -171,7 +171,7 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str, str], s
         said(worn, "{} worn off at the deepest place" if worn == "worn_depth_max" else "{} worn off")
         if released:
             parts.append(released)
-            said("friction_work", "friction dissipates {} in all")
+            said("friction_work", "friction dissipates {} during the whole run")
         else:
             for name, text in SHAKEN.items():
                 said(name, text)
@@ -206,13 +206,13 @@ def least_known(result: Result) -> str:
 
     steps = [name for name in wide if name in BETWEEN]
     name = max(wide.keys() - set(steps), key=lambda one: ("±" in told[one], wide[one], one), default="")
-    of_steps = f"{', '.join(map(known, steps))}, has an error of the step between drive levels"
+    of_steps = f"{', '.join(map(known, steps))}, has an error of one step between drive levels"
     if not name:
         return f"{of_steps}."
     but = f"; {of_steps}, which the scene sets" if steps else ""
     least = f"; closest to the tolerance is {known(name)}" if "±" in told[name] else ""
     sharp = "" if all("±" in one for one in told.values()) else f"; {SHARP}"
-    return f"Every measure with an error meets the tolerance {tolerance:g}{least}{but}{sharp}."
+    return f"Every measure with an error estimate meets the tolerance {tolerance:g}{least}{but}{sharp}."
 
 
 def linked(text: str, name: str, more: str = "") -> str:
@@ -296,8 +296,8 @@ def fragment(summary: dict, sentence: str, cycles: float | None, released: str =
 def _records(name: str, measures: dict) -> str:
     """`of_records` behind a value, whose ± is then said to be that of the numerics alone."""
     text = of_records(name, measures)[1]
-    numerics = "± of the numerics; " if "±" in pair(name, measures[name]) else ""
-    return f" ({numerics}{text} over records)" if text else ""
+    numerics = "± is the numerical error; " if "±" in pair(name, measures[name]) else ""
+    return f" ({numerics}{text} for other records)" if text else ""
 
 
 def _value(name: str, one: dict, over: str) -> str:

@@ -35,12 +35,12 @@ def lines_of(told: Told | None, cutoff: float | None) -> list:
     if one is None:
         return []
     if "reason" in one:
-        return [f"  it gives no [contact.asperities]: {one['reason']}"]
+        return [f"  the trace gives no table [contact.asperities]: {one['reason']}"]
     fine = told.fine
     soft, stiff = (1 / (share * fine.height) for share in reversed(PERSSON))
     decay = sum(PERSSON) / 2 * fine.height
     half = one["stiffness_half_sampled"]
-    sampled = "every second sample alone gives no such surface" if half is None else \
+    sampled = "with every second sample of the trace there is no such surface" if half is None else \
         f"with every second sample of the trace the ratio is {_per(half)}, {100 * (half / one['stiffness'] - 1):+.2g} %"
     return ["  paste this into a scene if the other face is smooth (Greenwood-Williamson peaks, radius "
             f"{short(one['radius'], 'm', 3)}, {one['density']:.3g} 1/m^2):",

@@ -26,23 +26,25 @@ from .areal import write_columns, write_x3p
 
 WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_max": "worn depth, largest",
          "worn_depth_mean": "worn depth, mean", "worn_area": "worn area", "amplitude_ratio": "amplitude ratio",
-         "slope_ratio": "slope ratio", "worn_from_before": "worn from, x before", "worn_to_before": "worn to, x before",
-         "worn_from_after": "worn from, x after", "worn_to_after": "worn to, x after",
+         "slope_ratio": "slope ratio", "worn_from_before": "worn part begins, x of first trace",
+         "worn_to_before": "worn part ends, x of first trace",
+         "worn_from_after": "worn part begins, x of second trace", "worn_to_after": "worn part ends, x of second trace",
          "worn_depth_within": "worn depth, mean over the worn part",
-         "track_from": "track from", "track_to": "track to", "track_direction": "track, direction",
+         "track_from": "track begins at", "track_to": "track ends at", "track_direction": "track, direction",
          "track_length": "track length", "track_volume": "track, area times length",
          "track_width": "track width", "track_depth": "track depth, mean", "track_step": "track, step height",
-         "track_pile_up_left": "track, pile-up at 'from'", "track_pile_up_right": "track, pile-up at 'to'",
+         "track_pile_up_left": "track, pile-up at its beginning", "track_pile_up_right": "track, pile-up at its end",
          "track_depth_floor": "track depth, floor", "track_area_gross": "track, lost area",
-         "track_pile_up": "track, pile-up", "track_area_net": "track, lost less pile-up",
-         "hidden_wear": "wear that a wedge may hide, mean",
+         "track_pile_up": "track, pile-up", "track_area_net": "track, lost area minus pile-up",
+         "hidden_wear": "mean wear that a wedge may hide",
          "worn_volume": "worn volume", "grown_volume": "grown volume", "worn_share": "worn share of the region",
          "shift_x": "shift along x", "shift_y": "shift along y", "rotation": "rotation",
          "worn_depth_mean_from_abbott": "worn depth, mean, from Abbott curves"}
 DRAWN = 1_000_000  # heights that a histogram and an Abbott curve are drawn from, spread over a larger scan
-NOTE = ("All intervals are 95 % intervals. Those of shift, depth and area hold for the measured place and come from "
-        "the noise of the unworn heights. Those of ratios hold for the whole surface and assume Gaussian heights with "
-        "the same statistics everywhere. If both traces are of the same place, their heights vary together, and the "
+NOTE = ("All intervals are 95 % intervals. The intervals of shift, depth and area hold for the measured place and "
+        "come from the noise of the unworn heights. The intervals of ratios hold for the whole surface and assume "
+        "Gaussian heights with the same statistics everywhere. If both traces are of the same place, their heights "
+        "vary together, and the "
         "intervals are narrower.")
 
 
@@ -204,7 +206,7 @@ def page(parts: list, found: tuple, directions: list = (), pressing: Pressed | N
         sections.append(Section("directions", "x over y", figure(
             "xy", pictures.crossed(parts, directions),
             "Left: spectra of both directions. Right: amplitude of the band and slope along x over those along y, with "
-            "their 95 % intervals; the value 1 means that the surface is alike in both directions.",
+            "their 95 % intervals; the value 1 means that the surface is equally rough in both directions.",
             f"Waves along x over those along y: amplitude {said}")))
     for number, one in enumerate(parts):
         body = [*(figure(f"{number}{place}", *each) for place, each in enumerate(figures(one))), _table(one),
@@ -254,7 +256,7 @@ def figures(one: Comparison) -> list:
     spectra = [each.spectrum for each in one.sizes]
     if spectra and all(each.density.any() for each in spectra):
         out.append((pictures.both_statistics(curves, spectra, BAND), f"Left: Abbott curves about {about}. Right: "
-                    "spectra with the band in which the true density lies with 95 % probability.",
+                    "spectra with their 95 % bands.",
                     f"Abbott curves and spectra: amplitude ratio {shown(one.amplitude_ratio)[0]}"))
     return out
 
@@ -264,8 +266,9 @@ def _maps(one: Change) -> list:
     x, y, (first, second, depth) = one.before.x, one.before.y, line.laid(one)
     worn = one.volumes.values["worn_volume"]
     out = [(pictures.maps(x, y, (first, second, depth)),
-            "Left and middle: the first scan (before wear) and the second scan (after wear), aligned with the first, "
-            "both about the reference plane of the first scan; white: no height. Right: depth of the second scan below "
+            "Left and middle: the first scan (before wear) and the second scan (after wear), aligned with the first; "
+            "heights are measured from the reference plane of the first scan; white: no height. Right: depth of the "
+            "second scan below "
             "the first; missing depths are taken from their neighbours; white: outside the second scan.",
             f"Maps of both scans and of the worn depth: worn volume {' '.join(shown(worn)[::2])}")]
     known = np.isfinite(depth)
@@ -273,8 +276,8 @@ def _maps(one: Change) -> list:
     there = there[::-(-there.size // DRAWN)]
     heights = [each.ravel()[there] for each in (first, second)]
     out.append((pictures.both_heights(heights, [_bearing(z) for z in heights]),
-                "Left: share of the heights in each class. Right: Abbott curves. Both over the common region, about "
-                "the reference plane of the first scan (before wear).",
+                "Left: share of the heights in each class. Right: Abbott curves. Heights are those of the region "
+                "common to both scans, measured from the reference plane of the first scan (before wear).",
                 "Histograms and Abbott curves of the heights before and after"))
     if one.track is not None and not one.track.why:
         found = one.track.values

@@ -95,7 +95,8 @@ def lost(before: Path, after: Path) -> Lost:
                                 "folders are needed")
     first, second = read(before), read(after)
     if not second.wears:
-        raise PatchfemError(f"{after}: this run has no [wear], so nothing was worn; give the worn run second")
+        raise PatchfemError(f"{after}: this run has no [wear], so nothing wore off; give the run with [wear] as the "
+                            f"second folder")
     _one_patch(first, second)
     return _between(first, second)
 
@@ -113,13 +114,13 @@ def read(path: Path) -> Worn:
     held = {name: one.values for name, one in variables(file, names)[1].items()}
     with readable(file, "results of a patch"):
         for name, dimensions in NEEDED.items():
-            wanted(name in held, f"no {name} in it; run the scene again")
+            wanted(name in held, f"it contains no {name}; run the scene again")
             wanted(numeric(held[name]) and held[name].ndim in dimensions and np.isfinite(held[name]).all(),
                    f"{name} is not a field along the patch")
         size = held["x"].size
         wanted(size > 1 and all(held[name].shape[-1] == size for name in (*NEEDED, "worn_depth") if name in held),
                "its fields differ in length")
-        wanted((np.diff(held["x"]) > 0).all() and held["weight"].sum() > 0, "x is not a row of positions")
+        wanted((np.diff(held["x"]) > 0).all() and held["weight"].sum() > 0, "x is not a list of positions")
         y = held.get("strip_offset")
         shape = (size,) if y is None else (y.size, size)
         depth = held["worn_depth"][-1] if "worn_depth" in held else np.zeros(size)
@@ -156,7 +157,7 @@ def _one_patch(first: Worn, second: Worn) -> None:
                             f"differ by {say(off, 3)}")
     volumes = [0.0 if (one := each.measure("worn_volume")) is None else one["value"] for each in (first, second)]
     if volumes[1] < volumes[0]:
-        raise PatchfemError(f"{first.path} is worn more than {second.path}; give the less worn run first")
+        raise PatchfemError(f"{first.path} is worn more than {second.path}; give the less worn run as the first folder")
 
 
 def _at(x, own, values) -> np.ndarray:
@@ -306,7 +307,7 @@ def _track(x, depth, off: float, area: float) -> dict:
             "depth_mean": _with(area / width, off + area / width * sum(cells) / width, "m", "area lost divided by the "
                                                                                             "width"),
             "depth_floor": _with(floor, off, "m", "mean over the deepest fifth of its width"),
-            "area_net": _with(area, off * width, "m2", "lost area less pile-up, which is zero in a computed run"),
+            "area_net": _with(area, off * width, "m2", "lost area minus pile-up; pile-up is zero in a computed run"),
             "area_gross": _with(area, off * width, "m2", "lost area"),
             "pile_up": Quantity(0.0, 0.0, 0.0, "m2", "computed wear makes no pile-up")}
 
@@ -315,7 +316,7 @@ def verdict(one: Lost) -> tuple:
     """(headline, sentences)."""
     mean, unseen, track = one.values["worn_depth_mean"], one.values["hidden_wear"], one.track
     if not mean.value > 0:
-        return "nothing was worn between the two runs", []
+        return "nothing wore off between the two runs", []
     head, x = f"worn by {say(mean.value, 3)} on average over the patch", one.after.x
     seen, ends = "trace" if one.after.y is None else "scan", hidden(one.after, one.depth)
     if track and one.values["worn_share"].value < 0.999:

@@ -119,7 +119,7 @@ def read_table(folder: Path) -> dict:
     try:
         with open(folder / "sweep.csv", newline="", encoding="utf-8") as file:
             head, *rows = csv.reader(file)
-        wanted(rows and "outcome" in head and "message" in head, "sweep.csv has no case")
+        wanted(rows and "outcome" in head and "message" in head, "sweep.csv contains no case")
         lengths = {number for number, row in enumerate(rows, 2) if len(row) != len(head)}
         wanted(not lengths, f"sweep.csv: a row of {len(head)} fields is needed in line {min(lengths, default=0)}")
         with h5netcdf.File(folder / "sweep.nc", "r") as file:

@@ -87,7 +87,7 @@ def contents(asked: Asked, cases: Cases, found: Answers, keys: Sequence[str] = (
         messages = [found.messages.get(number, "") for number in range(len(cases))]
         texts["message"] = (messages, "why the case failed")
     if keys:
-        texts["folder"] = (keys, "folder of the case below cases/")
+        texts["folder"] = (keys, "folder of the case inside cases/")
     for name, (values, text) in texts.items():
         data[name] = (dims, np.array(values, object).reshape(cases.shape), {"long_name": text})
     return netcdf.Contents(data, coordinates, {

@@ -140,10 +140,11 @@ def test_always_a_sweep_of_which_no_case_has_settled_says_so_first(drawn):
     """Their numbers then count as they ended; 256 such cases were told as if they had settled."""
     table = read_table(drawn[0])
     count = len(table["outcome"])
-    said = "No case has settled; what follows describes the motions as they ended."
+    said = "No case has settled; the sentences below describe the end of each run."
     assert said not in "".join(lead_of(table).sentences())
     lead = lead_of(table | {"outcome": ["transient"] * (count - 2) + ["failed", ""]})
-    assert lead.sentences()[0] == f"1 of {count} cases have no answer yet; what follows covers the others. {said}"
+    assert lead.sentences()[0] == \
+        f"1 of {count} cases have no result yet; the sentences below describe the other cases. {said}"
     assert lead.answer().startswith(lead.left) and "settled" not in lead.scatter
     assert lead_of(table | {"outcome": ["failed"] * count}).left == ""
 

@@ -54,7 +54,7 @@ def test_exact_differences_and_the_last_two_cycles(tmp_path):
 
 def test_always_a_change_within_both_errors_is_not_marked(tmp_path):
     text = page([read(made(tmp_path / "a", 10.0, 2e-6, 3e-8)), read(made(tmp_path / "b", 10.0, 2.05e-6, 3e-8))])
-    assert "Nothing: the resolved scenes are the same" in text and "<b>2." not in text and "(+2" not in text
+    assert "There is no difference: the resolved scenes" in text and "<b>2." not in text and "(+2" not in text
 
 
 @pytest.mark.share(0, 3, 6)

@@ -30,7 +30,8 @@ def test_exact_the_worst_is_relative_and_named_with_its_case():
         "2 of 3 cases miss the tolerance of 1 % in loop area; the largest error is at slide.amplitude 0.05 um: 220 "
         "% of its value.")
     others = {"loop_area": loop, "moment": one([1, 1, 1], [9, 9, 9]), "rotation": one([1] * 3, [0, 0, 1])}
-    assert sentence(others, 0.01, where).endswith("220 % of its value; 2 other measures miss it in some case.")
+    assert sentence(others, 0.01, where).endswith(
+        "220 % of its value; 2 other measures miss the tolerance in some cases.")
     zero = {"energy": one([1e-15, 1, 1], [1e-11, 0, 0], 1e-12), "moment": one([1, 1, 1], [0.5, 0, 0])}
     assert "in moment; the largest error is at slide.amplitude 0.05 um: 50" in sentence(zero, 0.01, where)  # not 10
     assert sentence({"energy": zero["energy"]}, 0.01, where).endswith("0.05 um: larger than the value.")

@@ -25,7 +25,7 @@ def test_exact_a_block_on_a_rubbing_spring_turns_where_the_closed_form_says(tmp_
     answer = cli("run", scene, "-o", tmp_path / "out", "--no-page")
     said = next(line for line in answer.out.splitlines() if line.startswith("Released at "))
     found = re.match(r"Released at 500 um, the output first swings to -(\S+) um, reverses (\d+) times and comes to "
-                     r"rest at (\S+) um after (\S+) ms; friction dissipates (\S+) (\S+) in all\.$", said)
+                     r"rest at (\S+) um after (\S+) ms; friction dissipates (\S+) (\S+) during the whole run\.$", said)
     assert found, said
     load, mass, static = (float(re.search(pattern, text)[1]) for pattern in
                           (r'load = "(\S+) N"', r'moving_mass = "(\S+) kg"', r"static = (\S+)"))
@@ -58,7 +58,7 @@ def test_exact_what_the_last_cycles_leave_is_no_headline_of_a_release():
         "relative_displacement_amplitude": zero, "loop_area": zero | {"unit": "J"},
         "friction_work": {"value": 0.5, "unit": "J", "error": 0.01}}}
     assert headline(summary, 40.0, released="released it rests") == \
-        "Released it rests; friction dissipates 500 ± 10 mJ in all."
+        "Released it rests; friction dissipates 500 ± 10 mJ during the whole run."
 
 
 def test_exact_the_picture_of_the_whole_run_shows_every_turn():

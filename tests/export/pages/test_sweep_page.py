@@ -75,7 +75,7 @@ def test_always_a_measure_without_any_value_is_not_offered_and_a_failed_case_is_
     text = page(table)
     assert "loop_area" not in [one["name"] for one in data_of(text)["measures"]]
     assert "<b>12 cases</b> over contact.tilt.angle × normal.load: 10 steady, 1 failed, 1 grows." in text
-    assert "<i>grows</i>: The motion still grows, and no bounded steady motion was found" in text
+    assert "<i>grows</i>: The amplitude still grows at the end of the run, and" in text
     assert "<i>steady</i>" not in text and "<i>failed</i>" not in text
     assert "1 case failed: normal.load: &lt;refused&gt;" in text
 
@@ -126,12 +126,12 @@ def test_always_a_grid_is_thinned_to_a_grid_with_the_extremes_of_its_first_measu
     assert len(text.encode()) < 3e6 and shown.shape[1] > 400
     assert shown.shape[1] == np.prod([len(set(one)) for one in shown.tolist()])  # every combination
     cases = np.ravel_multi_index(shown.astype(int), counts)
-    said = "those with the largest and the smallest relative displacement amplitude are among them" in text
+    said = "the cases with the largest and the smallest relative displacement amplitude are among them" in text
     assert np.argmax(values) in cases and said is (np.argmin(values) in cases) and (said or len(counts) > 9)
 
 
-@pytest.mark.parametrize("most, said", [(900, "the one with the largest loop area is among them."),
-                                        (5000, "those with the largest and the smallest loop area are among them.")])
+@pytest.mark.parametrize("most, said", [(900, "the case with the largest loop area is among them."),
+                                        (5000, "cases with the largest and the smallest loop area are among them.")])
 def test_exact_a_page_names_the_extremes_that_its_grid_has(most, said):
     """Thirteen keys of two values; the one that is cut first is another at the smallest of the first case."""
     places = [one.ravel() for one in np.meshgrid(*[np.arange(2)] * 13, indexing="ij")]
@@ -269,7 +269,7 @@ def test_exact_the_span_of_the_first_measure_of_interest_with_its_largest_relati
     measures = {"loop_area": ([lost] * 3, [lost] * 3, "J"),
                 "pressure_peak": ([2e6, 3.1415926e6, 9e9], [5e3, lost, 1e9], "Pa")}
     trusted = dict.fromkeys(("loop_area", "pressure_peak", "relative_displacement_amplitude"), settled)
-    assert span(measures, trusted, settled) == "Pressure peak of the settled cases runs from 2 MPa to 3.142 MPa, " \
+    assert span(measures, trusted, settled) == "Pressure peak of the settled cases ranges from 2 MPa to 3.142 MPa, " \
         "with errors of at most 0.2 %."
     measures["loop_area"] = ([1e-3, lost, lost], [lost] * 3, "J")
     assert span(measures, trusted, settled) == "Loop area is 1 mJ throughout."
@@ -277,11 +277,11 @@ def test_exact_the_span_of_the_first_measure_of_interest_with_its_largest_relati
     amplitude = {"relative_displacement_amplitude": ([2.939e-8, 8.2614e-3], [1e-9, 8e-8], "m")}
     start = "Relative displacement amplitude"
     assert span(amplitude, {"relative_displacement_amplitude": both}, both) == \
-        f"{start} runs from 29.39 nm to 8.261 mm, with errors of at most 3 %."
+        f"{start} ranges from 29.39 nm to 8.261 mm, with errors of at most 3 %."
     assert span(amplitude, {"relative_displacement_amplitude": np.array([False, True])}, both) == \
         f"{start} in the cases that meet the tolerance is 8.261 mm throughout, with errors of at most 0.001 %."
     amplitude["relative_displacement_amplitude"] = ([0.0, 1.963e-5], [1e-13, 2e-14], "m")
-    assert span(amplitude, {"relative_displacement_amplitude": both}, both) == f"{start} runs from 0 to 19.63 um."
+    assert span(amplitude, {"relative_displacement_amplitude": both}, both) == f"{start} ranges from 0 to 19.63 um."
     assert span({"loop_area": ([lost], [lost], "J"), "heat": ([1.0], [0.0], "J")}, {}, both[:1]) == ""
 
 
@@ -323,7 +323,7 @@ def test_exact_round_off_is_zero_in_the_span_and_known_absolutely():
     """A joint that holds in its first cases: -1.4e-19 J ± 1e-11 J was known to 2e11 % of its value."""
     loop = np.array([4.2e-21, -1.4e-19, 3.7e-2]), np.array([1e-11, 1e-11, 7.4e-5]), "J"
     text = span({"loop_area": loop}, {"loop_area": np.ones(3, bool)}, np.ones(3, bool))
-    assert text == "Loop area runs from 0 to 37 mJ, with errors of at most 0.2 %."
+    assert text == "Loop area ranges from 0 to 37 mJ, with errors of at most 0.2 %."
 
 
 def swept(heights, known=1e-9, beside=()) -> str:
@@ -345,7 +345,7 @@ def test_exact_two_columns_that_change_together_have_a_least_and_others_have_non
     heights = np.array([9, 5, 1, 2, 3, 4, 4]) * 1e-6
     assert swept(heights, beside=[1, 2, 3, 4, 5, 6, 7]) == \
         "Relative displacement amplitude is least at normal.load 10 N, normal.width 3 mm: 1 um, at its peak " \
-        "frequency of 333.3 Hz (next cases: 3 N with 2 mm and 32 N with 4 mm)."
+        "frequency of 333.3 Hz (neighbouring cases: 3 N with 2 mm and 32 N with 4 mm)."
     assert "normal.width 5 mm: 1 um" in swept(heights, beside=[7, 6, 5, 4, 3, 2, 1])
     assert swept(heights, beside=[1, 2, 3, 3, 5, 6, 7]) == swept(heights, beside=[1, 9, 3, 4, 5, 6, 7]) == ""
 
@@ -362,7 +362,7 @@ def test_exact_a_case_that_is_not_known_may_stand_beside_the_least_where_it_cann
 def test_exact_the_load_that_lets_a_blade_move_least():
     assert swept(np.array([9, 5, 1, 2, 3, 4, 4]) * 1e-6) == \
         "Relative displacement amplitude is least at normal.load 10 N: 1 um, at its peak frequency of 333.3 Hz " \
-        "(next cases: 3 N and 32 N)."
+        "(neighbouring cases: 3 N and 32 N)."
     for ends in ([1, 2, 3, 4, 5, 6, 7], [7, 6, 5, 4, 3, 2, 1], [1.04, 1, 2, 3, 4, 5, 6], [2, 1, 2, 2]):
         assert swept(np.array(ends) * 1e-6) == ""
     assert swept(np.array([9, 5, 1, 2, 3, 4, 4]) * 1e-6, known=0.1) == ""
