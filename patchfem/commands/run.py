@@ -94,7 +94,7 @@ def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
     for text in answer["notes"]:
         note(text)
     if verbose:
-        say("seconds: " + ", ".join(f"{k} {v:.3f}" for k, v in answer["seconds"].items()))
+        say("wall-clock seconds: " + ", ".join(f"{k} {v:.3f}" for k, v in answer["seconds"].items()))
     print(f"results: {target}{page}")
     if (target / "fields.vtkhdf").is_file():
         place = shlex.quote(str(target))

@@ -103,8 +103,9 @@ def _plan_sweep(scene: Path, sets, what: Over, json_: bool, verbose: bool) -> No
 def _print_plan(answer: dict, probe: bool, verbose: bool) -> None:
     """What runs and costs, sentences, stiffnesses and groups; at last what the scene does not name."""
     print(f"kind     {answer['kind']}, engine {answer['engine']}")
-    print(f"cost     about {answer['seconds']:.1f} s{plans.compile_words(answer['compile_seconds'])} and "
-          f"{answer['bytes'] / 1e6:.0f} MB")
+    compiles = plans.compile_words(answer["compile_seconds"])
+    print(f"cost     about {answer['seconds']:.1f} s of computing time{compiles}, "
+          f"{answer['bytes'] / 1e6:.0f} MB of memory")
     sizes = [f"{count} {_words(name)}" for name, count in answer["unknowns"].items()]
     print("sizes    " + ", ".join([*sizes, f"{answer['steps']} steps in all"]))
     for effect in answer["effects"]:

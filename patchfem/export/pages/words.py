@@ -32,8 +32,9 @@ OF_WHAT = {  # said behind a value that would otherwise be taken for another, or
     "loop_area": "per cycle", "friction_work": WHOLE_RUN, "energy_dissipated": WHOLE_RUN, "energy_created": WHOLE_RUN,
     "stick_fraction": "of the interface as a whole", "equivalent_damping": "a damping ratio of mode 1"}
 SCATTER = "_scatter"  # behind the name of what a record of a random drive shows: how far other records differ
-SHAKEN = {"relative_displacement_rms": "the output moves {} rms", "absolute_acceleration_rms": "its acceleration is {} "
-          "rms", "response_frequency": "H1 peaks at {}", "response_damping": "the damping ratio of that peak is {}"}
+SHAKEN = {"relative_displacement_rms": "the displacement of the output is {} rms",
+          "absolute_acceleration_rms": "the acceleration of the output is {} rms",
+          "response_frequency": "H1 peaks at {}", "response_damping": "the damping ratio of that peak is {}"}
 BETWEEN = ("jump_level",)  # known to lie between two levels of the drive, whatever the tolerance
 ROUND = 1e-12  # of the friction force times the motion: work that is round-off
 NONE = MappingProxyType({})
@@ -177,7 +178,7 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str, str], s
                 said(name, text)
             said("relative_displacement_amplitude", "the largest swing is {} half peak-to-peak"
                  if next(iter(SHAKEN)) in measures else "displacement amplitude at the output {} (half peak-to-peak)")
-            said("relative_displacement_amplitude_steady", "it would settle at {}")
+            said("relative_displacement_amplitude_steady", "this amplitude would settle at {}")
             said("absolute_acceleration_peak", "peak acceleration {}")
         if "relative_displacement_amplitude" not in measures:
             said("friction_ratio_peak", "friction ratio peaks at {}")
