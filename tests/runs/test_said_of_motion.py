@@ -101,7 +101,8 @@ def test_exact_a_given_load_has_no_bar():
 def test_exact_an_output_that_stands_still_has_no_stiffness_nor_slip():
     """Bonds of order 0 swing their traction, and so what is called slip, over a slide that is round-off."""
     wave = np.sin(np.linspace(0, 4 * np.pi, 145))
-    window = SimpleNamespace(slide=1e-22 * wave, slip=3e-7 * wave, modal=1e-22 * wave[:, None], time=np.arange(145.0))
+    window = SimpleNamespace(slide=1e-22 * wave, slip=3e-7 * wave, modal=1e-22 * wave[:, None], time=np.arange(145.0),
+                             extra={})
     still = Seen(window, SimpleNamespace(period=72.0), None, {}, 12.9, 2e5, True, loop=(1e-22, 3.9, 0.0))
     assert still.slip == {"slip_amplitude": 0.0, "stick_fraction": 1.0} and still.cycle == {"loop_area": 0.0}
     assert gap(1e-22, 2e-22, 2e-22) == 0 < gap(1e-12, 2e-12, 2e-12)

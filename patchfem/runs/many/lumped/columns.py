@@ -179,7 +179,7 @@ def _reasons(models, sizes: Sizes, runs: Runs, found: Answers) -> None:
         cases = np.flatnonzero(which.ravel() == place).tolist()
         drive = models[cases[0]].rig.drive
         here = {name: values[cases[0]] for name, values in found.values.items() if not np.isnan(values[cases[0]])}
-        window = SimpleNamespace(time=np.array([0.0, runs.window * drive.period]))
+        window = SimpleNamespace(time=np.array([0.0, runs.window * drive.period]), extra={})
         for name, measure in without_value(here, window, drive, True).items():
             found.reasons.setdefault(name, {}).update(dict.fromkeys(cases, measure.reason))
             found.floors[name][cases] = measure.floor
