@@ -8,6 +8,7 @@ from typing import NamedTuple
 from ..core import say
 from ..effects import has
 from ..response import rows
+from ..scales import plain
 from .patch import faces, high_order, ladder
 from .results import notes, patch_rows
 from .rig import costs, engines
@@ -255,8 +256,11 @@ def _finer_under(seen, coarse) -> str:
         return faces.in_scene(seen.model, f"the mesh causes this; leave out {SIZE}")
     tighter = min((found for one in every if (found := _climbing(*one)) is not None), default=None)
     if tighter is None:
-        return (f"the mesh ({nodes} interface nodes) causes this, and a finer mesh would take too long; use the value "
-                "with its stated error")
+        seconds, most = max(ladder.next_seconds(one.patch) for one, _ in every), ladder.SPENT[False]
+        why = f"no accuracy.tolerance chooses a finer mesh, whose pieces would take about {plain(seconds, 2)} CPU s: " \
+            f"for a patch that moves at most {most:g} CPU s are spent on them" if seconds > most else \
+            "no accuracy.tolerance chooses a finer mesh"
+        return f"the mesh ({nodes} interface nodes) causes this, and {why}; use the value with its stated error"
     return f"the mesh ({nodes} interface nodes) causes this; set accuracy.tolerance = {tighter:.3g} for a finer mesh"
 
 

@@ -75,6 +75,19 @@ def test_always_a_mesh_at_its_cap_is_not_refined_by_a_tolerance(monkeypatch):
                             "these values with their stated errors")
 
 
+def test_exact_a_mesh_that_no_tolerance_refines_is_told_with_the_seconds_of_the_next(monkeypatch):
+    """"Too long" stood there for a loop of 4 nJ whose next mesh takes a second or two."""
+    monkeypatch.setattr(ladder, "SPENT", {True: 0.0, False: 1e-3})
+    flat = PATCH + '[contact.shear]\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\nkind = "sine"\n' \
+        'amplitude = "65 nm"\nfrequency = "1 Hz"\n'
+    found = run(plan(loads(flat)))
+    said = [text for text in found.warnings if "interface nodes) causes this" in text]
+    seconds = ladder.next_seconds(found.patch)
+    assert len(said) == 1 and 0.001 < seconds < 5
+    told = re.search(r"would take about (\S+) CPU s: for a patch that moves at most 0.001 CPU s are spent", said[0])
+    assert float(told[1]) == pytest.approx(seconds, rel=0.05) and "too long" not in said[0]
+
+
 def test_always_steps_that_are_left_out_cure_what_few_steps_do_not_show():
     """The change of no measure falls from 4 to 16 steps; those that the tolerance chooses meet it."""
     few, main = run(plan(loads(SHAKEN + FEW))), "relative_displacement_amplitude"

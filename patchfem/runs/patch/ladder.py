@@ -157,7 +157,7 @@ def climbs_at(asked, patches, tolerance: float) -> float | None:
     patches: as `climb` returns them for that tolerance. None where the next mesh is dear, or no tolerance asks for
     it: then the ladder has ended for good.
     """
-    if seconds_of([finer(grid) for grid in _grids(patches[0])]) > SPENT[asked.still]:
+    if next_seconds(patches[0]) > SPENT[asked.still]:
         return None
     if asked.gap.profile is not None and patches[0].sharper:
         ended = not met(measures(*(one for one in patches if one is not None), tolerance=tolerance), tolerance)
@@ -166,6 +166,11 @@ def climbs_at(asked, patches, tolerance: float) -> float | None:
     shares = (10.0**-k for k in range(1, MOST_DECADES + 1))
     return next((share * tolerance for share in shares
                  if not met(measures(*known, tolerance=share * tolerance), share * tolerance)), None)
+
+
+def next_seconds(patch) -> float:
+    """Predicted CPU seconds of condensing the pieces of a patch on the next mesh of its ladder."""
+    return seconds_of([finer(grid) for grid in _grids(patch)])
 
 
 def _grids(patch) -> tuple:
