@@ -124,8 +124,8 @@ def test_always_a_plan_says_what_does_not_run_where_it_is_asked(tmp_path):
     path = tmp_path / "rig.toml"
     path.write_text(text_of("rig"), "utf-8")
     short, long = cli("plan", path).out, cli("plan", path, "-v").out
-    assert "not on" not in short and long.startswith(short) and "friction.law=iwan" in long[len(short):]
-    assert "N/mm -> " in short and "friction limit over the largest force" in short and "e+0" not in short
+    assert "\nabsent" not in short and "\nabsent" in long and long.startswith(short) and "friction.law=iwan" in long[len(short):]
+    assert "N/mm -> " in short and "the largest force of the drive" in short and "e+0" not in short
 
 
 def test_exact_a_run_that_compiles_tells_no_pace_at_its_first_share(capsys):
