@@ -46,20 +46,22 @@ class Outcome(StrEnum):
 
 _SENTENCES = {
     Outcome.DONE: "Finished as asked.",
-    Outcome.STEADY: "The motion repeats from window to window within the tolerance.",
+    Outcome.STEADY: "The motion is steady: it repeats within the tolerance.",
     Outcome.STUCK: "The whole interface sticks in the last cycles.",
-    Outcome.TRANSIENT: "The run ended before the motion settled; more cycles may help if the drive repeats "
-                       "itself.",
-    Outcome.GROWS: "The motion still grows, and no bounded steady motion was found: friction does not limit it.",
-    Outcome.EXCEEDS_TRAVEL: "The motion exceeded the travel of the flexure, so the run ended there.",
-    Outcome.LEAVES_CONTACT: "The slide passed the end of the piece, where the pieces no longer overlap; lower the "
-                            "drive, shorten the slide or lengthen the piece.",
+    Outcome.TRANSIENT: "The run ended before the motion became steady; if the drive is periodic, more cycles may help.",
+    Outcome.GROWS: "The amplitude still grows at the end of the run, and no bounded steady motion was found: friction "
+                   "does not limit the motion.",
+    Outcome.EXCEEDS_TRAVEL: "The motion exceeded the travel of the flexure (`structure.travel`), so the run ended at "
+                            "that time.",
+    Outcome.LEAVES_CONTACT: "The slide became so large that the pieces no longer overlap; lower the drive, shorten the "
+                            "slide or lengthen the piece.",
     Outcome.LEAVES_GROOVES: "The inertia of the lifted mass took all of the load, so the pieces left their grooves and "
-                            "the run ended there; lower the drive or the lifted mass, or raise the load.",
-    Outcome.WORN_THROUGH: "Wear went through a coating at its deepest place, so the run ended; ask for fewer "
-                          "cycles or make the coating thicker.",
+                            "the run ended at that time; lower the drive or the lifted mass, or raise the load.",
+    Outcome.WORN_THROUGH: "A coating was worn through where the wear is deepest, so the run ended at that cycle; ask "
+                          "for fewer cycles or make the coating thicker.",
     Outcome.NO_CONTACT: "The pieces do not touch; raise the load or close the gap.",
-    Outcome.NOT_CONVERGED: "A numerical method did not converge, so the result is marked; do not use it.",
+    Outcome.NOT_CONVERGED: "A numerical method did not converge, so the result is marked as invalid; do not use the "
+                           "result.",
 }
 
 

@@ -69,7 +69,7 @@ def test_exact_drawn_cases_lie_in_their_ranges_and_come_again():
 
 
 def test_refuses_what_is_no_sweep():
-    with pytest.raises(pf.SceneError, match="nothing to sweep over"):
+    with pytest.raises(pf.SceneError, match="no key to sweep is given"):
         pf.sweep(RIG)
     with pytest.raises(pf.SceneError, match=r"--over normal.load: .*'lbf'"):
         pf.sweep(RIG, {"normal.load": ["1 lb"]})

@@ -74,8 +74,8 @@ HIGHER, BELOW = 3, 0.8  # releases from higher up; share of the smallest amplitu
 FINER = 3  # doublings of the steps of a decay
 
 
-UNKNOWN = ('bonds have a closed-form friction loop only with reading = "stretch", order = 1, constant bond length, no '
-           "breakaway and pieces rigid in shear")
+UNKNOWN = ('the friction loop of bonds has a closed form only with reading = "stretch", order = 1, a constant bond '
+           'length, breakaway = 0 and pieces that are rigid in shear')
 
 
 class Curve(NamedTuple):
@@ -162,8 +162,8 @@ def backbone(model: Model, mode: str = "", amplitudes=None, methods=WAYS, progre
         joint = _joint(model, mode)
         wanted = _default(joint) if amplitudes is None else np.unique(np.asarray(amplitudes, float))
         if wanted[-1] > joint.model.rig.travel:
-            raise PatchfemError(f"the amplitude {say(wanted[-1], 3)} lies beyond this travel; give smaller amplitudes "
-                                "with --amplitudes", "structure.travel")
+            raise PatchfemError(f"the largest amplitude, {say(wanted[-1], 3)}, is above this travel; give smaller "
+                                "amplitudes with --amplitudes", "structure.travel")
         curves, missing, richer = {}, {}, model.rig.richer
         other = None if richer is None else _joint(replace(model, rig=richer), mode)
         for way in methods:
@@ -187,7 +187,7 @@ def _beside(curve: Curve, other: Curve) -> Curve:
     a, ends = curve.amplitude, other.amplitude[[0, -1]] * [1 - CLOSE, 1 + CLOSE]
     curve = curve.at((a >= ends[0]) & (a <= ends[1]))
     if not curve.amplitude.size:
-        raise NotConverged("the check run with more modes of the structure found no motion of these amplitudes; raise "
+        raise NotConverged("a check with more modes of the structure found no free motion at these amplitudes; raise "
                            "structure.reduced.modes")
     frequency, damping = (OF_MODES * np.abs(np.interp(curve.amplitude, other.amplitude, theirs) - own) for own, theirs
                           in ((curve.frequency, other.frequency), (curve.damping, other.damping)))
@@ -197,7 +197,7 @@ def _beside(curve: Curve, other: Curve) -> Curve:
 
 def _joint(model: Model, name: str) -> Joint:
     if model.rig is None:
-        raise PatchfemError("a backbone needs a rig: give the scene [structure] and [drive]", "structure")
+        raise PatchfemError("a backbone needs the scene of a rig; add the tables [structure] and [drive]", "structure")
     modes, number = model.rig.modes, _number(model.rig, name)
     if modes.lateral_faces is not None:
         flat = next(one.key for one in model.rig.interfaces if one.lateral)
@@ -211,16 +211,16 @@ def _joint(model: Model, name: str) -> Joint:
         stiffness = _held_by(joint._replace(stiffness=held_by(model.rig, plan(model).chain)))
         joint = joint._replace(held=modes.held(modes.interfaces, stiffness, number), stiffness=stiffness)
     if not _limit(joint) and model.rig.bends and (model.friction is not None or model.rig.interfaces):
-        raise PatchfemError("the load or the coefficient of friction is 0, so no friction acts; leave out [friction] "
-                            "and its load for the backbone without friction", "friction.static")
+        raise PatchfemError("the load or the coefficient of friction is 0, so no friction acts; for the backbone "
+                            "without friction leave out [friction] and the normal load", "friction.static")
     if not (modes.omega[number] or joint.held[0]):
-        raise PatchfemError("this mode has 0 Hz and its friction is rigid, so it has no natural frequency")
+        raise PatchfemError("this mode has 0 Hz and rigid friction acts on it, so the mode has no natural frequency")
     if not (joint.linear or model.rig.bends or np.abs(modes.interfaces @ joint.held[1]).max() > 0):
-        raise PatchfemError("the mode does not move the contact, so no friction acts on it; choose another mode with "
-                            "--mode, or give this mode a slide")
+        raise PatchfemError("the mode does not move the contact, so no friction acts on the mode; choose another mode "
+                            "with --mode, or give this mode the key `slide`")
     if not joint.reach > 0:
-        raise PatchfemError("the mode does not move the output, so the mode has no amplitude there; give the mode an "
-                            "output, or choose another mode with --mode")
+        raise PatchfemError("the mode does not move the point of the output, so its amplitude there is 0; give the "
+                            "mode the key `output`, or choose another mode with --mode")
     return joint
 
 
@@ -255,7 +255,8 @@ def _number(rig, name: str) -> int:
             raise PatchfemError(f"backbone --mode {name}: the rig has {modes.omega.size} modes, counted from 1", "")
         return int(name) - 1 if name else int(np.argmax(modes.omega > 0))
     if name and name not in names:
-        raise PatchfemError(f"backbone --mode {name}: no mode of this name; the rig has {', '.join(names)}", "")
+        raise PatchfemError(f"backbone --mode {name}: no mode has this name; the modes of the rig are "
+                            f"{', '.join(names)}", "")
     k = names.index(name) if name else 0
     return k if modes.shapes is None else int(np.argmax(np.abs(modes.shapes[k])))
 
@@ -372,11 +373,11 @@ def _refuse(joint: Joint, way: str) -> None:
     model = joint.model
     for reason, holds in (("on grooves", model.grooves is not None),
                           ("with a load that changes with the motion", model.rig.load_varies),
-                          ("for strips that slide independently", model.rig.strips_slide_apart),
+                          ("for strips that slide independently of one another", model.rig.strips_slide_apart),
                           ("for several interfaces with rigid friction",
                            _rigid(model) and len(model.rig.interfaces) > 1)):
         if holds:
-            raise PatchfemError(f"no {way} is known {reason}")
+            raise PatchfemError(f"{way} cannot be computed {reason}")
 
 
 def _rigid(model: Model) -> bool:
@@ -529,15 +530,15 @@ def _turned(joint: Joint, amplitudes) -> Curve:
     """Curve under rigid friction; it begins where the motion no longer holds on the way."""
     model, modes, load = joint.model, joint.model.rig.modes, _limit(joint)
     if model.rig.bends or not modes.omega.all():
-        raise PatchfemError("with rigid friction the free motion cannot be computed if there is a nonlinear spring or "
-                            "a mode of 0 Hz")
+        raise PatchfemError("with rigid friction the free motion cannot be computed if the rig has a nonlinear spring "
+                            "or a mode of 0 Hz")
     f, row = model.friction, modes.interfaces[0]
     kinetic = load if f.kinetic is None else load * f.kinetic / f.static
     found = limit_cycles.relay_backbone(modes, row, (kinetic, load), amplitudes, joint.mode)
     kept = [(a, *one) for a, one in zip(amplitudes, found) if one is not None]
     if not kept:
-        raise NotConverged("with rigid friction no motion of these amplitudes slides all the time; give larger "
-                           "amplitudes")
+        raise NotConverged("at these amplitudes rigid friction stops the motion in each cycle, and only a motion that "
+                           "always slides can be computed; give larger amplitudes")
     a = np.array([one[0] for one in kept])
     frequency, damping = np.array([(c.omega / (2 * np.pi), zeta) for _, c, zeta in kept]).T
     loss = 4 * kinetic * a * abs(row[joint.mode] / modes.output[joint.mode]) if modes.omega.size == 1 else \
@@ -551,7 +552,7 @@ def _static(joint: Joint, amplitudes) -> Curve:
     of the contact alone on a bench."""
     _refuse(joint, "static curve")
     if _rigid(joint.model):
-        raise PatchfemError("rigid friction has no stiffness, so the stuck mode has no static curve")
+        raise PatchfemError("rigid friction has no finite stiffness, so the sticking mode has no static curve")
     if (known := _in_closed_form(joint, amplitudes)) is not None:
         return known
     try:
@@ -581,8 +582,8 @@ def _rising(best, error) -> Curve:
     whole = np.isfinite(best + error).all(axis=0) & (np.diff(force, prepend=0.0) > 0)
     count = whole.size if whole.all() else int(np.argmin(whole))
     if not count:
-        raise NotConverged("no static force along the mode has an equilibrium at these amplitudes; use --method "
-                           "balance")
+        raise NotConverged("no static force with the shape of the mode holds the rig in equilibrium at these "
+                           "amplitudes; use --method balance")
     return Curve(best[0], best[1], error[1], best[2], error[2], best[3]).at(slice(count))
 
 
@@ -846,8 +847,9 @@ def _regimes(joint: Joint, wanted, micro: float | None) -> list:
         return []
     edge = MICRO * _amplitude_of(joint, _knee(joint))
     if wanted[0] > edge:
-        return [f"the smallest amplitude, {say(wanted[0], 3)}, lies beyond micro-slip, which ends at about "
-                f"{say(edge, 2)}; begin at {say(LOW / MICRO * edge, 2)} to see the exponent of micro-slip"]
+        return [f"the smallest amplitude, {say(wanted[0], 3)}, lies above the range of micro-slip, which ends at about "
+                f"{say(edge, 2)}; to get the exponent of micro-slip, begin --amplitudes at "
+                f"{say(LOW / MICRO * edge, 2)}"]
     return [f"the exponent of micro-slip cannot be determined: fewer than two amplitudes below {say(edge, 2)} have a "
             f"loss of at least {RESOLVED:g} times the error of the loss; give amplitudes up to {say(edge, 2)}, or a "
             "smaller accuracy.tolerance"]
@@ -865,7 +867,7 @@ def _edge(one: Curve) -> float | None:
 
 def _unrubbed(joint: Joint) -> tuple:
     rubs = joint.model.friction is not None or joint.model.rig.interfaces
-    return ("no friction acts, so frequency and damping do not change with the amplitude",) if joint.linear and rubs \
+    return ("no friction acts, so frequency and damping are the same at all amplitudes",) if joint.linear and rubs \
         else ()
 
 
@@ -873,10 +875,10 @@ def _unworn(model: Model) -> tuple:
     return () if model.wear is None else ("these curves are for unworn pieces: [wear] is ignored",)
 
 
-LEFT_OUT = {"balance": "not computed: harmonic balance did not converge there; the curve may fold back, or the mode "
-                       "may stop oscillating",
-            "quasi-static": "the static curve ends there",
-            "decay": "not computed: the release, or one of its coarser check runs, gave no frequency and damping there"}
+LEFT_OUT = {"balance": "harmonic balance did not converge there; the curve may turn back to smaller amplitudes, or the "
+                       "mode may stop oscillating",
+            "quasi-static": "the static curve does not reach these amplitudes",
+            "decay": "the free decay, or one of the coarser decays that check it, gave no frequency and damping there"}
 
 
 def _gaps(wanted, curves: dict) -> list:
@@ -887,7 +889,8 @@ def _gaps(wanted, curves: dict) -> list:
         if lacks.size and one.amplitude.size < wanted.size:
             left = f"lie from {say(lacks[0], 3)} to {say(lacks[-1], 3)}" if lacks.size > FEW else \
                 f"are {', '.join(say(each, 3) for each in lacks)}"
-            out.append(f"{way} has {one.amplitude.size} of {wanted.size} points; the points left out {left}: "
+            out.append(f"method {way}: {one.amplitude.size} of {wanted.size} amplitudes have a result; the amplitudes "
+                       f"without a result {left}: "
                        f"{LEFT_OUT[way]}")
     return out
 
@@ -895,13 +898,14 @@ def _gaps(wanted, curves: dict) -> list:
 def _secant(joint: Joint, wanted, curves: dict) -> list:
     """A sentence on what a static curve in slip is, where no balance stands beside it."""
     slips = not joint.linear and _limit(joint) and wanted[-1] > MICRO * _amplitude_of(joint, _knee(joint))
-    return ["quasi-static frequencies follow from the stiffness between turning points under a force of fixed shape; "
-            "once the contact slips they are higher than those of --method balance, because the first harmonic of the "
-            "force gives a lower stiffness"] \
+    return ["--method quasi-static takes the stiffness from the two turning points of the motion under a force of "
+            "fixed shape; --method balance takes the stiffness from the first harmonic of the force, which is lower "
+            "once the contact slips; quasi-static frequencies are therefore higher than those of balance"] \
         if slips and "quasi-static" in curves and "balance" not in curves else []
 
 
-WHY = {"decay": "a decay gives the mean over a cycle, in which the amplitude falls by a fraction of {:.2g} there",
+WHY = {"decay": "a decay gives the mean over a cycle, and there the amplitude falls by a fraction of {:.2g} in one "
+                "cycle",
        "quasi-static": "the static curve uses the secant stiffness under a force of fixed shape; harmonic balance uses "
                        "the first harmonic of the force"}
 
@@ -925,8 +929,9 @@ def _differences(curves: dict) -> list:
                 k = int(np.argmax(share))
                 lost = -np.expm1(-2 * np.pi * one.damping[k])
                 times = getattr(one, what)[k] / beside[k]
-                by = f"where that by {way} is {times:.2g} times as large" if times >= 2 else \
+                by = f"where the value by {way} is {times:.2g} times the value by balance" if times >= 2 else \
                     f"by {100 * share[k]:.2g} %"
-                out.append(f"{what} by {way} and by balance differ most at {say(one.amplitude[k], 3)}, {by}: "
+                out.append(f"the values of {what} by {way} and by balance differ most at the amplitude "
+                           f"{say(one.amplitude[k], 3)}, {by}: "
                            f"{why.format(lost)}")
     return out

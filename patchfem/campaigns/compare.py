@@ -16,7 +16,8 @@ SHOWN = {  # measure: (in words, what a scene needs for it)
     "normal_stiffness": ("normal stiffness K_n", "[contact]"),
     "tangential_stiffness": ("tangential stiffness K_t", "[contact.shear] or [contact.asperities]"),
     "onset_level": ("onset of slip", '[structure] and [drive] with waveform = "levels"'),
-    "loop_area": ("energy of the friction loop per cycle", "[friction] with [slide], or with [structure] and [drive]"),
+    "loop_area": ("energy dissipated by friction per cycle", "[friction] with [slide], or with [structure] and "
+                                                             "[drive]"),
 }
 
 
@@ -69,8 +70,7 @@ def pressed(before: Model, after: Model, title: str, say: Callable | None = None
             sides.append(None)
             failed.append(f"the surface {name}: {error}")
     known = {name for one in sides if one is not None for name, m in one.measures.items() if _there(m)}
-    lacking = tuple(f"{words}: not computed by "
-                    f"this scene, because it lacks {need}" for name, (words, need) in SHOWN.items()
+    lacking = tuple(f"{words}: not computed, because the scene lacks {need}" for name, (words, need) in SHOWN.items()
                     if name not in known) if any(sides) else ()
     return Pressed(title, *sides, tuple(failed), lacking)
 

@@ -77,9 +77,10 @@ def curve(model: Model, knob: str, say=None) -> list:
     with placed(model.source):
         mine = knobs_of(model)
         if knob not in mine:
-            raise PatchfemError(f"cost --over {knob}: this scene has only the settings {', '.join(mine) or 'none'}", "")
+            raise PatchfemError(f"cost --over {knob}: the cost of this setting cannot be measured for this scene; "
+                                f"possible settings: {', '.join(mine) or 'none'}", "")
         wanted = settings(model, knob)
-        _tried(wanted[0], "first run, not counted", None)  # imports and compiling stay out of the times
+        _tried(wanted[0], "first run, not timed", None)  # imports and compiling stay out of the times
         runs, done = [], 0
         for one in wanted:
             found = _timed(one, one is not wanted[-1], say, runs[-1:])
@@ -87,7 +88,7 @@ def curve(model: Model, knob: str, say=None) -> list:
                 done += 1
                 runs[-1:] = [_one_run(runs[-1], found)] if runs and found.same_as(runs[-1]) else [*runs[-1:], found]
         if done < 3:
-            raise PatchfemError(f"cost --over {knob}: fewer than three settings could be run", "")
+            raise PatchfemError(f"cost --over {knob}: fewer than three values of this setting could be run", "")
     best = _best(runs)
     return [one if one is best else replace(one, distances=_distances(one, best)) for one in runs]
 
@@ -135,7 +136,7 @@ def _timed(setting: Setting, coarse: bool, say, before=()) -> Cost | None:
                    {name: m.floor for name, m in known.items()}, {})
         if one.seconds >= LONG and _compiled() == kept:
             break
-    again = "".join(f", the run of {other.label}" for other in before if one.same_as(other))
+    again = "".join(f", the same run as {other.label}" for other in before if one.same_as(other))
     if say is not None:
         say(f"{one.label}: {one.seconds:.2f} CPU s" + f" in {one.wall_seconds:.2f} s" * one.waited() +
             (again or ", timed once" * (one.timings == 1)))
@@ -219,10 +220,10 @@ def sentence(runs: list, tolerance: float) -> str:
     known = [one for one in runs if one.errors or one.distances]
     share, name, least = min(((*_worst(one, names, tolerance), one) for one in known), key=lambda found: found[0])
     if share >= STUCK * max(_worst(one, [name], tolerance)[0] for one in known if name in one.values):
-        return (f"no run has all measures within {percent}: the error of {name} is {100 * share:.2g} % with every "
-                "setting")
-    return (f"no run has all measures within {percent}: the smallest error of {name} is {100 * share:.2g} %, with "
-            f"{least.words} in {_seconds(least)}")
+        return (f"no run has all measures within {percent}: with every setting the error of {name} is "
+                f"{100 * share:.2g} %")
+    return (f"no run has all measures within {percent}: the best run, with {least.words}, has an error of "
+            f"{100 * share:.2g} % in {name} and takes {_seconds(least)}")
 
 
 def worst_of(runs: list, tolerance: float) -> set:

@@ -66,8 +66,8 @@ def fit_loop(scene: Scene, to: Path, free, hold=(), say=None, options: LoopOptio
     """
     begin = perf_counter()
     if scene.kind != "bench":
-        raise SceneError([f"{scene.path}: fit: a loop needs a scene with [slide], but this is a {scene.kind} scene; "
-                          "prescribe the motion with [slide]"])
+        raise SceneError([f"{scene.path}: fit: to fit a measured loop the scene must prescribe the motion with "
+                          f"[slide], but this is a {scene.kind} scene; add [slide]"])
     wanted, wrong = ranges(free)
     if wrong:
         raise SceneError(wrong)
@@ -79,8 +79,8 @@ def fit_loop(scene: Scene, to: Path, free, hold=(), say=None, options: LoopOptio
     offsets = offsets_of(options.offsets, loop)
     everything = [*wanted, *(one.range for one in offsets)]
     if used <= len(everything):
-        raise PatchfemError(f"{to}: {used} rows are not held out, too few to determine {len(everything)} values and "
-                            "their intervals")
+        raise PatchfemError(f"{to}: only {used} rows are used for the fit (not held out), too few to determine "
+                            f"{len(everything)} values and their intervals")
     bench = BenchModel(scene, loop, wanted, offsets, options.warm, say)
     scale = float(np.abs(loop.reading[~held]).max())
 
@@ -125,7 +125,7 @@ def _refined(bench, residual, wanted, say) -> tuple:
             last = _counted(fit(residual, low, high, start=found.values, starts=1, bars="series"), before)
             return replace(last, agreed=agreed), change
         if say:
-            say(f"{bench.pieces} steps between two rows")
+            say(f"{bench.pieces} time steps between two rows")
         start, starts = found.values, 1
 
 
@@ -164,12 +164,13 @@ def _doubts(fitted: Fitted, led: bool) -> list:
     rms, step_error = fitted.rms, fitted.step_error
     out, peak, used = [], float(np.abs(loop.reading).max()), np.count_nonzero(~held)
     if rms > 1e-6 * peak and rows < FEWER * used:
-        out.append(f"the residual is correlated from row to row, so the {used} rows count as {max(rows, 1):.3g} "
-                   "independent rows in the intervals; a part of the deviation is systematic")
+        out.append(f"the deviations of neighbouring rows are correlated, so for the intervals the {used} rows count as "
+                   f"{max(rows, 1):.3g} independent rows; a part of the deviation is systematic")
     if abs(loop.reading[0]) > 0.2 * peak and not has(scene.friction.law, "memoryless") and not held[0] and not led:
-        out.append(f"the first row is at {abs(loop.reading[0]) / peak:.0%} of the peak, but the model starts "
-                   "unstressed: use --warm-up, hold out the first cycle, or begin the record at rest")
+        out.append(f"the force in the first row is {abs(loop.reading[0]) / peak:.0%} of the largest force, but the "
+                   "model starts without force: use --warm-up, hold out the first cycle, or give a record that begins "
+                   "at rest")
     if step_error > scene.accuracy.tolerance * peak:
-        out.append(f"with half the steps the force of the model changes by {step_error / peak:.1g} of the peak, more "
-                   "than the tolerance")
+        out.append(f"if the time steps are halved, the force of the model changes by {step_error / peak:.1g} of its "
+                   "peak, more than the tolerance")
     return out

@@ -75,14 +75,15 @@ def read_curve(path) -> tuple:
     table = read_columns(path, units, tuple(f"decay_{name} {name}" for name in UNITS), HEADER, "a decay",
                          labels=True)
     if len(set(table.labels.get("method", ("",)))) > 1:
-        raise PatchfemError(f"{path}: the file has the curves of several methods; keep the rows of one method")
+        raise PatchfemError(f"{path}: the file contains the curves of several methods; keep the rows of one method "
+                            "only")
     columns = {name.removeprefix("decay_"): one for name, one in table.values.items()}
     value = np.array([columns["frequency"], columns["damping"]])
     spread = np.array([columns[f"{name}_error"] / 2 if f"{name}_error" in columns else half * np.abs(one) for
                        name, half, one in zip(("frequency", "damping"), HALVES, value)])
     if (spread < 0).any():
-        raise PatchfemError(f"{path}: an error is below 0; give half the width of each interval, or leave out the "
-                            "column of errors")
+        raise PatchfemError(f"{path}: errors must be 0 or more; give half the width of each interval as its error, or "
+                            "leave out the column of errors")
     if not (columns["amplitude"] > 0).all() or not (value[0] > 0).all():
         raise PatchfemError(f"{path}: amplitudes and frequencies must be above 0")
     order = np.argsort(columns["amplitude"], kind="stable")
@@ -105,7 +106,7 @@ def fit_decay(scene: Scene, to: Path, free, say=None, starts: int = 3) -> Fitted
         raise SceneError(wrong)
     amplitude, measured, error = read_curve(to)
     if 2 * amplitude.size <= len(wanted):
-        raise PatchfemError(f"{to}: {amplitude.size} amplitudes cannot determine {len(wanted)} values")
+        raise PatchfemError(f"{to}: {amplitude.size} amplitudes are too few to determine {len(wanted)} values")
     base, apart, said, count = Base(scene), np.unique(amplitude), begin, 0
 
     @lru_cache(8)
@@ -113,7 +114,7 @@ def fit_decay(scene: Scene, to: Path, free, say=None, starts: int = 3) -> Fitted
         nonlocal said, count
         if say and perf_counter() - said >= SECONDS:
             said = perf_counter()
-            say(f"{count} curves of the model computed, {said - begin:.0f} s so far")
+            say(f"{count} curves of the model computed in {said - begin:.0f} s")
         count += 1
         sets = [one.assigned(value) for one, value in zip(wanted, values)]
         try:
@@ -128,8 +129,8 @@ def fit_decay(scene: Scene, to: Path, free, say=None, starts: int = 3) -> Fitted
     def quick(values) -> np.ndarray:
         found = curve(values, ways[-1])
         if (lost := np.isnan(found[0])).any():
-            raise PatchfemError(f"the model's mode does not oscillate at {_listed(amplitude[lost])}; leave out these "
-                                "rows, or narrow --free")
+            raise PatchfemError("the mode of the model does not oscillate at the amplitudes "
+                                f"{_listed(amplitude[lost])}; leave out these rows, or narrow the ranges of --free")
         return found * share
 
     def balanced(values) -> np.ndarray:
@@ -150,8 +151,10 @@ def fit_decay(scene: Scene, to: Path, free, say=None, starts: int = 3) -> Fitted
         try:
             told = balanced(start)
         except PatchfemError as reason:
-            raise PatchfemError(f"at the fitted values harmonic balance finds no oscillation at {_listed(amplitude)}: "
-                                f"{reason}; leave out the rows with the largest damping, or narrow --free") from None
+            raise PatchfemError("with the fitted values harmonic balance finds no oscillation at the amplitudes "
+                                f"{_listed(amplitude)}: "
+                                f"{reason}; leave out the rows with the largest damping, or narrow the ranges of "
+                                "--free") from None
         settled = np.abs((told - quick(start)) / error).max() < SAME
         tried.append((float(np.square((told - measured) / error).sum()), len(tried), start))
         share, starts = share * told / quick(start), 1
@@ -159,8 +162,9 @@ def fit_decay(scene: Scene, to: Path, free, say=None, starts: int = 3) -> Fitted
     start = start if settled else min(tried)[2]
     found = fitted(model, "series")
     best, lost = model(found.values), amplitude[np.isnan(curve(found.values, ways[0])[0])]
-    warned = [f"harmonic balance found no oscillation at {_listed(lost)}; there the static curve is used, with the "
-              "correction found at the nearest amplitude"] if lost.size else []
+    warned = [f"harmonic balance found no oscillation at the amplitudes {_listed(lost)}; there the static curve is "
+              "used, times the ratio of harmonic balance to the static curve at the nearest "
+              "amplitude"] if lost.size else []
     sets = [one.assigned(value) for one, value in zip(wanted, found.values)]
     return FittedDecay(scene, Path(to), wanted, found, amplitude, measured, error, best, ways[0], sets,
                        [*scene.remarks, *warned, *remarks(found, [one.key for one in wanted])], perf_counter() - begin)
@@ -182,7 +186,7 @@ def _known(curve, tried: list) -> list:
         if len(most) == len(WAYS):
             break
     if not most:
-        raise PatchfemError("no curve over the amplitude could be computed within the ranges of --free; "
+        raise PatchfemError("no curve of frequency and damping could be computed within the ranges of --free; "
                             f"{'; '.join(reasons[:len(WAYS)])}; leave out the rows with the largest damping, or change "
                             "the ranges of --free")
     return most

@@ -79,7 +79,7 @@ class BenchModel:
         path = np.interp(number, corner, time), np.interp(number, corner, slide), 0, 0.0
         run = law_bench.run(model, patch, 4, 0, path, Watch(smooth_sum_of(model, path[1]), self.say))
         if not run.load[0] > 0:
-            raise PatchfemError("no load presses the pieces", "")
+            raise PatchfemError("the normal load is 0 or less; give a load that presses the pieces together", "")
         out = run.force[corner]
         if self.instant:  # a row stands between two straight legs: the mean of both sides
             after = run.force[np.minimum(corner + 1, number[-1])]
@@ -138,18 +138,19 @@ class BenchModel:
         law, slide = scene.friction, scene.slide
         aged = not has(law.law, "timeless") and not (has(law.law, "bonds") and law.rest_growth is None)
         if not aged and not (scene.normal is not None and scene.normal.amplitude):
-            self.notes.append(f"{loop.path} has no time: its rows are taken as evenly spaced in time, which does "
-                              "not affect law '{law.law}'")
+            self.notes.append(f"{loop.path} has no column of time: its rows are taken as evenly spaced in time, which "
+                              f"does not affect law '{law.law}'")
             return np.arange(float(loop.reading.size))
         move = np.abs(np.diff(loop.displacement))
         if slide.kind in ("constant", "triangle") and move.all():
-            self.notes.append(f"{loop.path} has no time: the times of its rows are computed from slide.speed")
+            self.notes.append(f"{loop.path} has no column of time: the times of its rows are computed from slide.speed")
             return np.concatenate([[0.0], np.cumsum(move / slide.speed)])
-        raise PatchfemError(f"{loop.path}:1: no column time [s], which law '{law.law}' needs here (the scene sets the "
-                            "speed only for a constant or triangle slide without rests)")
+        raise PatchfemError(f"{loop.path}:1: law '{law.law}' needs the times of the rows here; add a column time [s] "
+                            "(the times can be computed from slide.speed only for a constant or triangle slide without "
+                            "rests)")
 
     def _note_amplitude(self) -> None:
         slide, half = self.scene.slide, float(np.ptp(self.loop.displacement)) / 2
         if slide.kind in ("sine", "triangle") and abs(slide.amplitude - half) > 0.02 * half:
-            self.notes.append(f"slide.amplitude is {slide.amplitude:.4g} m, but the measured displacement runs over "
-                              f"+-{half:.4g} m; the model follows the measured displacement")
+            self.notes.append(f"slide.amplitude is {slide.amplitude:.4g} m, but the amplitude of the measured "
+                              f"displacement is {half:.4g} m; the model follows the measured displacement")

@@ -109,7 +109,7 @@ def fit_patch(scene: Scene, slides=None) -> FittedPatch:
         while True:
             patch, *others = ladder.solve_all(model.patch, tolerance)
             if not patch.pressure.load > 0:
-                raise PatchfemError("no load presses the pieces; raise it", "contact.load")
+                raise PatchfemError("the normal load is 0 or less; raise the load", "contact.load")
             parts, coarse = _elements(model, patch), next((one for one in others if one is not None), None)
             at = _slides(parts) if slides is None else np.asarray(slides, float)
             own = Curves(*masing(*parts, at))
@@ -143,10 +143,10 @@ def _coarse(model: Model, patch, left: float) -> tuple:
         return ()
     cure = "begin with larger amplitudes, at which more elements of the patch slip"
     if not model.patch.chosen:
-        cure = "leave contact.element_size out: the mesh is then refined until chi is known" \
+        cure = "leave contact.element_size out: the mesh is then refined until the loss is known well enough" \
             if model.patch.mesh is None else "refine the mesh in the file"
-    return (f"the mesh ({patch.x.size} interface nodes) leaves {100 * left:.2g} % (rms) of the loss uncertain, and "
-            f"with the loss also chi of law 'iwan', which sets the exponent of micro-slip; {cure}",)
+    return (f"with this mesh ({patch.x.size} interface nodes) the energy loss has an error of {100 * left:.2g} % "
+            f"(rms); this also makes `chi` of law 'iwan' uncertain, which sets the exponent of micro-slip; {cure}",)
 
 
 def fit_law(law: str, static: float, load: float, slides, own: Curves, stiffness: float) -> OneLaw:
@@ -186,20 +186,22 @@ def _refuse(model: Model) -> None:
     """PatchfemError where a patch is no set of elastic-plastic elements of its own."""
     f, rig = model.friction, model.rig
     if model.patch is None or f is None:
-        raise PatchfemError("fit --from-patch needs a patch that slides: [contact] and [friction], with [slide] or "
-                            "with [structure] and [drive]", "contact" if model.patch is None else "friction")
+        raise PatchfemError("fit --from-patch needs a patch that slides: the scene must have [contact], [friction] and "
+                            "either [slide] or [structure] with [drive]",
+                            "contact" if model.patch is None else "friction")
     named = [law for law in LAWS if has(law, "timeless") and "shear" in LAWS[law].carries.split()]
     for key, reason, holds in (
-            ("friction.law", f"a patch with law '{f.law}' cannot be written as elements that stick or slip; use "
-                             f"{' or '.join(named)}", f.law not in named),
-            ("friction.law", f"'{f.law}' is rigid, so there is no stiffness to fit: add [contact.shear] or "
-             "contact.asperities.tangential_ratio", has(f.law, "set-valued") and not model.soft),
-            ("contact.grooves", "no fitted law describes grooves; leave them out here and add [normal.grooves] to the "
-                                "fitted law", model.grooves is not None),
+            ("friction.law", f"a patch with law '{f.law}' cannot be represented by elements that stick or slip; use "
+                             f"law {' or '.join(named)}", f.law not in named),
+            ("friction.law", f"law '{f.law}' is rigid, so the patch has no stiffness to fit; add [contact.shear] or "
+                             "contact.asperities.tangential_ratio", has(f.law, "set-valued") and not model.soft),
+            ("contact.grooves", "none of the laws to be fitted describes grooves; leave the grooves out for the fit, "
+                                "and add [normal.grooves] to the scene with the fitted law", model.grooves is not None),
             ("wear", "the fit uses the loops of unworn pieces; leave [wear] out", model.kind != "patch" and
              model.wear is not None),
-            ("structure.mode", "moves or turns the pieces out of the plane of the contact, so the load and the loops "
-                               "change; set normal, pitch and yaw to 0", rig is not None and
+            ("structure.mode", "a mode moves the pieces normal to the contact or rotates them, so the normal load "
+                               "changes with the motion, or the strips slide by different amounts; set the keys "
+                               "`normal`, `pitch` and `yaw` to 0", rig is not None and
              (rig.load_varies or rig.strips_slide_apart))):
         if holds:
             raise PatchfemError(reason, key)
@@ -208,5 +210,5 @@ def _refuse(model: Model) -> None:
 def slides_of(lengths) -> np.ndarray | None:
     """The slides (k,) [m] that were asked for, None for none; PatchfemError for fewer than three, which fix no law."""
     if lengths is not None and len(lengths) < 3:
-        raise PatchfemError("--amplitudes: at least three amplitudes are needed, such as 0.1 um..10 um:25")
+        raise PatchfemError("--amplitudes: give at least three amplitudes, for example 0.1 um..10 um:25")
     return None if lengths is None else np.asarray(lengths, float)

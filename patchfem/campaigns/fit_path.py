@@ -40,7 +40,7 @@ def offsets_of(names, loop: Loop) -> list:
     out = []
     for name in dict.fromkeys(part.strip() for one in names for part in one.split(",")):
         if name not in OFFSETS:
-            raise PatchfemError(f"--offset {name}: unknown; use {' or '.join(OFFSETS)}")
+            raise PatchfemError(f"--offset {name}: not a possible offset; use {' or '.join(OFFSETS)}")
         if name == "force":
             size, kind = float(np.abs(loop.reading).max()), "force" if loop.quantity == "force" else None
         else:
@@ -60,8 +60,9 @@ def whole_cycles(loop: Loop) -> int:
     behind = place * way < -SAME * np.ptp(place)
     back = np.flatnonzero(behind[:-1] & ~behind[1:])
     if not back.size:
-        raise PatchfemError(f"{loop.path}: --warm-up needs a record that passes its first displacement again in the "
-                            "same direction; record a whole cycle, or leave --warm-up out")
+        raise PatchfemError(f"{loop.path}: --warm-up needs a record of at least one whole cycle, in which the "
+                            "displacement returns to its first value and passes it in the same direction as at the "
+                            "start; give such a record, or leave --warm-up out")
     return int(back[-1]) + 1
 
 

@@ -61,34 +61,36 @@ def measured_of(text: str) -> Measured:
     if not equals:
         return _from_file(Path(text))
     if name not in QUANTITIES:
-        raise PatchfemError(f"--to {text}: {name} is not known; use one of {', '.join(QUANTITIES)}, such as "
-                            '"worn_depth_max=2.5 um..3.5 um", or the JSON of compare')
+        raise PatchfemError(f"--to {text}: {name} is not a possible quantity; use one of {', '.join(QUANTITIES)}, such "
+                            'as "worn_depth_max=2.5 um..3.5 um", or the JSON file that compare writes')
     try:
         ends = [parse(part.strip(), "length") for part in value.split("..")]
     except ValueError as error:
         raise PatchfemError(f"--to {name}: {error}") from None
     if len(ends) > 2 or not 0 < ends[0] <= ends[-1]:
-        raise PatchfemError(f"--to {text}: one value above zero or low..high is needed")
+        raise PatchfemError(f"--to {text}: give one value above zero, or a range low..high above zero")
     return Measured(name, (ends[0] + ends[-1]) / 2, ends[0], ends[-1], "--to")
 
 
 def _from_file(path: Path) -> Measured:
     try:
         if path.stat().st_size > LARGEST:
-            raise PatchfemError(f"{path}: more than {LARGEST} bytes; the JSON of compare is needed")
+            raise PatchfemError(f"{path}: the file is larger than {LARGEST} bytes; give the JSON file that compare "
+                                "writes")
         found = json.loads(path.read_text("utf-8"))
     except FileNotFoundError:
-        raise Missing(f"{path}: no such file; --to needs the JSON of compare or worn_depth_max=VALUE") from None
+        raise Missing(f"{path}: no such file; give --to the JSON file that compare writes, or "
+                      "worn_depth_max=VALUE") from None
     except (OSError, ValueError, RecursionError) as error:
-        raise PatchfemError(f"{path}: not the JSON of compare ({error})") from None
+        raise PatchfemError(f"{path}: this is not the JSON file that compare writes ({error})") from None
     found = found.get("measures", found) if isinstance(found, dict) else {}
     for name in QUANTITIES:
         one = found.get(name) if isinstance(found, dict) else None
         parts = [one.get(key) for key in ("value", "low", "high")] if isinstance(one, dict) else [None]
         if all(isinstance(part, (int, float)) and math.isfinite(part) for part in parts) and parts[0] > 0:
             return Measured(name, float(parts[0]), max(float(parts[1]), 0.0), float(parts[2]), str(path))
-    raise PatchfemError(f"{path}: the file contains no worn depth above zero; compare gives no depth if the traces "
-                        "have no common reference")
+    raise PatchfemError(f"{path}: the file contains no worn depth above zero; compare writes a depth only if the "
+                        "traces have a common reference")
 
 
 def wear_coefficient(model: Model, to: str, free, progress=None) -> Coefficient:
@@ -101,14 +103,16 @@ def wear_coefficient(model: Model, to: str, free, progress=None) -> Coefficient:
     if model.patch is None:
         raise PatchfemError(f"--to {target.name}: a [normal] contact has no worn depth; use [contact]", "normal")
     if model.wear.start is not None:
-        raise PatchfemError(f"fit {KEY}: the fit needs unworn pieces at the start; leave out wear.start", "wear.start")
+        raise PatchfemError(f"fit {KEY}: the fit must start from unworn pieces; leave out wear.start", "wear.start")
 
     patch = ladder.solve_all(model.patch, model.accuracy.tolerance, False)[0]  # no coefficient changes it
     curve, most = _curve(model, patch, bounds.high, target.name, progress)
     if not curve[1][-1] >= target.value:
-        raise PatchfemError(f"--free {KEY}: with {bounds.high:.4g} m^2/N the scene reaches only {target.name} = "
+        raise PatchfemError(f"--free {KEY}: with the high bound {bounds.high:.4g} m^2/N the scene reaches only "
+                            f"{target.name} = "
                             f"{curve[1][-1]:.4g}, but {target.value:.4g} was measured; "
-                            + ("the coating is worn through then" if curve[0][-1] < 1 else "raise the high bound"))
+                            + ("the coating is then worn through before the last cycle" if curve[0][-1] < 1 else
+                               "raise the high bound"))
     inverse = _inverse(curve)
     value, runs, reached = float(bounds.high * inverse(target.value)), 1, math.nan
     while runs < MOST_RUNS:
@@ -118,11 +122,11 @@ def wear_coefficient(model: Model, to: str, free, progress=None) -> Coefficient:
             break
         value *= float(inverse(target.value) / inverse(reached))
     else:
-        raise NotConverged(f"fit {KEY}: after {MOST_RUNS} runs the fit has reached {target.name} = {reached:.6g}, not "
-                           f"{target.value:.6g}")
+        raise NotConverged(f"fit {KEY}: after {MOST_RUNS} runs the fit has reached only {target.name} = {reached:.6g} "
+                           f"in place of {target.value:.6g}")
     if value < bounds.low:
-        raise PatchfemError(f"--free {KEY}: {target.name} = {target.value:.4g} needs {value:.4g} m^2/N, below the low "
-                            f"bound {bounds.low:.4g}; lower this bound")
+        raise PatchfemError(f"--free {KEY}: {target.name} = {target.value:.4g} needs a coefficient of {value:.4g} "
+                            f"m^2/N, which is below the low bound {bounds.low:.4g}; lower this bound")
     low, high = (value * inverse(min(end, most)) / inverse(target.value) for end in (target.low, target.high))
     return Coefficient(float(value), float(low), float(high), target, float(reached), bounds, runs)
 
@@ -132,7 +136,8 @@ def _bounds(free) -> Range:
     if wrong:
         raise SceneError(wrong)
     if [one.key for one in found] != [KEY]:
-        raise PatchfemError(f"--free: with [wear] only {KEY} is fitted, such as {KEY}=1e-16 m^2/N..1e-12 m^2/N")
+        raise PatchfemError(f"--free: in a scene with [wear] only {KEY} can be fitted, for example {KEY}=1e-16 "
+                            "m^2/N..1e-12 m^2/N")
     return found[0]
 
 

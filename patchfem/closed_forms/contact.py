@@ -113,7 +113,7 @@ def _rounded_angle(line_load, flat, radius, modulus) -> float:
     want = 2 * line_load * radius / (flat**2 * modulus)
     top = np.pi / 2 - 1e-9
     if want >= _less_sine(2 * top) / (2 * np.cos(top)**2):
-        raise ValueError("the flat part is too short to matter under this load; use hertz_pressure")
+        raise ValueError("under this load the flat part is too short to affect the pressure; use hertz_pressure")
     from scipy.optimize import brentq
 
     return brentq(lambda t: _less_sine(2 * t) / (2 * np.cos(t)**2) - want, 0.0, top, xtol=1e-18, rtol=1e-15)
@@ -253,8 +253,8 @@ def cattaneo_stick_half_width(shear_load, line_load, radius, modulus, friction):
     half = hertz_half_width(line_load, radius, modulus)
     share = np.abs(shear_load) / (friction * line_load)
     if np.any(share > 1):
-        raise ValueError(f"shear_load {shear_load} exceeds friction times load, {friction * line_load}: the contact "
-                         "slides")
+        raise ValueError(f"shear_load {shear_load} exceeds friction times the normal load, {friction * line_load}: the "
+                         "whole contact slides")
     return half * np.sqrt(1 - share)
 
 

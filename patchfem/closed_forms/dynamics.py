@@ -67,9 +67,10 @@ def sliding_amplitude(r, friction, damping=0.0) -> float:
     """
     positive(r=r)
     if friction < 0 or not 0 <= damping < 1:
-        raise ValueError(f"friction must be >= 0 and damping in [0, 1), got {friction}, {damping}")
+        raise ValueError(f"friction must be >= 0 and damping must lie in [0, 1), got friction = {friction} and damping "
+                         f"= {damping}")
     if damping == 0 and r == 1:
-        raise ValueError("no steady sliding motion at resonance without damping; see bounded_input")
+        raise ValueError("without damping no steady sliding motion exists at resonance; see bounded_input")
     half, w = np.pi / r, np.sqrt(1 - damping**2)
 
     def basis(t):
@@ -80,11 +81,12 @@ def sliding_amplitude(r, friction, damping=0.0) -> float:
     try:
         free = np.linalg.solve(np.stack([x0 + x1, v0 + v1]), [-2 * friction, 0.0])
     except np.linalg.LinAlgError:
-        raise ValueError(f"no isolated sliding motion exists without damping at the frequency ratio r = {r}") from None
+        raise ValueError(f"without damping no isolated sliding motion exists at the frequency ratio r = {r}") from None
     size2 = 1 / ((1 - r * r)**2 + (2 * damping * r)**2)
     sine = v0 @ free / r
     if size2 < sine**2:
-        raise ValueError(f"no motion without stops exists at the frequency ratio r = {r} with f/a = {friction}")
+        raise ValueError(f"no motion that slides without stops exists at the frequency ratio r = {r} with f/a = "
+                         f"{friction}")
     cosine = np.sqrt(size2 - sine**2)
     t = half * (np.arange(2000) + 0.5) / 2000
     speed = np.array([basis(at)[1] @ free for at in t]) - r * (cosine * np.sin(r * t) + sine * np.cos(r * t))

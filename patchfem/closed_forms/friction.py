@@ -91,7 +91,8 @@ def virgin_force(slide, length, order=1.0, initial=1.0, limit=1.0):
     if order <= -1:
         raise ValueError(f"order must exceed -1, got {order}")
     if np.any(x < 0):
-        raise ValueError("slide must not be negative; the curve of first loading is odd")
+        raise ValueError("slide must not be negative; for a negative slide use the negative of the force at the "
+                         "positive slide")
     with np.errstate(divide="ignore", invalid="ignore"):
         first = initial * x**order * np.exp(-x) / gamma(order + 1) if initial else 0.0
     return limit * (gammainc(order + 1, x) + first)
@@ -114,7 +115,7 @@ def reversal_force(back, length, order=1.0, reading="stretch", limit=1.0):
             raise ValueError(f"order must exceed -1, got {order}")
         return limit * (2 * gammaincc(order + 1, 2 * x) - 1)
     if order < 0:
-        raise ValueError(f"order must not be negative in the stretch reading, got {order}")
+        raise ValueError(f"with reading 'stretch' order must not be negative, got {order}")
     if order == 1:
         return limit * (2 * np.exp(-x) - 1)
     old = x**(order + 1) * np.exp(-x) * hyp1f1(1, order + 2, -x) / gamma(order + 2)

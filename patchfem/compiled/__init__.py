@@ -458,6 +458,7 @@ def _tell() -> None:
 def _told(say) -> None:
     if not PLAIN and not any(any(one.rglob(f"*.{ending}")) for one in _kept(_folder()) for ending in ("code", "nbi")):
         why = _placed()[1] or short(_folder() / "code", LEAST)
-        say("compiling the time loop for this machine, " +
-            (f"at every command (10 to 30 s): {why}; set PATCHFEM_CACHE to another folder" if why else
-             "once (10 to 30 s)"))
+        say("compiling the code of the simulation for this machine, " +
+            (f"which takes 10 to 30 s at every command because the compiled code cannot be kept: {why}; set "
+             "PATCHFEM_CACHE to another folder" if why else
+             "which takes 10 to 30 s and is needed only once"))

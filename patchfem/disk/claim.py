@@ -69,8 +69,9 @@ class Claim:
                 owner = os.read(file, 200).decode("utf-8", "replace").split()
                 if self._works(owner):
                     there = "" if len(owner) < 3 or owner[2] == HOST else " of another machine"
-                    raise Missing(f"{self.shown}: another {self.kind} (process {owner[0]}{there}) is writing it; "
-                                  "wait, or name another folder with -o; if that process is not patchfem, remove "
+                    raise Missing(f"{self.shown}: another {self.kind} (process {owner[0]}{there}) is writing to this "
+                                  "folder; wait until that process ends, or name another folder with -o; if that "
+                                  "process is not patchfem, remove the file "
                                   f"{self.path.parent.name}/{self.path.name}")
                 os.ftruncate(file, 0)
                 if os.pwrite(file, self.me.encode(), 0) < len(self.me):  # part of a name would be nobody's
@@ -80,7 +81,8 @@ class Claim:
             with suppress(OSError):
                 if not self.path.stat().st_size:
                     self.path.unlink()
-            raise Missing(f"{self.shown}: cannot be written ({error.strerror}: {self.path.name} beside it)") from None
+            raise Missing(f"{self.shown}: cannot be written, because the file {self.path.name} beside it cannot be "
+                          f"written ({error.strerror})") from None
         HELD.add(self.path)
 
     def release(self) -> None:

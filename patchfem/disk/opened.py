@@ -22,6 +22,6 @@ def reading(path: str | Path) -> BinaryIO:
 
         if not select.select([file], [], [], PATIENCE)[0]:
             file.close()
-            raise TimeoutError(0, f"a pipe that received no data within {PATIENCE:.0f} s")
+            raise TimeoutError(0, f"this is a pipe, and no data came through it within {PATIENCE:.0f} s")
     os.set_blocking(file.fileno(), True)
     return file

@@ -45,7 +45,7 @@ def _of_others(folder: Path) -> str:
     if found.st_uid != os.geteuid():
         return f"{folder} belongs to another user"
     if found.st_mode & stat.S_IWOTH:
-        return f"others may write to {folder} (empty it, then run chmod o-w on it)"
+        return f"other users may write to {folder} (empty this folder, then run chmod o-w {folder})"
     if found.st_mode & stat.S_IWGRP:  # made under a usual umask of 002
         folder.chmod(stat.S_IMODE(found.st_mode) & ~stat.S_IWGRP)
     return ""

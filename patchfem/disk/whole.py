@@ -39,7 +39,7 @@ def whole(path, need: int | None = None) -> Iterator[Path]:
     """
     path = Path(path)
     if os.path.isdir(path):
-        raise Unwritten(f"{shown(path)}: cannot be written (it is a folder; name a file)")
+        raise Unwritten(f"{shown(path)}: cannot be written, because this is a folder; name a file")
     if _direct(path):
         try:
             yield path
@@ -136,7 +136,8 @@ def fault(error: OSError, path: Path, partial: Path, need: int | None = None) ->
         limited = where.endswith(")")  # what is written so far counts against a limit, and no longer for the free room
         left = there - written if limited else there
         if error.errno in FULL and not _places(path):
-            return Unwritten(f"{shown(path)}: not enough space: the disk has no free inodes; remove files")
+            return Unwritten(f"{shown(path)}: not enough space: the disk has no free entries for new files (inodes); "
+                             "remove files")
         if error.errno in FULL or (error.errno is None and left < NARROW):
             wanted = f"{size_of(need)} needed" if need is not None else f"more than {size_of(written)} needed"
             why = f" ({os.strerror(error.errno)})" if error.errno else ""
@@ -148,7 +149,7 @@ def fault(error: OSError, path: Path, partial: Path, need: int | None = None) ->
 def unmade(error: OSError) -> str:
     """Why a folder could not be made, with the way out where there is one."""
     if error.errno == errno.ENAMETOOLONG:
-        return "its name is longer than the disk allows; use a shorter one with -o"
+        return "the name of the folder is longer than the disk allows; give a shorter name with -o"
     if error.errno in (errno.EEXIST, errno.ENOTDIR):
         path = Path(error.filename or "")
         files = [shown(one) for one in (path, *path.parents) if one.is_file()]

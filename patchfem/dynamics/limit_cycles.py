@@ -186,7 +186,7 @@ def _of_mode(modes: ModalBasis, group: Group, mode: int, size: float) -> list:
     few, many = (_crossings(modes, group, mode, amplitudes, harmonics) for harmonics in (FEW, 2 * FEW + 1))
     if len(few) != len(many):
         raise NotConverged(f"flutter_amplitude: {len(few)} limit cycles were found with {FEW} harmonics but "
-                           f"{len(many)} with {2 * FEW + 1}")
+                           f"{len(many)} limit cycles with {2 * FEW + 1} harmonics")
     return [better._replace(error=2 * abs(one.amplitude - better.amplitude) + ROUND * better.amplitude)
             for one, better in zip(few, many)]
 

@@ -80,7 +80,7 @@ class Grows(NotConverged):
     """A motion that gains as much in every period, so that none repeats; mapped: the last one."""
 
     def __init__(self, mapped: Mapped, steps: int):
-        super().__init__("dynamics: the motion grows from period to period, so no periodic motion was found")
+        super().__init__("dynamics: no periodic motion was found, because the motion grows from period to period")
         self.mapped, self.steps = mapped, steps
 
 
@@ -131,8 +131,8 @@ class Shooting:
             mapped, periods = self.mapped(self.after(mapped, periods[0])), (min(2 * periods[0], periods[1]), periods[1])
             if self.grows(mapped):
                 raise Grows(mapped, used + 1)
-        raise NotConverged(f"dynamics: no periodic motion was found in {MOST} steps of Newton's method; start closer "
-                           "to the periodic motion, or use accuracy.method = \"march\"")
+        raise NotConverged(f"dynamics: no periodic motion was found in {MOST} steps of Newton's method; start from a "
+                           "motion closer to the periodic motion, or use accuracy.method = \"march\"")
 
     def _newton(self, mapped: Mapped, shares) -> Mapped | None:
         """A better Mapped by the first of some shares of Newton's step that leads to one, None where none does."""

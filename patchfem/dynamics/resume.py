@@ -203,14 +203,14 @@ def load(path: Path, key: str, run, samples: Samples, fresh) -> None:
         with np.load(path, allow_pickle=False) as file:
             found = {name: file[name] for name in file.files}
         if str(found["key"]) != key:
-            raise PatchfemError(f"{path.parent.name}: the saved state belongs to another scene or version; "
-                                f"{WITHOUT}")
+            raise PatchfemError(f"{path.parent.name}: the state saved there belongs to another scene or to another "
+                                f"version of patchfem; {WITHOUT}")
         _into(run, "run", found)
         samples.take(found, fresh)
     except PatchfemError:
         raise
     except Exception as error:  # a damaged archive has many ways to fail
-        raise PatchfemError(f"{path.parent.name}: the saved state cannot be read ({error}); {WITHOUT}") from None
+        raise PatchfemError(f"{path.parent.name}: the state saved there cannot be read ({error}); {WITHOUT}") from None
 
 
 def _taken(value, name: str, found: dict, number):

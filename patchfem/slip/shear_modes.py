@@ -140,7 +140,7 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
     """
     limit = np.asarray(limit, float)
     if not (limit > 0).any():
-        raise PatchfemError("contact.shear: no point carries friction")
+        raise PatchfemError("contact.shear: the friction limit is 0 at every point of the contact")
     points = np.flatnonzero(limit > 0)
     force, none = limit[points], np.zeros(0, np.int64)
     if local_length == 0 and np.ptp(tangential) == 0:  # a spring before rigid points: they all slip at once
@@ -271,8 +271,9 @@ def _spectrum(tangential, limit, bond_length: float, weakening: float) -> Spectr
     values, vectors = values[::-1], vectors[:, ::-1]
     jump = values[0] / bond_length * (weakening - 1)
     if jump >= 1:
-        raise PatchfemError("contact.shear with friction.kinetic below static: the patch may jump without a change of "
-                            f"load ({jump:.3g} >= 1); raise friction.bond_length or friction.kinetic")
+        raise PatchfemError("contact.shear with friction.kinetic below static: the patch may slip suddenly without a "
+                            f"change of the force on it (the stability number {jump:.3g} must be below 1); raise "
+                            "friction.bond_length or friction.kinetic")
     shape, values = (np.ones((index.size, 1)), tangential[:1, 0]) if even else (vectors / root[:, None], values)
     return Spectrum(frozen_array(index, np.int64), limit[index], shape, values, bond_length)
 

@@ -46,7 +46,8 @@ def rub(lower: np.ndarray, upper: np.ndarray, step: float, stroke: float, worn: 
     low, up = _surfaces(lower, upper)
     reach = _reach(stroke, step, low.shape[1])
     if not (np.isfinite(worn) and worn >= 0 and 0 <= upper_share <= 1 and (bite is None or bite > 0)):
-        raise PatchfemError("worn is a depth of zero or more, upper_share lies between 0 and 1, bite is above zero")
+        raise PatchfemError("`worn` (a depth) must be zero or more, `upper_share` must lie between 0 and 1, and `bite` "
+                            "must be above zero")
     if worn == 0:
         return Rubbed(frozen_array(low), frozen_array(up), 0)
     places = [0, *range(1, reach), reach, *range(reach - 1, 0, -1), 0] if reach else [0]
@@ -55,8 +56,8 @@ def rub(lower: np.ndarray, upper: np.ndarray, step: float, stroke: float, worn: 
     cycles = int(np.ceil(worn / (visits * bite)))
     depth = worn / (cycles * visits)
     if depth < FINEST * max(np.abs(low).max(), np.abs(up).max()):
-        raise PatchfemError(f"a depth of {say(depth, 3)} at a time is below the round-off of the heights; use a larger "
-                            "bite, or shift the surfaces to a mean height near zero")
+        raise PatchfemError(f"the depth worn off in one step, {say(depth, 3)}, is below the round-off of the heights; "
+                            "use a larger `bite`, or shift the surfaces to a mean height near zero")
     pair = _Pair(low, up, upper_share)
     for _ in range(cycles):
         for place in places:
@@ -136,19 +137,21 @@ def _shifted_sum(moved, fixed, by: int, out) -> None:
 def _surfaces(lower, upper) -> tuple:
     low, up = np.array(lower, float, order="C"), np.array(upper, float, order="C")
     if low.ndim != 2 or low.shape != up.shape or not low.size or not np.isfinite([low, up]).all():
-        raise PatchfemError(f"two rough surfaces need finite heights on the same raster, not {low.shape} and "
-                            f"{up.shape}")
+        raise PatchfemError("both surfaces must have finite heights on the same raster, but their shapes are "
+                            f"{low.shape} and {up.shape}")
     return low, up
 
 
 def _reach(stroke: float, step: float, points: int) -> int:
     """The stroke in steps."""
     if not (np.isfinite([stroke, step]).all() and step > 0 and stroke >= 0):
-        raise PatchfemError(f"a stroke of zero or more and a step above zero are needed, not {stroke:g} and {step:g} m")
+        raise PatchfemError(f"the stroke must be zero or more and the step must be above zero, but they are {stroke:g} "
+                            f"m and {step:g} m")
     reach = round(stroke / step)
     if abs(stroke - reach * step) > 1e-6 * step or 2 * reach > points:
         raise PatchfemError(f"a stroke of {stroke:g} m on a raster of {points} steps of {step:g} m: the stroke must be "
-                            f"a whole number of steps, the nearest is {reach * step:g} m, and at most half a period")
+                            "a whole number of steps and at most half the length of the raster; the nearest whole "
+                            f"number of steps is {reach * step:g} m")
     return reach
 
 

@@ -68,7 +68,6 @@ def critical_jump(compliance, rate, active, held: str = "load", places=None) -> 
 def refuse_explicit(cycles: float, critical: float) -> None:
     """Raise PatchfemError for an explicit jump [cycles] longer than the critical one, with the remedy."""
     if cycles > critical:
-        raise PatchfemError(f"an explicit jump of {cycles:.4g} cycles is longer than the stability limit of "
-                            f"{critical:.4g}, beyond which every second node lifts off; leave wear.scheme out, or "
-                            "raise wear.jumps",
-                            "wear.scheme")
+        raise PatchfemError(f"a jump of {cycles:.4g} cycles by the explicit scheme is longer than the stability "
+                            f"limit of {critical:.4g} cycles, beyond which every second node lifts off; leave "
+                            "wear.scheme out, or raise wear.jumps", "wear.scheme")

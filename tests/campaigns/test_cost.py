@@ -84,9 +84,10 @@ def test_exact_the_sentence_names_the_cheapest_run_or_the_worst_measure():
     runs = [made("2", 1, 4e-2, 3e-2), made("4", 2, 8e-3, 6e-3), made("8", 5, 2e-3)]
     assert sentence(runs, 1e-2) == "a knob at 4: 2 CPU s per run, with all measures within 1 %"
     assert sentence(runs, 1e-3) == \
-        "no run has all measures within 0.1 %: the smallest error of a is 0.2 %, with a knob at 8 in 5 CPU s"
+        "no run has all measures within 0.1 %: the best run, with a knob at 8, has an error of 0.2 % in a and " \
+        "takes 5 CPU s"
     still = [made("2", 1, 2e-2), made("4", 2, 2e-2), made("8", 5, 2e-2)]
-    assert sentence(still, 1e-2) == "no run has all measures within 1 %: the error of a is 2 % with every setting"
+    assert sentence(still, 1e-2) == "no run has all measures within 1 %: with every setting the error of a is 2 %"
     bold = [made("2", 1, 1e-3, 3e-2), *runs[1:]]  # states less than its distance to the best
     assert sentence(bold, 1e-2) == "a knob at 4: 2 CPU s per run, with all measures within 1 %"
 
@@ -181,7 +182,7 @@ def test_exact_a_picture_does_not_join_two_kinds_of_error():
 
 
 @pytest.mark.parametrize("words, said", [
-    (["--over", "colour"], "use one of element_size"), (["--over", "steps_per_cycle"], "has only the settings "
+    (["--over", "colour"], "use one of element_size"), (["--over", "steps_per_cycle"], "possible settings: "
                                                                                        "element_size"),
 ])
 def test_refuses_knobs_that_a_scene_does_not_have(tmp_path, words, said):
@@ -205,7 +206,7 @@ def test_exact_python_has_the_answer_and_the_files_of_the_command(tmp_path, monk
         assert (tmp_path / "here" / name).read_bytes() == (tmp_path / "there" / name).read_bytes()
     assert pf.cost(scene, over="element_size", say=[].append)["element_size"]["cheapest"] == {"a": "middle"}
     monkeypatch.undo()
-    with pytest.raises(pf.PatchfemError, match="this scene has only the settings element_size"):
+    with pytest.raises(pf.PatchfemError, match="possible settings: element_size"):
         pf.cost(scene, over="shear_modes")
 
 

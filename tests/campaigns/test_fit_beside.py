@@ -60,9 +60,9 @@ def test_exact_a_lead_in_ends_where_the_record_begins(tmp_path):
 def test_refuses_a_warm_up_of_a_record_without_a_cycle(tmp_path):
     time, slide = rows(80, 1)
     loop = table(tmp_path / "loop.csv", time[:30], slide[:30], np.ones(30))
-    with pytest.raises(PatchfemError, match="passes its first displacement again"):
+    with pytest.raises(PatchfemError, match="returns to its first value and passes it"):
         fit_loop(scene_of(tmp_path, "bonds"), loop, free_of(*NAMES), options=LoopOptions((), True))
-    with pytest.raises(PatchfemError, match="--offset time: unknown; use force or displacement"):
+    with pytest.raises(PatchfemError, match="--offset time: not a possible offset; use force or displacement"):
         fit_loop(scene_of(tmp_path, "bonds"), loop, free_of(*NAMES), options=LoopOptions(("time",)))
 
 

@@ -123,14 +123,14 @@ def test_the_verb_prints_what_a_law_leaves_out(tmp_path, monkeypatch):
 @pytest.mark.parametrize("text, said, mended", [
     (POINT + friction_of("iwan") + SLIDE, "[contact]", JOINT + SLIDE),
     (CROWN, "[friction]", JOINT + SLIDE),
-    (JOINT.replace('"coulomb"', '"nonlocal"\nbond_length = "1 um"') + SLIDE, "use coulomb or elastic-plastic",
+    (JOINT.replace('"coulomb"', '"nonlocal"\nbond_length = "1 um"') + SLIDE, "use law coulomb or elastic-plastic",
      JOINT + SLIDE),
     (JOINT.replace("[contact.shear]\n", "") + SLIDE, "add [contact.shear]", JOINT + SLIDE),
     (RIG.replace("slide = 1.0", "slide = 1.0\nnormal = 0.1").replace('"coulomb"', '"elastic-plastic"\nbond_length = '
                                                                    '"1 um"'), "`normal`, `pitch` and `yaw` to 0",
      RIG.replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"')),
     (JOINT + SLIDE + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 10\n', "leave [wear] out", JOINT + SLIDE),
-    (JOINT.replace('load = "26 lbf"', 'load = "0 N"') + SLIDE, "no load", JOINT + SLIDE)])
+    (JOINT.replace('load = "26 lbf"', 'load = "0 N"') + SLIDE, "the normal load is 0", JOINT + SLIDE)])
 def test_refuses_a_patch_that_is_no_set_of_elements_with_the_remedy(text, said, mended):
     with pytest.raises(pf.PatchfemError) as wrong:
         fit_patch(pf.load(text))

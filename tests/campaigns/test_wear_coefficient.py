@@ -58,7 +58,7 @@ def test_refuses_what_cannot_be_fitted(scene, tmp_path):
     assert "raise the high bound" in said("--to", "worn_depth_max=1 mm", *FREE)
     assert "below the low bound" in said("--to", "worn_depth_max=1e-3 nm", *FREE)
     assert "only wear.coefficient" in said("--to", "worn_depth_max=1 um", "--free", "friction.static=0.1..0.6")
-    assert "is not known; use" in said("--to", "depth=1 um", *FREE)
+    assert "is not a possible quantity; use" in said("--to", "depth=1 um", *FREE)
     (tmp_path / "nothing.json").write_text('{"worn_depth_mean": null}')
     assert "no worn depth" in said("--to", tmp_path / "nothing.json", *FREE)
     (tmp_path / "nothing.json").write_text("[" * 100_000)

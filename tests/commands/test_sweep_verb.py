@@ -264,7 +264,7 @@ def test_refuses_a_second_writer(scene, tmp_path, monkeypatch):
         another.setattr(os, "getpid", lambda: 1)
         first = Folder(tmp_path / "a", ()).__enter__()
     answer = cli(*words)
-    assert answer.code == 4 and "another sweep (process 1)" in answer.err and "remove a/.writer" in answer.err
+    assert answer.code == 4 and "another sweep (process 1)" in answer.err and "remove the file a/.writer" in answer.err
     first.__exit__(None, None, None)
     assert cli(*words).code == 0
     (tmp_path / "a" / ".writer").write_text("4194305")  # beyond the largest number of a process: it died
@@ -375,11 +375,11 @@ def test_refuses_to_set_what_is_swept(scene, tmp_path, verb, one):
     """Every case has its own value of a swept key: one that is set would be read and not used."""
     answer = cli(verb, scene, "--over", "structure.mode.0.frequency=100 Hz,110 Hz", "--set", one,
                  *(("-o", tmp_path / "a") if verb == "sweep" else ()))
-    assert answer.code == 2 and f"--set {one}: structure.mode.0.frequency is swept" in answer.err
+    assert answer.code == 2 and f"--set {one}: the sweep already sets structure.mode.0.frequency" in answer.err
     own = tmp_path / "own.toml"
     own.write_text(RIG + '\n[sweep]\n"friction.static" = [0.1, 0.2]\n', "utf-8")
     answer = cli(verb, own, "--set", "friction.static=0.3")
-    assert answer.code == 2 and "friction.static is swept" in answer.err and not (tmp_path / "a").exists()
+    assert answer.code == 2 and "sets friction.static in every" in answer.err and not (tmp_path / "a").exists()
 
 
 def test_exact_cases_of_a_file_and_drawn_ones_are_rows(scene, tmp_path):
@@ -410,7 +410,7 @@ def test_refuses_a_key_of_the_file_and_of_the_line(scene, tmp_path):
     (["--over", "friction.static=0.1,0.2", "-j", "0"], "the number of processes must be"),
     (["--over", "friction.static=0.1,0.2", "--of", "equivalent_dampin"], "did you mean 'equivalent_damping'?"),
     (["--over", "friction.static=0.1,0.2", "--of", "zzz"], "--of zzz: unknown measure; use a name that"),
-    (["--over", "friction.static=0.1,0.2", "--executor", "slurm"], "--executor slurm: unknown"),
+    (["--over", "friction.static=0.1,0.2", "--executor", "slurm"], "--executor slurm: not possible"),
 ])
 def test_refuses_words_that_do_not_stand_together(scene, tmp_path, words, says):
     answer = cli("sweep", scene, *words, "-o", tmp_path / "a")

@@ -96,7 +96,7 @@ def test_refuses_a_second_writer_until_the_first_is_gone(tmp_path):
     first = process(HOLD, lock)
     assert first.stdout.readline() == "taken\n"
     answer = cli(*words)
-    assert answer.code == 4 and f"another run (process {first.pid}) is writing it" in answer.err
+    assert answer.code == 4 and f"another run (process {first.pid}) is writing to this" in answer.err
     assert names(tmp_path) == {"scene.toml", ".out.writer"}
     first.kill()
     while not (Path(f"/proc/{first.pid}/stat").read_text().split(") ")[1].startswith("Z")):
@@ -145,7 +145,7 @@ def test_exact_a_claim_whose_name_has_no_room_leaves_nothing(tmp_path, monkeypat
     """Part of a name once stayed behind, which no process could own or remove."""
     write = os.pwrite
     monkeypatch.setattr(os, "pwrite", lambda file, text, at: write(file, text[:5], at))
-    with pytest.raises(Missing, match=r"out: cannot be written \(No space left"):
+    with pytest.raises(Missing, match=r"out: cannot be written.* \(No space left"):
         Claim(tmp_path / "lock", "out", "run").take()
     with pytest.raises(Missing, match="out: cannot be written"), SweepFolder(tmp_path / "out", [1]):
         pass

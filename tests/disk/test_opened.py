@@ -39,9 +39,9 @@ def test_exact_a_pipe_that_begins_late_and_pauses_is_read_whole(pipe):
 def test_refuses_a_pipe_that_nobody_writes_to(pipe, monkeypatch):
     """It once held `check` and every other verb for ever."""
     monkeypatch.setattr(opened, "PATIENCE", 0.1)
-    with pytest.raises(scene.SceneError, match=r"x\.toml: cannot be read: a pipe that received no data within"):
+    with pytest.raises(scene.SceneError, match=r"x\.toml: cannot be read: this is a pipe, and no data came"):
         scene.text_of(pipe)
-    assert read(pipe)[1] == [f"{pipe}: cannot be read: a pipe that received no data within 0 s"]
+    assert read(pipe)[1] == [f"{pipe}: cannot be read: this is a pipe, and no data came through it within 0 s"]
 
 
 def test_always_a_system_without_such_pipes_reads_its_files(tmp_path, monkeypatch):

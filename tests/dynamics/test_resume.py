@@ -90,7 +90,7 @@ def test_refuses_the_state_of_another_march(tmp_path, often):
     scene.write_text(RIGS["one slide"], "utf-8")
     words = ("run", scene, "--no-page", "-o", tmp_path / "out", "--resume")
     answer = cli(*words)
-    assert answer.code == 2 and "no interrupted run is saved there; run without --resume" in answer.err
+    assert answer.code == 2 and "this folder contains no interrupted run; run without --resume" in answer.err
     assert sorted(one.name for one in tmp_path.iterdir()) == ["scene.toml"]
     often.stop = 5
     assert cli(*words[:-1]).code == 130

@@ -31,7 +31,7 @@ def test_refuses_a_folder_as_the_place_of_a_file(tmp_path, monkeypatch, place):
     monkeypatch.chdir(tmp_path)
     (tmp_path / "there").mkdir()
     answer = cli("schema", "-o", place)
-    assert answer.code == 4 and "it is a folder; name a file" in answer.err
+    assert answer.code == 4 and "this is a folder; name a file" in answer.err
 
 
 def test_always_long_words_are_cut():

@@ -200,14 +200,13 @@ def test_exact_band_of_a_sine():
 
 
 @pytest.mark.parametrize("change, message", [
-    ({"upper": np.zeros((40, 61))}, "two rough surfaces need finite heights on the same raster"),
-    ({"stroke": 5e-6}, "the stroke must be a whole number of steps, the nearest is 6.4e-06 m, and at most half a "
-                       "period"),
-    ({"stroke": 31 * STEP}, "at most half a period"),
-    ({"stroke": -STEP}, "a stroke of zero or more"),
-    ({"worn": np.nan}, "worn is a depth of zero or more"),
-    ({"upper_share": 1.1}, "upper_share lies between 0 and 1"),
-    ({"bite": 0.0}, "bite is above zero"),
+    ({"upper": np.zeros((40, 61))}, "both surfaces must have finite heights on the same raster"),
+    ({"stroke": 5e-6}, "at most half the length of the raster; the nearest whole number of steps is 6.4e-06 m"),
+    ({"stroke": 31 * STEP}, "at most half the length"),
+    ({"stroke": -STEP}, "the stroke must be zero or more"),
+    ({"worn": np.nan}, "`worn` (a depth) must be zero or more"),
+    ({"upper_share": 1.1}, "`upper_share` must lie between 0 and 1"),
+    ({"bite": 0.0}, "`bite` must be above zero"),
     ({"worn": 1e-20}, "is below the round-off of the heights"),
 ])  # fmt: skip
 def test_refuses(change, message):

@@ -49,11 +49,12 @@ class Asked:
         scene, drive = self.scene, self.scene.drive
         where = f"{scene.path}: fit --to {measured.name}: "
         if scene.kind not in ("rig", "linear"):
-            raise PatchfemError(f"{where}rows of frequency and input need a rig, but this is a {scene.kind} scene; to "
-                                "fit a loop with a displacement column, use a scene with [slide]")
+            raise PatchfemError(f"{where}to fit rows of frequency and input, the scene must be a rig, but this is a "
+                                f"{scene.kind} scene; to fit a loop with a column of displacement, use a scene with "
+                                "[slide]")
         if drive.kind != "base" or drive.waveform != "sine":
-            raise PatchfemError(f"{where}each row is one sine of the base; set drive.kind = 'base' and drive.waveform "
-                                "= 'sine'")
+            raise PatchfemError(f"{where}each row was measured under a sine of the base; set drive.kind = 'base' and "
+                                "drive.waveform = 'sine'")
         if drive.displacement is not None:
             raise PatchfemError(f"{where}the rows give the input as an acceleration; replace drive.displacement by "
                                 "drive.acceleration")
@@ -61,7 +62,7 @@ class Asked:
             raise PatchfemError(f"{where}[wear] cannot be fitted; leave [wear] out")
         for one in self.wanted:
             if one.key.startswith("drive.") or one.key == "measured.reading_cutoff":
-                raise PatchfemError(f"--free {one.key}: the drive is given by the rows; choose a key of the rig")
+                raise PatchfemError(f"--free {one.key}: the rows of the file give the drive; choose a key of the rig")
 
     def _settle(self) -> None:
         """Ask for steady motions where the scene allows them."""
@@ -71,7 +72,8 @@ class Asked:
         except SceneError:
             return
         self.sets.append(steady)
-        self.notes.append("the scene sets no method, so its steady motions are fitted with 'harmonic'")
+        self.notes.append("the scene does not set accuracy.method, so the steady motions are computed with the method "
+                          "'harmonic'")
 
     def model(self, values) -> Model:
         """The model with values (n,) of the free keys, at the drive of the scene; SceneError where they make none."""

@@ -46,8 +46,8 @@ class Cells:
         if name == "run":
             return [self.runs[k] for k in self.row]
         if name not in ("frequency", "input", "flag"):
-            raise PatchfemError(f"{self.path}: no column {name} to hold out or leave out; use frequency, input, flag, "
-                                "run")
+            raise PatchfemError(f"{self.path}: there is no column {name} by which rows can be held out or left out; "
+                                "use frequency, input, flag or run")
         return [getattr(self.rows[k], name) for k in self.row]
 
     def chosen(self, one: str) -> np.ndarray:
@@ -57,14 +57,14 @@ class Cells:
         """
         name, equals, values = (part.strip() for part in one.partition("="))
         if not equals or not values:
-            raise PatchfemError(f"--hold {one}: column=value,value is needed, such as frequency=135 Hz,150 Hz")
+            raise PatchfemError(f"--hold {one}: write column=value,value, for example frequency=135 Hz,150 Hz")
         here, out = self.column(name), np.zeros(self.row.size, bool)
         for text in (part.strip() for part in values.split(",")):
             named = np.array([self._is(name, value, text) for value in here])
             if not named.any():
                 known = ", ".join(dict.fromkeys(_shown(name, value) for value in here))
-                raise PatchfemError(f"--hold {name}={text}: no row of {self.path.name} with a reading has this "
-                                    f"value; it has {known}")
+                raise PatchfemError(f"--hold {name}={text}: no row of {self.path.name} with a reading has this value; "
+                                    f"the values of this column are {known}")
             out |= named
         return out
 
@@ -109,16 +109,17 @@ def cells_of(path: Path) -> Cells:
     row, felt, measured = [], [], []
     for k, one in enumerate(rows):
         if not (one.frequency > 0 and one.input > 0):
-            raise PatchfemError(f"{path}: row {k + 1}: frequency and input above zero are needed")
+            raise PatchfemError(f"{path}: row {k + 1}: frequency and input must be above zero")
         if one.acceleration == 0:
-            raise PatchfemError(f"{path}: row {k + 1}: an acceleration of 0 has no logarithm; leave the cell empty")
+            raise PatchfemError(f"{path}: row {k + 1}: the acceleration is 0, but the fit takes its logarithm; leave "
+                                "the cell empty")
         for value, is_felt in ((one.acceleration, True), (one.displacement, False)):
             if value is not None:
                 row.append(k)
                 felt.append(is_felt)
                 measured.append(value)
     if not row:
-        raise PatchfemError(f"{path}: no acceleration or displacement was read, so there is nothing to fit")
+        raise PatchfemError(f"{path}: no row has an acceleration or a displacement, so nothing can be fitted")
     row = np.array(row)
     asked = sorted({(rows[k].frequency, rows[k].input) for k in row})
     conditions = []

@@ -114,7 +114,7 @@ def fit_rows(question: Question, options: RowsOptions, say: Callable | None = No
     parts = cells.parts(options.leave_out, ~held) if options.leave_out else []
     if len(parts) == 1:
         raise PatchfemError(f"--leave-out {options.leave_out}: all rows that are not held out have the same value in "
-                            "this column, so no rows would be left to fit")
+                            "this column, so without that value no rows remain for the fit; choose another column")
     for _, part in parts:
         _enough(cells, ~held & ~part, count, how)
     placebos = [(text, question.asked(cells.conditions, text)) for one in options.placebos
@@ -138,8 +138,8 @@ def fit_rows(question: Question, options: RowsOptions, say: Callable | None = No
 def _enough(cells: Cells, training, count: int, how: Search) -> None:
     used = int((training & ~cells.unstable).sum() if how.unstable == "out" else training.sum())
     if used <= count:
-        raise PatchfemError(f"{cells.path}: {used} readings are neither held out nor left out, too few to determine "
-                            f"{count} values and their intervals")
+        raise PatchfemError(f"{cells.path}: only {used} readings are used for the fit (neither held out nor left out), "
+                            f"too few to determine {count} values and their intervals")
 
 
 def _predicted(computed: Computed, values, conditions) -> np.ndarray:
@@ -164,13 +164,13 @@ def _texts(one: str, wanted) -> list:
     """The --set strings of a placebo; PatchfemError where the fit or the rows would put another value in its place."""
     key, equals, values = (part.strip() for part in one.partition("="))
     if not equals or not values:
-        raise PatchfemError(f"--placebo {one}: table.key=value,value is needed, such as "
+        raise PatchfemError(f"--placebo {one}: write table.key=value,value, for example "
                             "structure.mode.yaw.frequency=110 Hz,138 Hz")
     if key in ("drive.frequency", "drive.acceleration"):
-        raise PatchfemError(f"--placebo {one}: the drive is given by the rows; choose a key of the rig")
+        raise PatchfemError(f"--placebo {one}: the rows of the file give the drive; choose a key of the rig")
     if any(key == each.key for each in wanted):
-        raise PatchfemError(f"--placebo {one}: this key is free, so every fit would find its own value; leave it out "
-                            "of --free, or choose another key")
+        raise PatchfemError(f"--placebo {one}: --free already fits this key, so a placebo value would have no effect; "
+                            "leave the key out of --free, or choose another key")
     return [f"{key}={value.strip()}" for value in values.split(",")]
 
 
@@ -195,20 +195,20 @@ def _said(cells: Cells, asked: Asked, found: Found, logs, how: Search) -> list:
     """What a person must know of the rows and of the fit."""
     out = remarks(found.fit, [one.key for one in asked.wanted])
     if cells.empty:
-        out.append(f"{len(cells.empty)} of {len(cells.rows)} rows have no reading and are left out: row "
+        out.append(f"{len(cells.empty)} of {len(cells.rows)} rows have no reading and are left out: rows "
                    f"{', '.join(str(k + 1) for k in cells.empty)}")
     count = int(cells.unstable.sum())
     if count:
         means = {"bound": "count in the fit as lower bounds", "out": "are left out of the fit",
-                 "read": "count in the fit like all others"}[how.unstable]
-        out.append(f"{count} readings flagged U {means}; scores_stable leaves them out")
+                 "read": "count in the fit like all other readings"}[how.unstable]
+        out.append(f"{count} readings flagged U (unstable) {means}; scores_stable leaves these readings out")
     lost = sorted({f"{cells.rows[k].frequency:.6g} Hz, {cells.rows[k].input:.4g} m/s^2"
                    for k, log in zip(cells.row, logs) if abs(log) >= MOST})
     if lost:
-        out.append(f"no bounded motion is found at {'; '.join(lost)}: each of these rows counts as a deviation by a "
-                   f"factor of {np.exp(MOST):.0f}")
+        out.append(f"no bounded motion is found at {'; '.join(lost)}: each row at these inputs counts as if the model "
+                   f"were wrong by a factor of {np.exp(MOST):.0f}")
     alone = int((found.rms <= np.nanmin(found.rms) * 1.01).sum())
     if alone == 1 and how.starts > 1:
-        out.append(f"only one of {how.starts} starts ends within 1 % of the best training score: more --starts may "
-                   "find a better fit")
+        out.append(f"only one of {how.starts} searches ended within 1 % of the best training score, so a better fit "
+                   "may exist; raise --starts")
     return out

@@ -80,7 +80,7 @@ def searched(cells: Cells, computed: Computed, training, how: Search, bars: str 
     ends = descents(quick, begins, True, kept, computed.forget, tell)
     rms = np.array([one.rms for one in ends])
     if np.isnan(rms).all():
-        raise NotConverged(f"fit: every one of {how.starts} starts failed; the first failed because: {quick.reason}")
+        raise NotConverged(f"fit: all {how.starts} searches failed; the first failed for this reason: {quick.reason}")
     best = descents(Counted(residual, box), [ends[int(np.nanargmin(rms))].u], before=computed.forget)
     found = answered(quick, best, bars, ends)
     values = np.array([box.values(one.u) if np.isfinite(one.cost) else np.full(n, np.nan) for one in ends])

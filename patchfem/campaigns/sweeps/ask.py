@@ -48,8 +48,8 @@ def asked_of(path: Path, sets: Sequence[str], request: Request) -> tuple[Asked, 
     swept = {asked.place(axis.key): axis.key for axis in cases.axes}
     both = [(one, swept.get(asked.place(".".join(pieces_of(one.partition("=")[0]))))) for one in sets]
     if any(key for _, key in both):
-        raise SceneError([f"--set {one}: {key} is swept, so every case has its own value; remove --set, or the key "
-                          "from the sweep" for one, key in both if key])
+        raise SceneError([f"--set {one}: the sweep already sets {key} in every case; remove this --set, or remove the "
+                          "key from the sweep" for one, key in both if key])
     return asked, cases
 
 
@@ -60,8 +60,8 @@ def cases_of(asked: Asked, request: Request) -> Cases:
     """
     parts, wrong = [], []
     if min(request.count, request.seed) < 0 or (request.sobol and not request.count):
-        raise SceneError([f"{request.count} random cases with seed {request.seed}: whole numbers >= 0 are needed, and "
-                          "at least one case for Sobol's sequence"])
+        raise SceneError([f"{request.count} random cases with seed {request.seed}: the number of cases and the seed "
+                          "must be whole numbers >= 0, and Sobol's sequence needs at least one case"])
     if request.file is not None:
         listed, wrong = table.read(request.file)
         parts += [listed] if listed is not None else []
@@ -72,9 +72,10 @@ def cases_of(asked: Asked, request: Request) -> Cases:
         axes, mistakes = asked.axes()
         wrong += mistakes
         if not axes and not mistakes:
-            wrong.append(f"{asked.path}: nothing to sweep over; add --over table.key=v1,v2,... or a table [sweep]")
+            wrong.append(f"{asked.path}: no key to sweep is given; add --over table.key=v1,v2,... or a table [sweep]")
     twice = {axis.key for part in parts for axis in part.axes} & {axis.key for axis in axes}
-    wrong += [f"--over {key}: this key is also in {request.file}" for key in sorted(twice)]
+    wrong += [f"--over {key}: {request.file} sets this key already; remove the key from one of the "
+              "two" for key in sorted(twice)]
     if not wrong:
         wrong += _same(asked, [axis.key for axis in (*axes, *(one for part in parts for one in part.axes))])
     if wrong:
@@ -83,8 +84,8 @@ def cases_of(asked: Asked, request: Request) -> Cases:
         raise SceneError([*asked.mistakes(first), *wrong])
     count = prod([*map(len, parts), *([request.count] if request.count else [len(axis.texts) for axis in axes])])
     if count > MOST:
-        raise SceneError([f"{asked.path}: {count} cases are more than one sweep may have ({MOST}); sweep parts of the "
-                          "ranges, or take N cases from them with --sobol N"])
+        raise SceneError([f"{asked.path}: the sweep has {count} cases, more than the largest number possible ({MOST}); "
+                          "give fewer values for each key, or draw N cases from the ranges with --sobol N"])
     if request.count and axes:
         parts.append(samples.drawn(axes, request.count, request.sobol, request.seed))
     elif axes:
@@ -111,7 +112,8 @@ def _same(asked: Asked, keys: Sequence[str]) -> list[str]:
     for key in keys:
         place = asked.place(key)
         if first.setdefault(place, key) != key:
-            wrong.append(f"--over {key}: this key is given twice, also as {first[place]}")
+            wrong.append(f"--over {key}: this key is the same as {first[place]}, which is given already; remove one of "
+                         "them")
     return wrong
 
 

@@ -25,14 +25,18 @@ def read(path: Path) -> tuple[Cases | None, list[str]]:
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         return None, [f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}"]
     if len(lines) < 2:
-        return None, [f"{path}: a header like `{HEADER}` is needed, and a row for each case below it"]
+        return None, [f"{path}: the first line must be a header such as `{HEADER}`, and each line after it must give "
+                      "one case"]
     heads = [_HEAD.fullmatch(cell) for cell in lines[0][1]]
     if not all(heads):
-        return None, [f"{path}:{lines[0][0]}: a header like `{HEADER}` is needed, not '{','.join(lines[0][1])[:80]}'"]
-    wrong = [f"{path}:{number}: {len(heads)} cells are needed, not {len(row)}" for number, row in lines[1:]
+        return None, [f"{path}:{lines[0][0]}: the first line must be a header such as `{HEADER}`, not "
+                      f"'{','.join(lines[0][1])[:80]}'"]
+    wrong = [f"{path}:{number}: the line must have {len(heads)} cells, as the header has, not "
+             f"{len(row)}" for number, row in lines[1:]
              if len(row) != len(heads)]
     keys = [head[1] for head in heads]
-    wrong += [f"{path}:{lines[0][0]}: {key}: is given twice" for key in dict.fromkeys(keys) if keys.count(key) > 1]
+    wrong += [f"{path}:{lines[0][0]}: {key}: two columns have this key; remove one of "
+              "them" for key in dict.fromkeys(keys) if keys.count(key) > 1]
     if wrong:
         return None, wrong
     axes = []
@@ -50,7 +54,7 @@ def _column(key: str, unit: str | None, cells: list) -> tuple[Axis | None, list[
         if cell in known:
             continue
         if unit is not None and not NUMBER.fullmatch(cell):
-            wrong.append((number, f"'{cell[:60]}' is not a number; write the unit in the header"))
+            wrong.append((number, f"'{cell[:60]}' must be a number without a unit; write the unit in the header"))
             continue
         try:
             known[cell] = values_of(key, [f"{cell} {unit}" if unit else cell])

@@ -82,22 +82,25 @@ def grid(modes: ModalBasis, drive, laws, over: tuple, start: Start | None, stick
     (duration, steps_per_cycle), n, i = over, modes.omega.size, len(modes.interfaces)
     table, compiled = rows(laws, i, stick_speed), loops()
     if steps_per_cycle < 4:
-        raise PatchfemError(f"accuracy.steps_per_cycle = {steps_per_cycle}: at least 4 steps per cycle are needed")
+        raise PatchfemError(f"accuracy.steps_per_cycle = {steps_per_cycle}: the value must be at least 4")
     h = drive.period / steps_per_cycle
     most = MOST_NUMBERS / (2 * n + 2 * i + 3)
     if not 0.5 < duration / h <= most:
-        raise PatchfemError(f"a run of {duration:g} s in steps of {h:g} s takes {duration / h:.3g} steps; 1 to "
-                            f"{most:.3g} steps are possible: change drive.cycles or accuracy.steps_per_cycle")
+        raise PatchfemError(f"a run over {duration:g} s of motion in steps of {h:g} s takes {duration / h:.3g} steps, "
+                            f"but the number of steps must lie between 1 and {most:.3g}; change drive.cycles or "
+                            "accuracy.steps_per_cycle")
     idle = np.flatnonzero(~np.any(modes.interfaces, axis=1))
     if idle.size:
-        raise PatchfemError(f"no mode moves interface {idle[0] + 1}: give slide for a mode, or leave the interface out")
+        raise PatchfemError(f"no mode moves interface {idle[0] + 1}; give a mode the key `slide`, or leave the "
+                            "interface out")
     count = round(duration / h) + 1
     filled = *(np.zeros((count, size)) for size in (n, n, i, i)), np.zeros(count, np.int64)
     if start is not None:
         if np.shape(start.z) != (n,) or np.shape(start.v) != (n,):
-            raise PatchfemError(f"a start needs {n} displacements and {n} velocities, one of each per mode")
+            raise PatchfemError(f"the start must give {n} displacements and {n} velocities, one displacement and one "
+                                "velocity for each mode")
         if not np.all(np.isfinite([start.z, start.v])):
-            raise PatchfemError("a start needs finite displacements and velocities")
+            raise PatchfemError("the displacements and velocities of the start must be finite")
         filled[0][0], filled[1][0] = start.z, start.v
     values = np.array(drive.values(np.arange(count) * h), float, order="C")
     # arrays of their own: numba compiles a loop anew for one that is read-only or lies otherwise in memory
@@ -141,10 +144,11 @@ def finish(modes: ModalBasis, run: Grid, failures: int, warnings: list) -> Compa
     flow = max(abs(work), viscous + abs(friction), abs(stored), 1e-300)
     if not np.isfinite(error):
         step = int(np.argmax(~np.isfinite(v).all(axis=1)))
-        warnings = [*warnings, f"the motion is not finite from step {step} on; raise accuracy.steps_per_cycle"]
+        warnings = [*warnings, f"from step {step} on the computed motion is not a finite number; raise "
+                               "accuracy.steps_per_cycle"]
     elif abs(error) > 1e-3 * flow:
-        warnings = [*warnings, f"the energy does not balance: {abs(error) / flow:.1%} of the energy that passed "
-                               f"through is {'missing' if error > 0 else 'created by the method'}"]
+        warnings = [*warnings, f"the energy balance has an error: {abs(error) / flow:.1%} of the energy exchanged in "
+                               f"the run is {'missing' if error > 0 else 'created by the numerical method'}"]
     kept = np.arange(len(z)) * run.h, z, v, force.T, residual.T, iterations
     for array in (*kept, run.drive):
         array.setflags(write=False)

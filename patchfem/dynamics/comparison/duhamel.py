@@ -47,10 +47,11 @@ def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 
     or "force" (N); relax in (0, 1]; most: iterations per step. PatchfemError for values that cannot be.
     """
     if convergence not in CRITERIA:
-        raise PatchfemError(f"accuracy.convergence: '{convergence}' is not one of {', '.join(CRITERIA)}")
+        raise PatchfemError(f"accuracy.convergence: '{convergence}' is not possible; use one of {', '.join(CRITERIA)}")
     if not 0 < tolerance < np.inf or not 0 < relax <= 1 or most < 2:
-        raise PatchfemError(f"accuracy.convergence_tolerance = {tolerance:g}, relax = {relax:g}, most = {most}: a "
-                            "finite tolerance > 0, 0 < relax <= 1 and at least 2 iterations are needed")
+        raise PatchfemError(f"accuracy.convergence_tolerance = {tolerance:g}, relax = {relax:g}, most = {most}: the "
+                            "tolerance must be finite and > 0, relax must be > 0 and <= 1, and most (the number of "
+                            "iterations) must be at least 2")
     found = grid(modes, drive, laws, (duration, steps_per_cycle), start)
     maps, coupling = kernels(modes, found.h), modes.dampers - np.diag(np.diag(modes.dampers))
     solve = np.linalg.inv(np.eye(modes.omega.size) + maps[:, 1, 3:] * coupling)
@@ -69,20 +70,22 @@ def _admitting(convergence: str, tolerance: float, share: float) -> list:
         return []
     cure = f"divide accuracy.convergence_tolerance by {np.ceil(share / ADMITTED):.0f}" if convergence == "force" else \
         'set accuracy.convergence = "force"'
-    return [f"iterating until the {convergence} changes by less than {tolerance:g} leaves a friction error of "
-            f"{share:.3g} of the friction limit; {cure}"]
+    return [f"the iterations end when the {convergence} changes by less than {tolerance:g}, which leaves an error of "
+            f"the friction force of up to {share:.3g} of the friction limit; {cure}"]
 
 
 def _warnings(modes, laws, found: Grid, failures, steps: int) -> list:
     out, (*_, residual, iterations) = [], found.filled
     left = np.abs(residual) / found.laws[:, 1]
     if left.max(initial=0.0) > ADMITTED:
-        out.append(f"in accepted steps the force used differs from the friction law by up to {left.max():.3g} of the "
-                   f"friction limit, on average by {left[1:].mean():.3g}")
+        out.append(f"the friction force differs from the friction law by up to {left.max():.3g} of the friction limit, "
+                   f"and on average over the steps by {left[1:].mean():.3g} of this limit")
     if failures:
-        out.append(f"{failures} of {iterations.size - 1} steps did not converge within the allowed iterations")
+        out.append(f"{failures} of {iterations.size - 1} steps did not converge within the largest number of "
+                   "iterations")
     turn = found.h * max(elastic_rates(modes, laws), default=0.0)
     if turn > TURN:
-        out.append(f"the elastic friction oscillates through {turn:.2g} rad in a step (limit {TURN:g}); set "
+        out.append(f"the block on the elastic contact oscillates through {turn:.2g} rad in one time step (limit "
+                   f"{TURN:g} rad); set "
                    f"accuracy.steps_per_cycle = {steps * int(np.ceil(turn / TURN))}")
     return out

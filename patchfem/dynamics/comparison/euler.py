@@ -41,14 +41,16 @@ def _warnings(modes, laws, h, steps: int) -> list:
         if left[i] < 0:
             damped = np.all(own[modes.omega > 0] > 0)
             times = int(np.ceil(np.nanmax(lost / own))) if damped else 0
-            grows = ", so its free vibration grows; " + (f"set accuracy.steps_per_cycle = {steps * times}" if times else
-                                                      "no step of this method damps this vibration")
+            grows = ", so the free vibration of this mode grows; " + ("set accuracy.steps_per_cycle = "
+                                                                      f"{steps * times}" if times else
+                                                      "no step size of this method damps this vibration")
         out.append(f"explicit Euler lowers the damping ratio of mode '{modes.names[i]}' by {lost[i]:.3g}, from "
                    f"{own[i]:.3g} to {left[i]:.3g}{grows}")
     for one, face in zip(laws, modes.interfaces):
         pace = np.sum(face**2) / modes.mass * one.steepness
         if h * pace > 2:
-            out.append(f"a step of {h:.3g} s is above 2 v_0 m/limit = {2 / pace:.3g} s: the friction changes its sign "
-                       "from step to step while the interface hardly moves")
-    return out + ["explicit Euler lowers the damping ratio of the elastic contact, which is 0, by "
+            out.append(f"a step of {h:.3g} s is above 2 v_0 m/limit = {2 / pace:.3g} s: the computed friction force "
+                       "changes its sign from step to step while the interface hardly moves")
+    return out + ["explicit Euler lowers the damping ratio of the vibration on the elastic contact from 0 to a "
+                  "negative value, by "
                   f"{h * rate / 2:.3g}" for rate in elastic_rates(modes, laws)]

@@ -22,7 +22,7 @@ def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 
     suffices. Other laws are solved at the end of the step. PatchfemError for values that cannot be.
     """
     if stick_speed is not None and not (np.isfinite(stick_speed) and stick_speed >= 0):
-        raise PatchfemError(f"accuracy.stick_speed = {stick_speed:g} m/s: a finite speed >= 0 is needed")
+        raise PatchfemError(f"accuracy.stick_speed = {stick_speed:g} m/s: the speed must be finite and >= 0")
     found = grid(modes, drive, laws, (duration, steps_per_cycle), start, stick_speed)
     h, faces = found.h, modes.interfaces
     inverse = np.linalg.inv(np.eye(modes.omega.size) + h / 2 * modes.dampers + h * h / 4 * np.diag(modes.omega**2))
@@ -41,9 +41,9 @@ def _warnings(modes, laws, found: Grid, by_force, stops) -> list:
         static = row[2] + added_static(modes, face, row[3], h)
         if not by_force and static > 1.01 * row[1]:
             out.append(f'with the stick speed {row[3]:g} m/s and steps of {h:.3g} s the interface sticks up to a force '
-                       f'of {static:.3g} N instead of {row[1]:.3g} N, and smaller steps make this worse; set '
+                       f'of {static:.3g} N instead of {row[1]:.3g} N; smaller steps raise this force further; set '
                        f'accuracy.stick_speed = "{low_speed(modes, face, row[1], h):.2g} m/s"')
         drop = 0.5 * stops * modes.mass * row[3]**2 / np.sum(face**2)
-        out.append(f"below {row[3]:g} m/s the method stops the interface at once ({stops} times, taking out up to "
-                   f"{drop:.3g} J in all), which rigid friction does not do")
+        out.append(f"below {row[3]:g} m/s the method stops the interface at once, which rigid friction does not do; "
+                   f"this happened {stops} times and removed up to {drop:.3g} J of energy in all")
     return out

@@ -92,9 +92,9 @@ def rows(laws, interfaces: int, stick_speed: float | None = None) -> np.ndarray:
     for k, (law, row) in enumerate(zip(laws, found)):
         smooth = row[0] > 0
         if not np.all(np.isfinite(row)) or row[1] <= 0 or np.any(row < 0) or (smooth and np.any(row[HEAD + 1:] == 0)):
-            raise PatchfemError(f"{law}: the friction law needs finite numbers above zero")
+            raise PatchfemError(f"{law}: the numbers of the friction law must be finite and above zero")
         if not smooth and row[2] > row[1]:
-            raise PatchfemError(f"{law}: friction.kinetic is above friction.static")
+            raise PatchfemError(f"{law}: friction.kinetic must not be above friction.static")
         out[k, :len(row)] = row
         out[k, HEAD] = number[law.kernels]
     return out
@@ -132,14 +132,15 @@ def sticking_warnings(modes: ModalBasis, laws, h: float, stick_speed: float | No
     for law, face in zip(laws, modes.interfaces, strict=True):
         if isinstance(law, Coulomb):
             if not law.row(stick_speed)[3] and law != NO_FRICTION:
-                out.append("Coulomb friction without a stick branch: the force is always plus or minus the kinetic "
-                           "friction, so a sticking interface chatters and creeps; set accuracy.stick_speed = "
+                out.append("with a stick speed of 0 Coulomb friction never sticks in this method: the force is always "
+                           "plus or minus the kinetic friction, so an interface that should stick chatters and creeps; "
+                           "set accuracy.stick_speed = "
                            f'"{low_speed(modes, face, law.static, h):.2g} m/s"')
         elif law.steepness:
             speed = float(np.arctanh(0.5)) * law.limit / law.steepness
-            out.append("limit*tanh(v/v_0) never sticks: under half of the friction limit the interface creeps at "
-                       f"{speed:.3g} m/s without end")
+            out.append("the law limit*tanh(v/v_0) never sticks: under a constant force of half the friction limit the "
+                       f"interface creeps at {speed:.3g} m/s")
         elif law.printed:
-            out.append("eq. 3.12 as printed in the report keeps the force at its limit once it has reached it, "
-                       "whatever the motion does; use printed = false")
+            out.append("with eq. 3.12 as printed in the report, the force stays at the friction limit once this limit "
+                       "is reached, even if the motion reverses; use printed = false")
     return list(dict.fromkeys(out))

@@ -43,7 +43,7 @@ def elements_of(stiffness, yield_slide) -> Elements:
     """
     k, y = np.asarray(stiffness, float), np.asarray(yield_slide, float)
     if not (np.isfinite(k).all() and np.isfinite(y).all() and (k >= 0).all() and (y >= 0).all()):
-        raise PatchfemError("friction: elements need a finite stiffness and yield slide >= 0")
+        raise PatchfemError("friction: the stiffness and the yield slide of each element must be finite and >= 0")
     if k.size == 1 and k[0] > 0 and y[0] > 0:  # nothing to sort, in two fifths of the time
         return Elements(frozen_array(k), frozen_array(y), frozen_array([0], np.int64))
     order = np.flatnonzero((k > 0) & (y > 0))
@@ -64,7 +64,7 @@ def coulomb(static: float, kinetic: float | None = None) -> Elements:
     """
     kinetic = static if kinetic is None else kinetic
     if not 0 <= kinetic <= static:
-        raise PatchfemError("friction.kinetic: a value between 0 and static is needed")
+        raise PatchfemError("friction.kinetic: the value must lie between 0 and friction.static")
     none = frozen_array([])
     return Elements(none, none, frozen_array([], np.int64), float(static), float(kinetic))
 

@@ -112,8 +112,8 @@ def simulate(modes: ModalBasis, drive, groups, cycles: float, window: int = 10, 
     NotConverged where events pile up.
     """
     if start is not None and abs(float(modes.output @ start.z)) > travel:
-        raise PatchfemError("structure.travel: the start lies beyond this travel; raise travel or start nearer to the "
-                            "middle")
+        raise PatchfemError("structure.travel: the displacement at the start is larger than this travel; raise the "
+                            "travel, or start nearer to the middle")
     run = started(modes, drive, groups, cycles, window, travel, start, memory)
     done = run.go(frames, progress)
     if done is None:  # the travel ends the run: the same again to there, for the last cycles before it
@@ -211,12 +211,13 @@ class _Run:
                                         self.books, self.room, rows)
         sums += before
         if code == self.kernels.PILED:
-            raise NotConverged("dynamics: events of stick and slip follow each other without end at t = "
-                               f"{rows[max(used - 1, 0), 0]:.9g} s")
+            raise NotConverged(f"dynamics: at t = {rows[max(used - 1, 0), 0]:.9g} s the contact changes between stick "
+                               "and slip again and again without time passing")
         if code == self.kernels.OPEN:
-            nearer = "bring kinetic nearer to static, or " if np.any(self.table.kinetic < self.table.static) else ""
-            raise NotConverged("dynamics: no state of stick and slip that satisfies the law of friction was found "
-                               f"after an event; {nearer}use method = \"march\"")
+            nearer = "bring friction.kinetic nearer to friction.static, or " \
+                if np.any(self.table.kinetic < self.table.static) else ""
+            raise NotConverged('dynamics: after a change between stick and slip no state was found that satisfies the '
+                               f'friction law; {nearer}use accuracy.method = \"march\"')
         self.passed = code == self.kernels.TRAVEL
         return code, rows[:0 if self.passed else used]
 

@@ -90,7 +90,8 @@ class Orbits:
             if code == self.kernels.DONE:
                 return used, float(max(books.extremes[0, 1], -books.extremes[0, 0]))
             if code != self.kernels.FULL:
-                raise NotConverged("dynamics: events of stick and slip follow each other without end within a period")
+                raise NotConverged("dynamics: within a period the contact changes between stick and slip again and "
+                                   "again without time passing")
             self.rows, self.held = np.zeros((2 * len(self.rows), self.wide)), {}
 
     def _held(self, name: str, plant, moving: float = 0.0) -> tuple:

@@ -133,8 +133,8 @@ class PeriodMap:
         """Set the clock to a sine; it is made once for each of the last drives."""
         if id(drive) not in self.clocks:
             if len(drive.segments) != 1:
-                raise PatchfemError("drive: a periodic motion needs a single sine without end; use accuracy.method = "
-                                    '"march" for this drive')
+                raise PatchfemError('drive: a periodic motion is computed only under one sine that does not end; for '
+                                    'this drive use accuracy.method = "march"')
             if len(self.clocks) >= DRIVES:
                 self.clocks.clear()
             stiff = max(float(one.stiffness.sum()) for one in self.groups)
@@ -164,7 +164,7 @@ class PeriodMap:
                                                self.books, self.room, self.spare, seen)
         pieces = self.follow.held_call(self.held[size], place(period / 2 if half else period, period))
         if pieces < 0:
-            raise NotConverged("dynamics: events pile up within a period")
+            raise NotConverged("dynamics: within a period the contact changes between stick and slip too often")
         rows, columns = turned = turned_of(memory)
         end = Point(self.motion.ravel().copy(), copied(memory), turned)
         kept = 2 * n + (columns < seen[1, rows]).nonzero()[0]

@@ -73,7 +73,7 @@ def clock_of(drive, faces: int) -> Clock:
     """The Clock of a drive of `core` or `structure.drives` at t = 0. PatchfemError where it begins later."""
     segments = segments_of(drive)
     if segments[0, :2].any():
-        raise PatchfemError("drive: the first segment must start at 0 s")
+        raise PatchfemError("drive: the first segment of the drive must start at 0 s")
     return Clock(np.zeros(6), segments, np.array([drive.period]), np.zeros(faces + 1))
 
 

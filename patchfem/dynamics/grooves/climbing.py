@@ -27,9 +27,9 @@ def refuse_heavy(grooves: Grooves, static: float, modes) -> None:
     taken = -grooves.lifted_mass * grooves.least_mass(static)
     if taken >= own:
         raise PatchfemError(f"a lifted mass of {grooves.lifted_mass:.6g} kg presses so hard on the downward flank that "
-                            f"friction exceeds the inertia of the sliding mass of {own:.6g} kg; the motion is then not "
-                            f"determined; less than {own / -grooves.least_mass(static):.6g} "
-                            "kg is needed", f"{grooves.key}.lifted_mass")
+                            f"friction exceeds the inertia of the sliding mass of {own:.6g} kg, and the motion is then "
+                            f"not determined; the lifted mass must be below {own / -grooves.least_mass(static):.6g} "
+                            "kg", f"{grooves.key}.lifted_mass")
 
 
 def lifts(grooves: Grooves, time: float) -> str:

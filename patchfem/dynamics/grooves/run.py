@@ -147,7 +147,7 @@ class SampledRun(GroovesRun):
         """Mark the run not_converged when steps did not meet their error; what was computed is kept."""
         if self.ledger[7]:
             self.outcome = Outcome.NOT_CONVERGED
-            self.message = (f"{int(self.ledger[7])} of {self.done} steps did not converge on the grooves; raise "
+            self.message = (f"{int(self.ledger[7])} of {self.done} time steps on the grooves did not converge; raise "
                             "accuracy.steps_per_cycle")
 
     def strained(self) -> float:

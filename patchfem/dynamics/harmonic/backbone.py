@@ -73,8 +73,8 @@ class FreeBalance:
         none near."""
         found = damped(lambda v: self.system(v, amplitude), x, lambda _, left, size: np.linalg.norm(left) < 1e-7)
         if found is None:
-            raise NotConverged(f"backbone: no free motion of amplitude {say(amplitude, 3)} was found by continuation "
-                               "from smaller amplitudes")
+            raise NotConverged(f"backbone: no free motion with the amplitude {say(amplitude, 3)} was found by "
+                               "following the motion from smaller amplitudes")
         x, one = found[0], self.system(found[0], amplitude)
         slides = self.balance.lift @ unpack(x[:-2] * amplitude, self.balance.lift.shape[1])
         return x, Free(amplitude, x[-2] * self.scale, x[-1], slides, one.fold.force, one.modal)

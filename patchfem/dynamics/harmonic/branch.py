@@ -92,8 +92,8 @@ def _curve(modes, drives, group, parameter, how: How) -> Branch:
         if harmonics or above <= tolerance / 4:
             return Branch(points, parameter, tuple(f / scale for f in path.folds),
                           tuple(f / scale for f in path.crossings), path.ended)
-    raise NotConverged(f"a balance of {LADDER[-1]} harmonics misses {above:.1e} of the motion on the curve, more than "
-                       f"the limit of {tolerance / 4:g}; raise the tolerance")
+    raise NotConverged(f"harmonic balance with {LADDER[-1]} harmonics misses a part of {above:.1e} of the motion, more "
+                       f"than the limit of {tolerance / 4:g}; raise the tolerance")
 
 
 def _followed(modes, drives, group, parameter, h, first, longest) -> tuple:
@@ -196,9 +196,9 @@ def backbone(modes, group, amplitudes, mode: int = 0, harmonics: int = 9) -> Bac
     """
     group, wanted = group_of(modes, group), np.asarray(amplitudes, float)
     if wanted.size == 0 or not np.isfinite(wanted).all() or wanted[0] <= 0 or np.any(np.diff(wanted) <= 0):
-        raise PatchfemError("backbone: amplitudes must be positive and rise")
+        raise PatchfemError("backbone: the amplitudes must be positive and in rising order")
     if not 0 <= mode < modes.omega.size:
-        raise PatchfemError(f"backbone: mode {mode}: there are {modes.omega.size}, counted from 0")
+        raise PatchfemError(f"backbone: there is no mode {mode}; the rig has {modes.omega.size} modes, counted from 0")
     samples = group.samples or group.samples_for(harmonics, np.full(len(group.rows), wanted[-1]))
     balance = balance_of(modes, group, samples)
     omega, shape = modes.held(group.rows, group.stiffness(), mode)

@@ -44,7 +44,7 @@ def follow(system, x, p: float, bounds: tuple, forward: bool = True, step: float
     size = scale or float(np.linalg.norm(x)) or 1.0
     x = correct(system, x, p, np.zeros(x.size), 1.0, size, width, goal, p)
     if x is None:
-        raise NotConverged("accuracy.method: no first motion of the curve was found near the given start")
+        raise NotConverged("accuracy.method: the first point of the curve was not found near the given start")
     x, p = x[0], x[1]
     tangent = _tangent(system, x, p, None, size, width, forward)
     found = [(x, p, tangent[1], 0.0)]

@@ -27,7 +27,7 @@ class Group:
             law = law_of_model(law) if hasattr(law, "fields") else law
             faces = modes.interfaces
             if np.ndim(row) == 0 and not 0 <= row < len(faces):
-                raise PatchfemError(f"interface {row}: there are {len(faces)}, counted from 0")
+                raise PatchfemError(f"there is no interface {row}; the rig has {len(faces)} interfaces, counted from 0")
             vector = faces[row] if np.ndim(row) == 0 else np.asarray(row, float)
             key = vector.tobytes() if np.ndim(row) else int(row)
             rows[key] = vector

@@ -114,8 +114,8 @@ class Balance:
         u, s, vt = np.linalg.svd(rows, full_matrices=False)
         rank = int(np.sum(s > 1e-12 * s[0])) if s[0] > 0 else 0  # round-off of rows that depend on others
         if rank == 0:
-            raise PatchfemError("structure.mode.slide: no mode moves the interface, so harmonic balance has no "
-                                "friction to balance; give slide for a mode")
+            raise PatchfemError("structure.mode.slide: no mode moves the interface, so no friction acts and harmonic "
+                                "balance is not needed; give a mode the key `slide`")
         full = rank == rows.shape[0]
         self.modes, self.rows, self.contact = modes, rows, contact
         self.lift = np.eye(rank) if full else u[:, :rank]
@@ -297,6 +297,6 @@ def newton(balance: Balance, x, omega: float, level: float, harmonics: int, most
     found = damped(lambda v: balance.system(v, omega, level, harmonics), x, met, most=most)
     if found is None:
         at = f"{harmonics} harmonics at {omega / (2 * np.pi):.6g} Hz"
-        raise NotConverged(f"accuracy.harmonics: harmonic balance with {at} did not converge in {most} steps; give a "
-                           "start, or follow the curve from a lower level")
+        raise NotConverged(f"accuracy.harmonics: harmonic balance with {at} did not converge in {most} iterations; "
+                           "give a motion to start from, or begin at a lower drive level")
     return found

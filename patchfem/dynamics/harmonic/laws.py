@@ -127,7 +127,7 @@ class Jenkins(Law):
     def __post_init__(self):
         k, w = (np.atleast_1d(np.asarray(v, float)) for v in (self.stiffness, self.limit_slide))
         if k.shape != w.shape or not (np.isfinite(k).all() and np.isfinite(w).all()) or k.min() <= 0 or w.min() < 0:
-            raise PatchfemError("Jenkins elements need as many stiffnesses > 0 as limit slides >= 0, all finite")
+            raise PatchfemError("each Jenkins element needs a finite stiffness > 0 and a finite limit slide >= 0")
         order = np.argsort(w, kind="stable")
         k, w = k[order], w[order]
         object.__setattr__(self, "stiffness", frozen_array(k))
@@ -321,7 +321,10 @@ def law_of_model(model):
     if form == "flow" or (form == "points" and one.numbers[2] < 0 and not one.numbers[7]):
         return Flow(one)
     if model.set_valued:
-        raise PatchfemError("accuracy.method: \"harmonic\" cannot treat rigid friction, whose force jumps; use the "
-                            "event map, or law = \"elastic-plastic\" with a short bond_length")
-    raise PatchfemError('accuracy.method: "harmonic" works only with reading = "stretch", order = 1, a constant bond '
-                        'length, friction.breakaway = 0 and a rigid slide; use method = "march"')
+        raise PatchfemError("accuracy.method: \"harmonic\" "
+                            'cannot treat rigid friction, because the force of rigid friction jumps; use the exact '
+                            'solution from event to event, or friction.law = \"elastic-plastic\" with a short '
+                            'friction.bond_length')
+    raise PatchfemError('accuracy.method: "harmonic" can treat bonds only with friction.reading = "stretch", '
+                        'friction.order = 1, a constant bond length, friction.breakaway = 0 and pieces that are rigid '
+                        'in shear; use accuracy.method = "march"')

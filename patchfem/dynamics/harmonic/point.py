@@ -130,7 +130,7 @@ def point(modes, drive, group, harmonics: int | None = None, tolerance: float = 
             return found
         x = cut(balance_of(modes, group, 0), found.coefficients, found.unknowns, h, _next(h))
     if found is None or found.error > tolerance:
-        raise NotConverged(f"accuracy.tolerance: {LADDER[-1]} harmonics leave an error of "
+        raise NotConverged(f"accuracy.tolerance: with {LADDER[-1]} harmonics the motion still has an error of "
                            f"{found.error if found else np.inf:.1e}, more than {tolerance:g}; raise the tolerance, or "
                            'use accuracy.method = "march"')
     return found
@@ -227,8 +227,9 @@ def _along_levels(balance, omega, level, h: int) -> np.ndarray:
                   (0.0, level), True, 0.05, 0.5, 1000, 1e-6)
     if path.ended != "end":
         bare = any(k for k, *_ in balance.linear(omega, h).free)
-        why = ("; an undamped mode driven at its natural frequency stays bounded only if friction can hold it: give "
-               "the mode damping") if bare else ", neither from the sticking contact nor by raising the drive from zero"
+        why = ("; an undamped mode that is driven at its natural frequency stays bounded only if friction can hold the "
+               "contact; give the mode damping") if bare else \
+            "; the search began at the sticking contact and also followed the motion while the drive rose from zero"
         raise (_Unbounded if bare else NotConverged)(
             f"accuracy.harmonics: harmonic balance with {h} harmonics found no steady motion at "
             f"{omega / (2 * np.pi):.6g} Hz{why}")

@@ -20,7 +20,7 @@ from .laws import Jenkins, Track
 STEP = 1e-6  # of a slide, over which the slope of a tip is taken
 TURNS = 2.0  # ratio of two rates of a cycle whose forces are the same where a law knows no time
 SAME = 1e-9  # of a force, what round-off may change of it
-RATE = "friction that depends on the sliding speed has no static loop"
+RATE = "a friction force that depends on the sliding speed has no static loop"
 
 
 class Loops(NamedTuple):

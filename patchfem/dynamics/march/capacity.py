@@ -12,7 +12,7 @@ from ...core import Missing
 
 MOST_STRIPS = 2_000_000  # entries of a list of bonds, beyond which a run is refused
 ENTRY = 80  # bytes of one
-CURE = "loosen accuracy.tail or accuracy.merge, or use reading = \"stretch\" with order = 1"
+CURE = "raise accuracy.tail or accuracy.merge, or use reading = \"stretch\" with order = 1"
 
 
 class Kept(NamedTuple):

@@ -458,8 +458,9 @@ class Run:
                 for array, old in zip((*self.contact, *self._moving()), begin):
                     array[...] = old
                 did, status = self._steps(did - 1, rows)[0], 1
-                self.message = (f"from {say(self._out(rows[did]), 3)} on the motion diverges, because nothing holds "
-                                "the block beyond the barrier of the softening spring; the run ended there")
+                self.message = (f"beyond a displacement of {say(self._out(rows[did]), 3)} the motion grows without "
+                                "limit, because the force of the softening spring no longer pulls the block back; the "
+                                "run ended there")
             self.done += did
             parts.append(rows[:did + 1])
             self._judge(status)
@@ -559,10 +560,12 @@ class Run:
             self.outcome = Outcome.EXCEEDS_TRAVEL
         if status == 3:
             self.outcome = Outcome.NOT_CONVERGED
-            self.message = f"the motion is not finite at step {self.done}; raise accuracy.steps_per_cycle"
+            self.message = (f"at step {self.done} the computed motion is not a finite number; raise "
+                            "accuracy.steps_per_cycle")
         if status == UNFIT:
             self.outcome = Outcome.NOT_CONVERGED
-            self.message = f"no contact set fits the motion at step {self.done}; raise accuracy.steps_per_cycle"
+            self.message = (f"at step {self.done} the method could not determine which points are in contact; raise "
+                            "accuracy.steps_per_cycle")
 
     def _snapshot(self, row) -> dict:
         n = 2 * self.modes.omega.size
@@ -573,8 +576,8 @@ class Run:
         """Mark the run not_converged when a step missed its residual; what was computed is kept."""
         if self.ledger[7]:
             self.outcome = Outcome.NOT_CONVERGED
-            self.message = (f"{int(self.ledger[7])} of {self.done} steps did not reach the required force accuracy of "
-                            f"{GOAL:.0e} of the friction limit; raise accuracy.steps_per_cycle")
+            self.message = (f"{int(self.ledger[7])} of {self.done} time steps have an error of the friction force "
+                            f"above the required {GOAL:.0e} of the friction limit; raise accuracy.steps_per_cycle")
 
     def watched(self, rows) -> tuple:
         """Slide rates (k, i) [m/s] and slips (k, i) [m] of the interfaces in booked rows."""

@@ -145,7 +145,7 @@ def points_model(law, area, sigma, shear=None, pattern=None) -> ContactModel:
     the lower piece, `area` and `sigma` then belong to the points of the upper one. ValueError for both together.
     """
     if shear is not None and pattern is not None:
-        raise ValueError("shear modes and a pressure that stays on the lower piece cannot be combined")
+        raise ValueError("elastic shear of the pieces cannot be combined with a pressure that stays on the lower piece")
     if shear is None:
         return element_model(points_element(law, area, sigma, pattern))
     area, sigma = np.asarray(area, float)[shear.points], np.asarray(sigma, float)[shear.points]

@@ -85,10 +85,10 @@ def sets_of(patch, spring: float = 0.0) -> ContactSets:
     PatchfemError for a smooth skin, strips, or a patch that carries no load.
     """
     if patch.skin is not None:
-        raise PatchfemError(unbuilt("contact.asperities.law: a law that is not linear, with a load that "
-                                    "changes,", "linear"))
+        raise PatchfemError(unbuilt("contact.asperities.law: a law that is not linear together with a normal load that "
+                                    "changes", "linear"))
     if patch.strips is not None:
-        raise PatchfemError(unbuilt("[contact.strips] with a load that changes", "either"))
+        raise PatchfemError(unbuilt("[contact.strips] with a normal load that changes", "either"))
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     c, x = patch.pieces.normal, patch.x
     if spring > 0:
@@ -232,13 +232,13 @@ def model_of(modes: ModalBasis, law: Rubbing, sets: ContactSets | None, load=Non
     """The model of a basis on contact sets, or under a prescribed load on one point, which no heave or pitch can move.
     shear: ShearModes of an elastic-plastic law or of bonds; PatchfemError beside any other."""
     if shear is not None and law.kind not in (PLASTIC, POINTS, LISTS):
-        raise PatchfemError(unbuilt("friction.law: this law together with a changing load and "
-                                    "[contact.shear]", "stiff"))
+        raise PatchfemError(unbuilt("friction.law: this law together with [contact.shear] and a normal load that "
+                                    "changes", "stiff"))
     if shear is not None and shear.points.size != sets.x.size:
-        raise PatchfemError("contact.shear: under a load that changes the shear modes must span every node")
+        raise PatchfemError("contact.shear: if the normal load changes, the shear modes must include every node")
     if load is not None and any(part is not None and np.any(part) for part in (modes.normal, modes.pitch)):
-        raise PatchfemError("structure.mode.normal: a single contact point cannot heave or pitch; use [contact] in "
-                            "place of [normal]")
+        raise PatchfemError("structure.mode.normal: with [normal] the contact is a single point, which cannot move "
+                            "normal to the contact (`normal`) or rotate (`pitch`); use [contact] in place of [normal]")
     return VaryingLoadModel(law, sets, rows_of(modes), load, shear)
 
 

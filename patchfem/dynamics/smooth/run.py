@@ -276,7 +276,8 @@ class Motion:
             self.outcome = Outcome.LEAVES_GROOVES
         elif status in (WILD, ENDLESS):
             self.outcome = Outcome.NOT_CONVERGED
-            self.message = (f"no time step meets the tolerance at {self.time:.6g} s; use accuracy.method = \"march\"")
+            self.message = (f"at {self.time:.6g} s no time step, however small, meets the tolerance; use "
+                            "accuracy.method = \"march\"")
 
     def book(self) -> dict:
         """The energy ledger [J] as the motion stands, and the steps taken."""

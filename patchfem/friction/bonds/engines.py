@@ -40,8 +40,9 @@ class Choice:
     def said(self) -> str:
         """One line for a plan: engine, length of the list, cost per step, settings and bound of the error."""
         if self.engine == "recursion":
-            return f"recursion, exact, {1e6 * self.seconds:.2g} us a step"
-        parts = [f"{self.engine}: about {self.strips:.0f} list entries, {1e6 * self.seconds:.2g} us a step"]
+            return f"recursion, exact, computing time {1e6 * self.seconds:.2g} us per time step"
+        parts = [f"{self.engine}: about {self.strips:.0f} list entries, computing time {1e6 * self.seconds:.2g} us per "
+                 "time step"]
         if self.tail > 0:
             parts.append(f"tail {self.tail:.1g}")
         if self.merge > 0:
@@ -52,7 +53,7 @@ class Choice:
 def impossible(engine: str, reading: str, order: float) -> str:
     """Why an engine cannot sum such a law and what can; empty where it can."""
     if engine == "recursion" and (reading != "stretch" or order != 1):
-        return "sums only reading = \"stretch\" with order = 1; use \"auto\" or \"merged\""
+        return "works only with reading = \"stretch\" and order = 1; use \"auto\" or \"merged\""
     return ""
 
 

@@ -26,7 +26,7 @@ def growth_at(rest: float, slip: float, surface, reference: float, rest_activati
     surface = np.asarray(surface, float)
     if not (surface > 0).all() or not np.isfinite(surface).all() or not reference > 0:
         worst = float(surface.min()) if reference > 0 else reference
-        raise PatchfemError(f"a temperature of {worst:g} K: absolute temperatures above 0 K are needed")
+        raise PatchfemError(f"a temperature of {worst:g} K is not possible; temperatures must be above 0 K")
     cold = 1 / reference - 1 / surface
     return (_scaled("rest_growth", rest, (rest_activation or 0.0) * cold, "rest_activation"),
             _scaled("slip_growth", slip, -(slip_activation or 0.0) * cold, "slip_activation"))
@@ -36,8 +36,9 @@ def _scaled(name: str, value: float, exponent, key: str):
     total = np.log(value) + exponent
     if not ((total < np.log(np.finfo(float).max)) & (total > np.log(np.finfo(float).tiny))).all():
         worst = float(np.asarray(total).flat[np.argmax(np.abs(total))]) / np.log(10)
-        raise PatchfemError(f"{name} would be 1e{worst:.0f} at the surface temperature, beyond any floating-point "
-                            f"number; lower temperature.{key} or bring surface and reference closer together")
+        raise PatchfemError(f"at the surface temperature {name} would be 1e{worst:.0f}, outside the range of "
+                            f"floating-point numbers; lower temperature.{key}, or bring temperature.surface closer to "
+                            "temperature.reference")
     out = value * np.exp(exponent) if (np.abs(exponent) < 600).all() else np.exp(total)
     return float(out) if np.ndim(out) == 0 else out
 

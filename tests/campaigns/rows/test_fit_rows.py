@@ -158,7 +158,7 @@ def rubbed(tmp_path_factory):
 def test_exact_a_rubbing_rig_is_found_from_its_own_rows(tmp_path, rubbed):
     found = fitted(scene_of(tmp_path, RUBS), table(tmp_path, rubbed), free(*RUBS_FREE))
     assert found.fit.values == pytest.approx([0.45, 2.4e6], rel=1e-5)
-    assert any("steady motions are fitted" in text for text in found.warnings)
+    assert any("steady motions are computed" in text for text in found.warnings)
 
 
 @pytest.mark.slow
@@ -255,8 +255,8 @@ def test_a_motion_without_a_bound_counts_as_a_thousand(tmp_path, wanted):
 
 
 @pytest.mark.parametrize("sets, wanted, match", [
-    (["drive.waveform=step"], LINEAR_FREE, "one sine of the base"),
-    ([], ("drive.cycles=10..20",), "the drive is given by the rows"),
+    (["drive.waveform=step"], LINEAR_FREE, "under a sine of the base"),
+    ([], ("drive.cycles=10..20",), "the rows of the file give the drive"),
     ([], (*LINEAR_FREE, "structure.moving_mass=1 kg..2 kg"), "too few to determine 3 values")])
 def test_refuses_what_rows_do_not_speak_of(tmp_path, sets, wanted, match):
     path = table(tmp_path, [(143.0, 20.0, 30.0, "", ""), (150.0, 20.0, 30.0, "", ""),
@@ -350,10 +350,10 @@ def test_placebos_are_whole_fits_of_their_own(tmp_path):
 @pytest.mark.parametrize("words, said", [
     (["--offset", "force"], "belongs to a loop"), (["--starts", "0"], "at least one"),
     (["--placebo", "friction.static"], "table.key=value,value"), (["--leave-out", "displacement"], "no column"),
-    (["--placebo", "structure.mode.axial.damping=0.01,0.2"], "this key is free"),
-    (["--placebo", "drive.frequency=140 Hz"], "the drive is given by the rows"),
+    (["--placebo", "structure.mode.axial.damping=0.01,0.2"], "already fits this key"),
+    (["--placebo", "drive.frequency=140 Hz"], "the rows of the file give the drive"),
     (["--placebo", "structure.mode.axial.slide=1,x"], "a plain number is needed"),
-    (["--leave-out", "input"], "no rows would be left"), (["--unstable", "maybe"], "unstable")])
+    (["--leave-out", "input"], "no rows remain"), (["--unstable", "maybe"], "unstable")])
 def test_refuses_options_that_rows_do_not_have(tmp_path, words, said):
     given = ["fit", str(scene_of(tmp_path, LINEAR).path), "--to", str(table(tmp_path, linear_rows())), "--free",
              *LINEAR_FREE, "-o", str(tmp_path / "out"), *words]

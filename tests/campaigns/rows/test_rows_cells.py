@@ -62,15 +62,15 @@ def test_held_rows_are_named_by_frequency_input_flag_or_run(tmp_path):
 
 
 @pytest.mark.parametrize("text, wanted", [
-    ("frequency=150", "unit"), ("frequency=151 Hz", "it has 143 Hz"), ("frequency", "column=value"),
+    ("frequency=150", "unit"), ("frequency=151 Hz", "this column are 143 Hz"), ("frequency", "write column=value"),
     ("displacement=1 mil", "no column displacement"), ("input=4 Hz", "--hold input=4 Hz")])
 def test_refuses_rows_to_hold_that_are_not_there(tmp_path, text, wanted):
     with pytest.raises(PatchfemError, match=wanted):
         cells_of(table(tmp_path, "143,4,5.0,0.1,")).chosen(text)
 
 
-@pytest.mark.parametrize("row, wanted", [("143,4,0,,", "acceleration of 0"), ("143,0,1,,", "above zero"),
-                                         ("143,4,,,*", "nothing to fit")])
+@pytest.mark.parametrize("row, wanted", [("143,4,0,,", "acceleration is 0"), ("143,0,1,,", "above zero"),
+                                         ("143,4,,,*", "nothing can be fitted")])
 def test_refuses_rows_that_have_no_ratio(tmp_path, row, wanted):
     with pytest.raises(PatchfemError, match=wanted):
         cells_of(table(tmp_path, row))

@@ -72,11 +72,11 @@ def test_always_says_what_a_worker_has_otherwise():
     here = Cluster.__new__(Cluster)
     here.name, mine = "--executor dask:tcp://x:1", own_of(work(Path("a.toml")))
     said = str(here._other(mine | {"patchfem": "0.3.0 (sources 12345678)", "files": "other"}, mine))
-    assert "a worker has patchfem 0.3.0 (sources 12345678), this machine has patchfem " + mine["patchfem"] in said
+    assert "a worker has patchfem 0.3.0 (sources 12345678), but this machine has patchfem " + mine["patchfem"] in said
     assert "numpy" not in said and "files" not in said
     assert "numpy 1.0" in str(here._other(mine | {"numpy": "1.0"}, mine))
-    assert "different files" in str(here._other(mine | {"files": "other"}, mine))
-    assert "no patchfem" in str(here._other(AttributeError("no own_of"), mine))
+    assert "differ between a worker" in str(here._other(mine | {"files": "other"}, mine))
+    assert "is not installed on a worker" in str(here._other(AttributeError("no own_of"), mine))
     with pytest.raises(Missing, match="the connection to the scheduler is lost"):
         here._died(Worn("cancelled"))
     assert "OSError: no" in here._died(Worn("error", OSError("no")))[1].reason
@@ -95,7 +95,7 @@ def test_refuses_a_worker_of_another_version(monkeypatch):
     """Workers that are there at once are asked before anything is sent, one that comes later with its first chunk."""
     import distributed
 
-    said = r"a worker has patchfem 0.\d, this machine has patchfem 0.\d: install the same version on both"
+    said = r"a worker has patchfem 0.\d, but this machine has patchfem 0.\d; install the same version on all"
     with distributed.LocalCluster(1, processes=False, protocol="tcp", host="127.0.0.1", dashboard_address=None,
                                   silence_logs="CRITICAL") as one:
         ready, left = Cluster(one.scheduler.address), [[0], [1]]

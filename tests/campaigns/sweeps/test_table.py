@@ -30,12 +30,12 @@ def test_exact_items_stand_in_the_header_as_they_are_printed(tmp_path):
 
 @pytest.mark.parametrize("text, says", [
     ("contact.load [lb]\n1\n2\n", ["cases.csv:2: contact.load: 'lb' is ambiguous", "cases.csv:3: contact.load"]),
-    ("contact.load [N],friction.static\n1 N,0.3\n2,a\n", ["cases.csv:2: contact.load: '1 N' is not a number",
+    ("contact.load [N],friction.static\n1 N,0.3\n2,a\n", ["cases.csv:2: contact.load: '1 N' must be a number",
                                                         "cases.csv:3: friction.static: a plain number"]),
     ("contact.lod [N]\n1\n2\n", ["cases.csv:1: contact.lod: not a key of a scene; did you mean 'load'"]),
-    ("contact.load [N],contact.load\n1,2 N\n", ["cases.csv:1: contact.load: is given twice"]),
-    ("contact.load [N]\n1,2\n", ["cases.csv:2: 1 cells are needed, not 2"]),
-    ("contact.load [N]\n", ["a header like"]),
+    ("contact.load [N],contact.load\n1,2 N\n", ["cases.csv:1: contact.load: two columns have this key"]),
+    ("contact.load [N]\n1,2\n", ["cases.csv:2: the line must have 1 cells, as the header has, not 2"]),
+    ("contact.load [N]\n", ["a header such as"]),
 ])
 def test_refuses_each_mistake_with_its_line(tmp_path, text, says):
     cases, wrong = read(written(tmp_path, text))

@@ -191,4 +191,4 @@ steps_per_cycle = 100
         force = np.interp(time, found.response.time, found.response.force)
         np.testing.assert_allclose(tau[1:] @ area, force[1:], rtol=1e-6, atol=1e-6 * 115.65)
         assert np.isfinite(found.fields["slip"]).all() and found.measures["energy_balance"].value < 1e-10
-        assert any("rise together" in note for note in found.extra["notes"])
+        assert any("are the same for all points" in note for note in found.extra["notes"])

@@ -298,7 +298,7 @@ def test_refuses_what_cannot_be_balanced():
         Group(modes, (2, Spring(1.0)))
     with pytest.raises(PatchfemError, match="on at least one interface"):
         Group(modes, [])
-    with pytest.raises(PatchfemError, match="stiffnesses > 0"):
+    with pytest.raises(PatchfemError, match="finite stiffness > 0"):
         Jenkins([1.0, -1.0], [1.0, 1.0])
     with pytest.raises(PatchfemError, match="no mode moves"):
         Balance(modes, np.zeros((1, 1)), None)

@@ -66,7 +66,7 @@ def test_exact_a_pitchfork_is_a_crossing():
 
 
 def test_refuses_a_start_off_every_branch():
-    with pytest.raises(NotConverged, match="no first motion"):
+    with pytest.raises(NotConverged, match="the first point of the curve"):
         follow(lambda x, p: (x**2 + 1 + p**2, np.diag(2 * x), np.array([2 * p])), [0.3], 0.5, (0.0, 1.0))
 
 
@@ -386,7 +386,7 @@ def test_exact_backbone_is_where_the_response_is_in_quadrature():
 
 
 def test_refuses_amplitudes_that_fall():
-    with pytest.raises(PatchfemError, match="rise"):
+    with pytest.raises(PatchfemError, match="in rising order"):
         backbone(RIG, Spring(1.0), np.array([2.0, 1.0]))
     with pytest.raises(PatchfemError, match="mode 3"):
         backbone(RIG, Spring(1.0), np.array([2.0]), mode=3)

@@ -138,7 +138,7 @@ def test_exact_an_undamped_mode_at_resonance_is_bounded_by_enough_friction(limit
     """The threshold pi/4 of the notes: below it no motion balances, and the reason is named."""
     modes, law = sdof(0.0), Jenkins([20.0], [limit / 20.0])
     if not bounded:
-        with pytest.raises(NotConverged, match="undamped mode driven at its natural frequency"):
+        with pytest.raises(NotConverged, match="undamped mode that is driven at its natural frequency"):
             point(modes, DRIVE, law)
         return
     p = point(modes, DRIVE, law, tolerance=1e-4)
@@ -152,5 +152,5 @@ def test_exact_an_undamped_mode_at_resonance_is_bounded_by_enough_friction(limit
 
 def test_refuses_a_tolerance_that_no_ladder_reaches():
     """A nearly rigid element at resonance: 255 harmonics are not enough for 1e-9, and it is said."""
-    with pytest.raises(NotConverged, match="harmonics leave an error"):
+    with pytest.raises(NotConverged, match="the motion still has an error"):
         point(sdof(0.05), BaseSine(1.0, 0.7), [Spring(0.1), Jenkins([1.0], [0.1])], tolerance=1e-12)

@@ -252,7 +252,7 @@ def test_hard_a_step_whose_place_and_pressure_disagree_is_booked():
     coarse, fine = (march(one_mode(OMEGA, 0.01, 1.0), drive, points_model(Bonds(0.4, 2e-6), area, sigma,
                                                                           pattern=(x, sigma)), 2, steps, window=2)
                     for steps in (12, 100))
-    assert coarse.outcome is Outcome.NOT_CONVERGED and "steps did not reach the required force" in coarse.message
+    assert coarse.outcome is Outcome.NOT_CONVERGED and "time steps have an error of the friction" in coarse.message
     assert fine.outcome is None and fine.message == ""
 
 

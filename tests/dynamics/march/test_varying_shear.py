@@ -172,7 +172,7 @@ def test_refuses_shear_beside_a_set_valued_law():
             varying_load.model_of(modes([100.0], [1.0], [1.0], [0.0]), LAWS[other], crowned(),
                                 shear=reduced(crowned(), law, 4))
     few = shear_modes(giving(crowned().x), 0.3 * crowned().reference.forces(0.0, 0.0), 1e-6, 4)
-    with pytest.raises(PatchfemError, match="span every node"):
+    with pytest.raises(PatchfemError, match="include every node"):
         varying_load.model_of(modes([100.0], [1.0], [1.0], [0.0]), law, crowned(), shear=few)
 
 

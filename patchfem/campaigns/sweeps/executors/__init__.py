@@ -29,12 +29,13 @@ def of(name: str = "", jobs: int = 1):
     PatchfemError for another name or less than one process, Missing where Dask is not there.
     """
     if jobs < 1:
-        raise PatchfemError(f"-j {jobs}: at least one process is needed")
+        raise PatchfemError(f"-j {jobs}: the number of processes must be at least 1")
     kind, _, address = name.partition(":")
     if kind == "dask":
         return cluster.Cluster(address, jobs if jobs > 1 else 0)
     if name:
-        raise PatchfemError(f"--executor {name}: unknown; use dask or dask:ADDRESS, or -j N without --executor")
+        raise PatchfemError(f"--executor {name}: not possible; use --executor dask, --executor dask:ADDRESS, or -j N "
+                            "without --executor")
     if jobs == 1:
         return Here()
     return pool.Pool(jobs)

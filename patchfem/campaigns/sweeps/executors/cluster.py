@@ -48,7 +48,8 @@ class Cluster:
             one.setLevel(CRITICAL)  # what they have to say is said here
         tls = distributed.Security().get_connection_args("client")["ssl_context"] is not None
         if address.startswith("tls:") and not tls:
-            raise PatchfemError(f"{self.name}: TLS needs certificates; give their files in {CERTIFICATES}")
+            raise PatchfemError(f"{self.name}: TLS needs certificates; give the paths of their files in the "
+                                f"environment variables {CERTIFICATES}")
         try:
             self.client = distributed.Client(self.own or address, timeout=PATIENCE, set_as_default=False)
         except (OSError, TimeoutError, ValueError) as error:
@@ -96,14 +97,14 @@ class Cluster:
         """Why a worker cannot answer: what it said of itself, or how it failed to, beside what is wanted."""
         if isinstance(found, Exception):
             said = f"{type(found).__name__}: {found}"
-            return Missing(f"{self.name}: a worker has no patchfem {want['patchfem']} ({said})")
+            return Missing(f"{self.name}: patchfem {want['patchfem']} is not installed on a worker ({said})")
         names = [name for name in want if found[name] != want[name] and name != "files"]
         there, here = (", ".join(f"{name} {one[name]}" for name in names) for one in (found, want))
         if names:
-            return Missing(f"{self.name}: a worker has {there}, this machine has {here}: install the same version on "
-                           "both")
-        return Missing(f"{self.name}: a worker reads different files under the names in the scene; put the files where "
-                       "all machines read them")
+            return Missing(f"{self.name}: a worker has {there}, but this machine has {here}; install the same version "
+                           "on all machines")
+        return Missing(f"{self.name}: the files named in the scene differ between a worker and this machine; put the "
+                       "files where all machines can read them")
 
     def _died(self, future) -> tuple:
         """(0 s, Died) of a chunk whose worker died or failed; Missing where the scheduler did."""

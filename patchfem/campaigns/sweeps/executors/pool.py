@@ -67,7 +67,7 @@ class Worker:
         try:
             seconds, found = self.pipe.recv()
         except (EOFError, OSError):
-            seconds, found = 0.0, Died(f"the process of this case died ({_how(self.process.wait())})")
+            seconds, found = 0.0, Died(f"the process that ran this case died ({_how(self.process.wait())})")
         chunk, self.chunk = self.chunk, None
         return chunk, seconds, found
 
@@ -142,5 +142,5 @@ def _started(work: Work, silent: bool) -> Worker:
 
 def _how(status: int) -> str:
     if status == -9:
-        return "killed, by hand or for lack of memory"
+        return "killed by a user, or for lack of memory"
     return f"signal {-status}" if status < 0 else f"exit code {status}"
