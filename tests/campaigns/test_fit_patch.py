@@ -142,6 +142,7 @@ def test_refuses_words_that_do_not_stand_together():
     for given, said in (({}, "from_patch alone"), ({"from_patch": True, "to": "a.csv"}, "from_patch alone"),
                         ({"from_patch": True, "amplitudes": "1 um,2 um"}, "at least three"),
                         ({"from_patch": True, "amplitudes": "1 s..2 s:4"}, "amplitudes"),
-                        ({"amplitudes": "1 um..2 um:4"}, "applies only to"), ({"from_patch": True, "hold": "a=1"}, "hold")):
+                        ({"amplitudes": "1 um..2 um:4"}, "applies only to"),
+                        ({"from_patch": True, "hold": "a=1"}, "hold")):
         with pytest.raises(pf.PatchfemError, match=said):
             pf.fit(JOINT + SLIDE, **given)
