@@ -49,8 +49,8 @@ def detected(time, slips, slides, period: float, held: float = 0.0, borders=()) 
     rows = [(at, 0, BORDER, np.nan) for at in borders if time[0] < at < time[-1]]
     for number in range(slips.shape[1]):
         rows += _one(time, slips[:, number], slides[:, number], period, held, number + 1)
-    return table(rows, source="detected in the samples of the last cycles: slip speed falls below or rises above 1e-2 "
-                              "of its peak in the cycle")
+    return table(rows, source="stick and slip are detected in the samples of the last cycles: the interface sticks "
+                              "while the slip speed is below 1e-2 of the peak slip speed of the cycle")
 
 
 def states(time, slip, period: float, held: float = 0.0) -> tuple:

@@ -47,8 +47,8 @@ def past_onset(kind: str, length: float | None = None) -> Callable[[Level], bool
 
 def no_onset(kind: str, length: float | None = None) -> str:
     """The reason why a run of levels has no onset; arguments as in `past_onset`."""
-    what = {"slip": "slips", "gauge": f"moves the output by more than {say(length)}" if length else ""}.get(
-        kind, f"distorts the acceleration (third over first harmonic) by more than {DISTORTED:g}")
+    what = {"slip": "slips", "gauge": f"has an amplitude at the output above {say(length)}" if length else ""}.get(
+        kind, f"has an acceleration whose third harmonic is more than {DISTORTED:g} of its first harmonic")
     return f"no rising level {what}"
 
 

@@ -174,8 +174,8 @@ def changing_note(outcome: Outcome, drive) -> list:
     """The sentence, in a list, on measures under a drive that changes to the end; an empty list for other drives."""
     if outcome is not Outcome.TRANSIENT or drive.segments or hasattr(drive, "beat"):
         return []
-    return ["the drive changes until the end, so the motion does not settle: the measures are those of the last "
-            "cycles; the whole motion is in result.nc"]
+    return ["the drive changes until the end of the run, so the motion cannot become steady; the measures are those of "
+            "the last cycles, and result.nc contains the whole motion"]
 
 
 def steady_of(drive, amplitudes, phasors) -> tuple:

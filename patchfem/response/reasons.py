@@ -16,9 +16,9 @@ IN_PLANE = "the interface slides in a plane, and this belongs to one direction"
 CYCLIC = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", *ACCELERATIONS)
 HOLDS = "the whole interface sticks throughout the last cycles"
 UNBOUNDED = "no bounded motion exists at this drive"
-STILL = "the output does not move: the first harmonic of its acceleration is 0 within the computable accuracy"
-UNCLOSED = ("the friction loop does not close: in the last cycles the stored energy changes by more than the "
-            "dissipated energy; energy_dissipated is that of the whole run")
+STILL = "the output does not move: the first harmonic of its acceleration is 0 within the accuracy of the computation"
+UNCLOSED = ("the friction loop does not close: during the last cycles the stored energy changes by more than friction "
+            "dissipates; the energy dissipated in the whole run is given by energy_dissipated")
 
 
 def without_value(values, window, drive, rubs: bool, beside: float = 0.0) -> dict:
@@ -31,7 +31,7 @@ def without_value(values, window, drive, rubs: bool, beside: float = 0.0) -> dic
                if rubs or name in ACCELERATIONS}
     if hasattr(drive, "band"):
         lacking |= dict.fromkeys(("response_frequency", "response_damping"),
-                                 "H1 has no peak within the band of the drive")
+                                 "the frequency response (H1) has no peak within the frequency band of the drive")
     if rubs:
         lacking["slip_start_phase"] = _of_phase(values, drive)
     return {name: Measure(None, TABLE[name].unit, None, TABLE[name].floor, reason=reason)
@@ -68,16 +68,16 @@ def unclosed(values, window, drive) -> dict:
 
 def _of_phase(values, drive) -> str:
     if not sinusoidal(drive):
-        return "the drive does not end as a sine, so slip has no phase"
+        return "the drive is not a sine at the end, so the start of slip has no phase"
     stuck = getattr(values.get("stick_fraction"), "value", values.get("stick_fraction"))
     if stuck == 1.0:
         return f"{HOLDS}, so no slip starts"
-    return "the interface never sticks in the last cycles, so no slip follows a stick"
+    return "the interface never sticks in the last cycles, so slip never starts after stick"
 
 
 def _of_cycles(name: str, values, window, drive, beside: float) -> str:
     if not sinusoidal(drive):
-        return "this needs a drive that ends as a sine"
+        return "this measure exists only for a drive that is a sine at the end"
     if not whole(window.time[-1] - window.time[0], drive):
         return "the run contains no whole cycle of the drive"
     if name in ACCELERATIONS and ACCELERATIONS[0] in values:
@@ -87,8 +87,8 @@ def _of_cycles(name: str, values, window, drive, beside: float) -> str:
     if lateral(window, "slides") is not None:
         return IN_PLANE
     if "equivalent_stiffness" not in values:
-        return f"{HOLDS}, so its loop has no width"
+        return f"{HOLDS}, so the slide does not change and the loop has no width"
     if name == "equivalent_damping":
-        return f"it is the damping ratio of mode 1, but another mode carries {plain(100 * beside, 2)} % of the slide" \
+        return f"this measure is that of mode 1, but another mode contributes {plain(100 * beside, 2)} % of the slide" \
             if beside > SHARED else "mode 1 is a rigid-body mode, or does not move the interface"
-    return "in none of the last cycles is the force known just before and just after the largest slide"
+    return "none of the last cycles contains samples of the force both just before and just after the largest slide"

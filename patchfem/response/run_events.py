@@ -13,7 +13,7 @@ OF_LOG = {0: STOP, 1: RELEASE_UP, -1: RELEASE_UP + 1, 2: REVERSAL_UP, -2: REVERS
 LEAST = -min(OF_LOG)
 KINDS = np.full(LEAST + max(OF_LOG) + 1, np.nan)  # by the number of an event in a log
 KINDS[np.array(list(OF_LOG)) + LEAST] = list(OF_LOG.values())
-SOURCE = "located by the event engine"
+SOURCE = "the times of stick and slip are those of the exact solution"
 
 
 def slips_of(response) -> tuple:

@@ -120,7 +120,7 @@ def reading(window, drive, peak: float, kind: str = "peak", cutoff: float | None
     if kind == "fundamental":
         return abs(_harmonic(window, drive, 1))
     if kind != "lowpass":
-        raise ValueError(f"reading '{kind}' is not one of {', '.join(READINGS)}")
+        raise ValueError(f"reading '{kind}' is not possible; use one of {', '.join(READINGS)}")
     n = np.arange(1, HARMONICS + 1)
     s = 1j * n * drive.omega / (2 * np.pi * cutoff)
     passed = np.array([_harmonic(window, drive, k) for k in n]) / (1 + np.sqrt(2) * s + s**2)

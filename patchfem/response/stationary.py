@@ -74,8 +74,8 @@ def short(found: dict, window) -> list:
     span, decay = float(window.time[-1] - window.time[0]), 1 / (2 * np.pi * at * zeta)
     if span >= ENOUGH * decay:
         return []
-    return [f"the record lasts {span / decay:.2g} decay times of the mode at {at:.4g} Hz, so the scatter is itself "
-            f"uncertain; drive.duration = '{1.5 * ENOUGH * decay:.2g} s' is enough"]
+    return [f"the response lasts only {span / decay:.2g} decay times of the mode at {at:.4g} Hz, too short for a "
+            f"reliable scatter between random drives; set drive.duration = '{1.5 * ENOUGH * decay:.2g} s'"]
 
 
 def rms(time, values) -> float:

@@ -24,8 +24,8 @@ ROW = 400.0  # per row of a recorded drive
 MAPPED, CODE = 60e6, 150e6  # of address space beside what is used: packages, and the compiler's library
 CODE_PART = "compiled code"
 CURES = {"contact.element_size": "make contact.element_size larger", "contact.mesh": "give contact.mesh fewer nodes on "
-         "its interface", "accuracy.tail": "loosen accuracy.tail or accuracy.merge", "structure": "give fewer modes",
-         "slide.file": "thin out the rows of slide.file", "drive.file": "thin out the rows of drive.file"}
+         "the interface", "accuracy.tail": "raise accuracy.tail or accuracy.merge", "structure": "give fewer modes",
+         "slide.file": "give fewer rows in slide.file", "drive.file": "give fewer rows in drive.file"}
 
 
 class EngineCode(NamedTuple):
@@ -233,10 +233,10 @@ def refusal(parts: tuple, free: float | None = None) -> str:
     if total <= free:
         return ""
     most = next((part for part in parts if part.key), None)
-    text = f"about {total / 1e9:.3g} GB are needed, {max(free, 0.0) / 1e9:.2g} GB are free"
+    text = f"about {total / 1e9:.3g} GB of memory are needed, but only {max(free, 0.0) / 1e9:.2g} GB are free"
     if most is None or most.bytes < 0.1 * total:
-        return f"{text}; give the process more memory"
-    return f"{text}; {most.bytes / 1e9:.3g} GB of it are for {most.what}: {CURES.get(most.key, f'lower {most.key}')}"
+        return f"{text}; free some memory, or run on a machine with more memory"
+    return f"{text}; {most.bytes / 1e9:.3g} GB of these are for {most.what}: {CURES.get(most.key, f'lower {most.key}')}"
 
 
 def refuse(parts: tuple) -> None:

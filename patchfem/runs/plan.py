@@ -24,12 +24,12 @@ from .wear import plan as of_wear
 
 LONGEST = 1e6  # seconds of a run, twelve days, beyond which none is begun
 GROUPS = {  # group -> (what it is, SI unit of its value)
-    "D": ("D: friction limit over the largest force of the drive", "1"),
-    "knee": ("acceleration beyond which friction alone does not limit the amplitude at resonance", "m s-2"),
-    "drive_amplitude_over_bond_length": ("amplitude of the drive over the bond length", "1"),
-    "amplitude_over_bond_length": ("amplitude of the slide over the bond length", "1"),
-    "slip_length": ("elastic slide of the pieces before the patch slips", "m"),
-    "tilt_over_first_opening": ("tilt over the tilt at which an edge lifts off", "1"),
+    "D": ("D: friction limit divided by the largest force of the drive", "1"),
+    "knee": ("acceleration of the drive above which friction alone does not limit the amplitude at resonance", "m s-2"),
+    "drive_amplitude_over_bond_length": ("displacement amplitude of the drive divided by the bond length", "1"),
+    "amplitude_over_bond_length": ("amplitude of the slide divided by the bond length", "1"),
+    "slip_length": ("elastic slide of the pieces before the whole patch slips", "m"),
+    "tilt_over_first_opening": ("tilt divided by the tilt at which an edge starts to lift off", "1"),
     "share_of_the_spread": ("factor of eq. 2.15 for the spread across the width", "1"),
 }
 
@@ -82,7 +82,7 @@ class Plan:
 
 def compile_words(seconds: float) -> str:
     """The words on what compiles, "" where nothing does."""
-    return f" (+ {seconds:.0f} s once, to compile)" if seconds else ""
+    return f" (and {seconds:.0f} s once for compiling)" if seconds else ""
 
 
 def plan(asked, per_point: bool = False) -> Plan:
@@ -164,11 +164,11 @@ def _verdict(model: Model, groups: dict, parts: tuple, said: list) -> list:
     if "slip_length" in groups:
         about = f"by {say(groups['slip_length'], 3)} or more before the whole patch slips"
         out.append(f"the pieces shear elastically {about}" if model.patch.shear else
-                   f"the pieces are rigid in shear in this scene; elastic pieces would shear {about}: add "
-                   "[contact.shear] to include this")
+                   f"the pieces are rigid in shear in this scene; elastic pieces would shear {about}; add "
+                   "[contact.shear] to include this shear")
     if model.kind == "rig" and model.soft and model.rig.load_varies:
-        out.append(f"{model.soft}is computed with the tangential modes of all nodes, because the load changes with the "
-                   "motion; a run with half as many modes gives the error")
+        out.append(f"the normal load changes with the motion, so {model.soft} is computed with the tangential modes of "
+                   "all nodes; a second run with half as many modes gives the error")
     return out
 
 
@@ -179,8 +179,8 @@ def refuse_size(what: Plan) -> None:
         pinned = what.model.accuracy.steps_per_cycle is not None
         key = "accuracy.steps_per_cycle or " if pinned else ""
         key += "slide.cycles" if what.kind == "bench" else "drive.cycles" if what.model.rig is not None else ""
-        raise Missing(f"the run would take about {what.seconds:.2g} s ({what.steps:.2g} steps), more than "
-                      f"{LONGEST:.0e} s; lower {key or 'the number of elements'}", "")
+        raise Missing(f"the run would need a computing time of about {what.seconds:.2g} s ({what.steps:.2g} time "
+                      f"steps), more than the limit of {LONGEST:.0e} s; lower {key or 'the number of elements'}", "")
 
 
 def _link(model: Model) -> dict:
@@ -216,6 +216,6 @@ def _groove_words(model: Model) -> list:
     if model.grooves is None or not load > 0:
         return []
     g, mu = model.grooves, model.friction.static
-    return [f"the grooves act as a spring N k^2 A = {g.stiffness(load):.4g} N/m at their bottom and resist up to "
-            f"{g.capacity(load, mu):.4g} N on their steepest flank, while friction alone resists mu N = "
-            f"{mu * load:.4g} N"]
+    return [f"at their bottom the grooves act as a spring of stiffness N k^2 A = {g.stiffness(load):.4g} N/m; on their "
+            f"steepest flank the contact resists a force of up to {g.capacity(load, mu):.4g} N; without grooves "
+            f"friction would resist up to mu N = {mu * load:.4g} N"]

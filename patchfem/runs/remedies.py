@@ -22,7 +22,7 @@ SIZE = "contact.element_size"  # an even mesh finds the ends of a contact at fir
 OF_PEAK = ("pressure_peak", "loaded_fraction")
 OF_SAMPLES = ("stick_fraction", "slip_start_phase")  # of a cycle of a balance, however many harmonics it has
 RINGS = "ring_"  # measures of a ring beside the motion, which an engine without steps need not have
-READ = "no known setting improves this value; use it with its stated error"
+READ = "no known setting makes this value more accurate; use the value with its stated error"
 # what a run answers first, named before what misses its tolerance by more
 FIRST = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "friction_ratio_peak",
          "pressure_peak", "contact_fraction")
@@ -76,7 +76,7 @@ def _said(seen, wide: dict, remedy: str) -> str:
     tolerance, names = seen.model.accuracy.tolerance, _first(seen, wide)
     known, left = [_known(seen.measures[name]) for name in names], len(wide) - len(names)
     more = "".join(f", {name} of {one}" for name, one in zip(names[1:], known[1:], strict=True))
-    others = f" ({left} other measure{'s exceed' if left > 1 else ' exceeds'} it too)" if left else ""
+    others = f" ({left} other measure{'s' * (left > 1)} also exceed{'s' * (left < 2)} the tolerance)" if left else ""
     return f"{names[0]} has an estimated error of {known[0]}{more}; the tolerance is {tolerance:g}{others}; {remedy}"
 
 
@@ -94,29 +94,30 @@ def _finer_mesh(seen, wide: dict, coarse) -> str:
     times = max(wide.values())
     peak = seen.measures.get("pressure_peak")
     if "worn_depth_max" in _first(seen, wide) and peak is not None and peak.value is None:
-        return ("the wear is deepest where the pressure is unbounded, so a finer mesh may not help; use it with its "
-                "stated error")
+        return ("the wear is deepest where the pressure is unbounded, so a finer mesh may not help; use the value with "
+                "its stated error")
     if times >= MOST:
         return READ  # it is 0
     if asked.mesh is not None:
         return "split the elements of contact.mesh"
-    nodes, wider = seen.patch.x.size, f"accuracy.tolerance = {_up(tolerance * times):g} would be met"
+    nodes, wider = seen.patch.x.size, f"the results would meet accuracy.tolerance = {_up(tolerance * times):g}"
     if asked.strips is not None and asked.strips[0] > 1:
-        return (f"the mesh ({nodes} interface nodes) and the number of strips both cause this; "
+        return (f"the mesh ({nodes} interface nodes) and the number of strips cause this error; "
                 f"{_more_strips(asked, wide)}")
     if not asked.chosen:
         return f"leave out {SIZE}"
     if not wide.keys() - set(patch_rows.DECISIVE):
         return f"a mesh finer than {nodes} interface nodes would take too long; {wider}"
     if asked.chosen and _locks(seen, wide):
-        return "every mesh has this error in plane strain at this Poisson's ratio; use the value with its stated error"
+        return ("with this Poisson's ratio in plane strain every mesh has this error; use the value with its stated "
+                "error")
     tighter = _climbing(seen, coarse)
     if tighter is None:
         finer = f"points closer than {say(seen.patch.averaging, 3)}" if seen.patch.averaging and \
             seen.patch.sharper else f"a mesh finer than {nodes} interface nodes"
         return (f"{finer} would take too long; use "
                 f"{'these values with their stated errors' if len(wide) > 1 else 'this value with its stated error'}")
-    return (f"the mesh ({nodes} interface nodes) was not refined for this quantity; set accuracy.tolerance = "
+    return (f"the mesh ({nodes} interface nodes) was not refined for this measure; set accuracy.tolerance = "
             f"{tighter:.3g} for a finer mesh")
 
 
@@ -235,12 +236,13 @@ def _unproven(model, steps: int, name: str, wide: dict) -> str:
 
     Steps that are left out are doubled until the displacement is met.
     """
-    seen = f"the change of {name} did not fall from {steps // 4} to {steps} steps per cycle"
+    seen = (f"the steps per cycle were doubled twice, up to {steps}, and the second doubling changed {name} no less "
+            "than the first")
     if exact := _stepless(model):
         return f"{seen}, so more steps may not help; {exact}"
     if model.kind == "rig" and model.accuracy.steps_per_cycle is not None and 2 * steps <= costs.MOST_STEPS and \
             "relative_displacement_amplitude" in wide:
-        return (f"{seen}; leave out accuracy.steps_per_cycle, so that patchfem doubles the steps until the "
+        return (f"{seen}; leave out accuracy.steps_per_cycle, so that patchfem doubles the number of steps until the "
                 "displacement meets the tolerance")
     return f"{seen}, so more steps may not help; use the value with its stated error"
 
@@ -251,17 +253,18 @@ def _finer_under(seen, coarse) -> str:
         (_of_face(seen, face), face.patches[1:]) for face in faces.faces_of(seen.model) if face.soft]
     asked, nodes = [one.model.patch for one, _ in every], max(one.patch.x.size for one, _ in every)
     if any(one.mesh is not None for one in asked):
-        return faces.in_scene(seen.model, "the mesh causes this; split the elements of contact.mesh")
+        return faces.in_scene(seen.model, "the mesh causes this error; split the elements of contact.mesh")
     if not all(one.chosen for one in asked):
-        return faces.in_scene(seen.model, f"the mesh causes this; leave out {SIZE}")
+        return faces.in_scene(seen.model, f"the mesh causes this error; leave out {SIZE}")
     tighter = min((found for one in every if (found := _climbing(*one)) is not None), default=None)
     if tighter is None:
         seconds, most = max(ladder.next_seconds(one.patch) for one, _ in every), ladder.SPENT[False]
-        why = f"no accuracy.tolerance chooses a finer mesh, whose pieces would take about {plain(seconds, 2)} CPU s: " \
-            f"for a patch that moves at most {most:g} CPU s are spent on them" if seconds > most else \
-            "no accuracy.tolerance chooses a finer mesh"
-        return f"the mesh ({nodes} interface nodes) causes this, and {why}; use the value with its stated error"
-    return f"the mesh ({nodes} interface nodes) causes this; set accuracy.tolerance = {tighter:.3g} for a finer mesh"
+        why = f"no accuracy.tolerance leads to a finer mesh: the next one would take about {plain(seconds, 2)} CPU s, " \
+            f"and a run with motion spends at most {most:g} CPU s on its mesh" if seconds > most else \
+            "no accuracy.tolerance leads to a finer mesh"
+        return f"the mesh ({nodes} interface nodes) causes this error, and {why}; use the value with its stated error"
+    return (f"the mesh ({nodes} interface nodes) causes this error; set accuracy.tolerance = {tighter:.3g} for a "
+            "finer mesh")
 
 
 def _stepless(model) -> str:

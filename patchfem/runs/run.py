@@ -29,7 +29,7 @@ __all__ = ["KeptState", "Plan", "Result", "plan", "run"]
 KINDS = {"patch": "patch.result static", "bench": "bench.result prescribed", "rig": "rig.rig coupled",
          "linear": "rig.rig coupled"}
 
-AT_REST = "the measures are those of the pressed patch at rest; the motion was not found"
+AT_REST = "no motion was found; the measures are those of the pressed patch at rest"
 
 
 class KeptState(NamedTuple):
@@ -71,7 +71,8 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
         warnings += [*patch_result.strained(model.patch, patch), *patch.notes]
         if estimate and coarse[0] is None:
             fewer = "split the elements of contact.mesh" if model.patch.mesh else "leave out contact.element_size"
-            warnings.append(f"no error is estimated on {patch.x.size - 1} elements along the interface; {fewer}")
+            warnings.append(f"the {patch.x.size - 1} elements along the interface are too few for an estimate of the "
+                            f"error; {fewer}")
         notes += patch_result.left_out(model, patch, coarse)
     if model.faced:
         if fresh:
@@ -141,7 +142,7 @@ def _keeping(kept: KeptState | None, what: Plan, patch):
         return kept.path.parent / f"march_{number}.npz"
 
     if kept.resume and model.wear is None and not path(1).is_file():
-        raise PatchfemError(f"{kept.path.parent.name}: no interrupted run is saved there; run without --resume")
+        raise PatchfemError(f"{kept.path.parent.name}: this folder contains no interrupted run; run without --resume")
     return resume.keeping(resume.Keeper(path, state_key(model, patch, kept.version), kept.resume))
 
 

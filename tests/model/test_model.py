@@ -183,7 +183,7 @@ STILL = STRUCTURE.replace("slide = 1.0", "slide = 1.0\nbase = 0.0")
 
 @pytest.mark.parametrize("text, key, line, says", [
     (STILL, "drive.kind", 'kind = "base"', "the drive excites no mode"),
-    (TINY, "", "", "GB are needed"),
+    (TINY, "", "", "GB of memory are needed"),
 ], ids=["a key of a run", "a size"])
 def test_refuses_with_file_and_line_once_whoever_asks(text, key, line, says):
     """The same sentence from the scene, its model and its plan; file and line of the key once, at the beginning."""

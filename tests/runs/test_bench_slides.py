@@ -298,7 +298,7 @@ def test_exact_the_printed_law_warns_where_bonds_break_before_they_ripen():
     fast = POINT + NONLOCAL + 'reading = "report"\n' + DWELL
     found = [run(plan(loads(fast, sets=sets)), estimate=False).warnings
              for sets in ([], ["friction.slip_growth=0.1 um"], ["friction.reading=stretch"])]
-    assert [any("of their length to form" in line for line in lines) for lines in found] == [True, False, False]
+    assert [any("of its length while it forms" in line for line in lines) for lines in found] == [True, False, False]
 
 
 @pytest.mark.parametrize("speed", ["1e-160 m/s", "1e-300 m/s"])

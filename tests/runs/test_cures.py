@@ -93,7 +93,7 @@ def test_always_steps_that_are_left_out_cure_what_few_steps_do_not_show():
     few, main = run(plan(loads(SHAKEN + FEW))), "relative_displacement_amplitude"
     said = [text for text in few.warnings if text.startswith(f"{main} has an estimated error of ")]
     assert len(said) == 1 and "absolute_acceleration_peak of " in said[0] and "loop_area of " in said[0]
-    assert "; leave out accuracy.steps_per_cycle, so that patchfem doubles the steps" in said[0]
+    assert "; leave out accuracy.steps_per_cycle, so that patchfem doubles the number of steps" in said[0]
     again = run(plan(loads(SHAKEN + FEW.replace("steps_per_cycle = 16\n", "")))).measures[main]
     assert again.error <= 1e-2 * again.value < few.measures[main].error
 
@@ -101,10 +101,10 @@ def test_always_steps_that_are_left_out_cure_what_few_steps_do_not_show():
 @pytest.mark.parametrize("wide, first", [
     ({"slip_start_phase": 0.5, "relative_displacement_amplitude": 0.08, "loop_area": 0.1},
      "relative_displacement_amplitude has an estimated error of 0.08 of its value, loop_area of 0.1 of its value; the "
-     "tolerance is 0.01 (1 other measure exceeds it too); set accuracy.steps_per_cycle = 64"),
+     "tolerance is 0.01 (1 other measure also exceeds the tolerance); set accuracy.steps_per_cycle = 64"),
     ({"slip_start_phase": 0.5, "stick_fraction": 0.1},
-     "slip_start_phase has an estimated error of 0.5 of its value; the tolerance is 0.01 (1 other measure exceeds it "
-     "too); set "
+     "slip_start_phase has an estimated error of 0.5 of its value; the tolerance is 0.01 (1 other measure also "
+     "exceeds the tolerance); set "
      "accuracy.steps_per_cycle = 128")])
 def test_exact_what_a_run_answers_first_is_named_first(wide, first):
     """Errors of 16 steps; that of second order falls by 16 at 64 steps, by 64 at 128."""
@@ -142,8 +142,8 @@ def test_exact_the_ringing_of_a_start_is_no_dissipation():
     loop = first.measures["loop_area"]
     assert first.outcome == "stuck" and abs(loop.value) > loop.floor / 100 and abs(loop.value) <= loop.error
     assert abs(first.measures["equivalent_damping"].value) <= first.measures["equivalent_damping"].error
-    told = [text for text in first.extra["notes"] if text.startswith("the free vibration from the start has not "
-                                                                     "decayed at 105")]
+    told = [text for text in first.extra["notes"] if text.startswith("the free vibration that began at the start has "
+                                                                     "not decayed at 105")]
     assert len(told) == 1
     cycles = re.search(r"drive.cycles = (\d+) to let", told[0])[1]
     assert any(f"drive.cycles = {cycles} to let" in text for text in first.warnings)

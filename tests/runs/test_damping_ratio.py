@@ -93,7 +93,7 @@ def test_exact_another_mode_that_slides_leaves_no_ratio():
     assert share > 0.05
     none = shared.measures["equivalent_damping"]
     assert none.value is None and none.reason == \
-        f"it is the damping ratio of mode 1, but another mode carries {100 * share:.2g} % of the slide"
+        f"this measure is that of mode 1, but another mode contributes {100 * share:.2g} % of the slide"
     assert alone.measures["equivalent_damping"].value == pytest.approx(ratio(alone), rel=2e-3)
 
 

@@ -141,7 +141,7 @@ def test_always_a_curve_over_frequency_passes_the_points_of_single_runs():
 
 
 def test_always_the_plan_says_how():
-    said = "the steady motion is found by a time integration whose start is corrected until the motion repeats"
+    said = "the steady motion is found by a time integration whose initial state is corrected until the motion repeats"
     assert said in pf.plan(scene("coulomb")).verdict
     assert "the steady motion is found by harmonic balance" in pf.plan(scene("elastic-plastic")).verdict
 

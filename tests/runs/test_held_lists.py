@@ -170,8 +170,8 @@ def test_always_the_list_of_levels_that_growing_bonds_just_hold_is_foreseen():
 
 def test_refuses_a_held_block_whose_list_the_plan_counts_too_long():
     scene = loads(RIG.format(reading="report", push=5.739).replace("cycles = 6", "cycles = 6000"))
-    assert "`run` will refuse this scene: the bond list would take about" in str(plan(scene))
-    with pytest.raises(Missing, match=r"the bond list .* would take about"):
+    assert "`run` will refuse this scene: the sum over the list of bonds would need" in str(plan(scene))
+    with pytest.raises(Missing, match=r"the list of bonds .* would need a computing time"):
         run(scene)
 
 

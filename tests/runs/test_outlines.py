@@ -241,7 +241,8 @@ def test_refuses_a_profile_shorter_than_the_interface_though_not_than_the_longer
 
 @pytest.mark.parametrize("more, planned, noted", [
     ("", "the stiffness is assembled by the stencil of a tensor grid", []),
-    (NARROW.format("upper"), "the stiffness is assembled by scikit-fem, as the shaped ends are not a tensor grid",
+    (NARROW.format("upper"), "the stiffness is assembled by scikit-fem, because the mesh of the "
+     "shaped ends is not a tensor grid",
      ["scikit-fem assembles the stiffness of the lower and the upper piece"])])
 def test_always_plan_and_result_say_what_assembles_the_pieces(more, planned, noted):
     scene = loads(BLOCK + 'element_size = "0.5 mm"\n' + more, "scene.toml")

@@ -132,7 +132,7 @@ def test_exact_a_level_of_a_patch_carries_the_error_of_its_mesh():
     assert all(1 / 4 < first.errors[name] / alone[name].error < 4 for name in first.values)
     a, b = (one.measures["onset_level"] for one in (coarse, fine))
     assert abs(a.value - b.value) <= a.error + b.error and a.error < 0.05 * a.value
-    assert any("onset_level: slip counts from an amplitude" in note for note in coarse.extra["notes"])
+    assert any("onset_level: slip counts only if its amplitude" in note for note in coarse.extra["notes"])
 
 
 def test_always_auto_takes_the_cheaper_engine():
@@ -154,12 +154,12 @@ def test_always_auto_takes_the_cheaper_engine():
 
 def test_always_the_plan_says_what_both_engines_cost():
     said = " ".join(pf.plan(pf.load(RIG)).verdict)
-    assert "1 element by engine piecewise: about" in said and "by time steps at this tolerance" in said
+    assert "1 element by engine piecewise; computing time" in said and "with time steps at this tolerance" in said
 
 
 def test_refuses_an_exact_run_without_end():
     stiff = RIG.replace("1 um", "1e-13 um") + '[accuracy]\nmethod = "exact"\n'
-    with pytest.raises(pf.Missing, match=r"more than \d+ s; lower drive.cycles or the stiffness of"):
+    with pytest.raises(pf.Missing, match=r"more than the limit of \d+ s; lower drive.cycles or the stiffness of"):
         pf.run(stiff)
 
 

@@ -65,7 +65,7 @@ cycles = 6
 
 
 def test_exact_transient_names_no_estimate_that_a_run_may_lack():
-    assert "_steady" not in Outcome.TRANSIENT.sentence and "if the drive repeats itself" in \
+    assert "_steady" not in Outcome.TRANSIENT.sentence and "if the drive is periodic" in \
         Outcome.TRANSIENT.sentence
 
 
@@ -77,8 +77,8 @@ def test_exact_a_drift_of_a_steady_motion_is_said_whatever_the_breakaway(outcome
     assert bool(found) == said and "breakaway" not in "".join(found)
 
 
-@pytest.mark.parametrize(("length", "said"), [(4e-5, "the interface is elastic: bonds 1e+05 N/m"),
-                                              (3e-7, "the block should stick")])
+@pytest.mark.parametrize(("length", "said"), [(4e-5, "the interface is elastic: its stiffness (bonds) is 1e+05 N/m"),
+                                              (3e-7, "friction should hold the block")])
 def test_exact_a_block_on_bonds_as_soft_as_its_mode_is_not_said_to_stick(length, said):
     """The mode has 1.916e5 N/m, the bonds mu N over their length: 4 N over 40 and 0.3 um."""
     found = pf.plan(loads(RIG.format(law=BONDS.format(length), load=4 / 0.3)))

@@ -133,7 +133,7 @@ def test_exact_a_level_without_a_bounded_motion_is_a_row_that_says_so():
     assert run.outcome == "steady" and np.isnan(run.extra["curve"]["amplitude"][2])
     with_elements = pf.run(text.replace(COULOMB, PLASTIC), **STEADY)
     assert [one.outcome for one in with_elements.extra["levels"]] == ["stuck", "steady", "not_converged"]
-    assert any("1 of 3 levels" in said and "undamped mode" in said for said in with_elements.warnings)
+    assert any("1 of 3 drive levels" in said and "undamped mode" in said for said in with_elements.warnings)
 
 
 @pytest.mark.slow
@@ -181,7 +181,7 @@ def test_always_a_balanced_motion_is_not_steady_where_none_lasts():
     assert any("is unstable" in said and "march" in said for said in found.warnings)
     levels = pf.run(LOCKED + LEVELS.format('"2 g", "5 g"', 12).replace("143 Hz", "200 Hz"), **STEADY)
     assert [one.outcome for one in levels.extra["levels"]] == ["stuck", "not_converged"]
-    assert levels.outcome == "stuck" and any("1 of 2 levels" in said for said in levels.warnings)
+    assert levels.outcome == "stuck" and any("1 of 2 drive levels" in said for said in levels.warnings)
 
 
 @pytest.mark.share(1)

@@ -122,5 +122,5 @@ def test_refuses_to_go_on_where_the_coating_is_gone(place):
     coat = 'substrate = "Ti-8Al-1Mo-1V"\n[contact.coating]\nmaterial = "WC-Co"\nthickness = "0.5 um"\n'
     coated = SCENE.replace('substrate = "Ti-8Al-1Mo-1V"\n', coat)
     pf.run(loads(coated, place / "a.toml", [HALF])).save(place / "gone")
-    with pytest.raises(PatchfemError, match="the coating of the upper piece was worn through there"):
+    with pytest.raises(PatchfemError, match="the coating of the upper piece was worn through;"):
         pf.run(loads(coated, place / "a.toml", ["wear.start=gone/result.nc"]))

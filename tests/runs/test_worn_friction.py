@@ -79,7 +79,7 @@ def test_always_jumps_do_not_pass_a_row_unseen():
     assert max(one.values["static_coefficient"] for one in moments) > 1.4 * MU
     assert 1 / 1.5 < jumps_about(model) / (len(moments) - 1) < 1.5
     few = ran(*TABLE, "wear.cycles=2e6", "wear.jumps=2")
-    assert [one for one in few.warnings if "one jump of the wear passes 2 rows of wear.friction" in one]
+    assert [one for one in few.warnings if "one jump of the wear passes 2 rows of the table wear.friction" in one]
 
 
 def test_exact_the_bond_length_changes_with_wear():

@@ -34,9 +34,9 @@ def limit_share(model, patch) -> float:
     forward, back = _law().limits(patch.x, sigma, weight, f.bond_length, f.order)
     if abs(forward - back) > ALIKE * max(forward, back):
         raise PatchfemError(unbuilt(
-            f"'{f.law}' on a pressure that is not symmetric (slip force {forward * f.static:.6g} N forward, "
+            f"law '{f.law}' with a pressure that is not symmetric (slip force {forward * f.static:.6g} N forward, "
             f"{back * f.static:.6g} N back)", "make the patch symmetric, or prescribe "
-                                              "the sliding with a [slide] table"), "friction.law")
+                                              "the slide with a table [slide]"), "friction.law")
     return (forward + back) / 2 / patch.pressure.load
 
 

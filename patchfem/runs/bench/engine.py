@@ -132,9 +132,9 @@ def _summed(model, slide, points: int, found: Choice, lists: int = 1) -> BenchEn
     strips = min(found.strips, size * max(1.0, 4 * float(np.abs(np.diff(slide)).max()) / law.length))
     seconds = (PASSES if lists == 1 else lists) * found.seconds * (strips / found.strips if found.strips else 1.0)
     if size * seconds > LONGEST:
-        raise Missing(f"the bond list (about {strips:.0f} entries) would take about {size * seconds:.0f} "
-                      f"s, more than {LONGEST:.0f} s; lower accuracy.steps_per_cycle or slide.cycles, or loosen "
-                      "accuracy.tail or accuracy.merge", "")
+        raise Missing(f"the sum over the list of bonds (about {strips:.0f} entries) would need a computing time of "
+                      f"about {size * seconds:.0f} s, more than the limit of {LONGEST:.0f} s; lower "
+                      "accuracy.steps_per_cycle or slide.cycles, or raise accuracy.tail or accuracy.merge", "")
     return BenchEngine(LIST if lists == 1 else LISTS, seconds, found)
 
 

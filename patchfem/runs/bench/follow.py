@@ -59,7 +59,7 @@ def follow_path(model, time, slide, frames: int, watch: Watch, paced: bool = Fal
 
         failed = slid(contact)
         while failed and full(contact):
-            contact = lengthened(contact, kept, f"before sample {b} of the bench")
+            contact = lengthened(contact, kept, f"before sample {b} of the prescribed slide")
             failed = slid(contact)
         missed += failed
         if b in at:

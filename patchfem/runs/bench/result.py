@@ -21,8 +21,9 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
     if has(f.law, "bonds"):
         warnings = [*warnings, *unbounded_bonds(model.bonds), *unripe(model.bonds, model.speed)]
         if f.reading == "report" and model.load_varies:
-            warnings = [*warnings, "in the law as printed in the report, a bond keeps the pressure at which it formed, "
-                        'so friction may exceed mu_s N while the load falls; set reading = "stretch" to avoid this']
+            warnings = [*warnings, 'in the law as printed in the report, a bond keeps the pressure at which it formed, '
+                                   'so while the load falls the friction force may exceed mu_s N; set friction.reading '
+                                   '= "stretch" to avoid this']
     steps = steps_of(model)
     frames = FRAMES if patch is not None else 0
     fine = bench.run(model, patch, steps, frames, watch=Watch(None, say, progress))
@@ -34,7 +35,7 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
     fields, created, power = {}, fine.values["energy_created"], np.abs(np.diff(fine.ledger[0])).sum()
     if f.reading == "report" and created > 1e-6 * power:
         warnings = [*warnings, f"the law as printed in the report created {created:.3g} J, {100 * created / power:.2g} "
-                               '% of the work exchanged; reading = "stretch" creates none']
+                               '% of the work exchanged; with friction.reading = "stretch" no energy is created']
     warnings = [*warnings, *warming(model, patch, fine), *work_check_warning(found, steps)]
     if patch is not None:
         warnings = [*warnings, *_overhang(model.patch, patch, fine)]
@@ -56,10 +57,10 @@ def _overhang(asked, patch, fine) -> list:
     """Warnings of a bench whose slide leaves the patch."""
     out = []
     if fine.lateral is not None and (aside := largest_slide(fine.lateral) / asked.width) > FAR:
-        out.append(f"the slide across the sliding direction is {aside:.2g} of the width, but the overhang is not "
-                   "modelled")
+        out.append(f"the slide across the sliding direction is {aside:.2g} of the width of the pieces, but the "
+                   "computation neglects that their edges no longer overlap")
     lost = 1 - float(fine.load.min() / fine.load[0]) if fine.load[0] > 0 else 0.0
     if lost > 0.01:
-        out.append(f"the upper piece slides off the pressed area: {100 * lost:.0f} % of the load is not carried at the "
-                   "end")
+        out.append("the upper piece slides off the pressed area: at the end the contact no longer carries "
+                   f"{100 * lost:.0f} % of the load")
     return [*out, *travelled(patch, fine.slide)]

@@ -55,8 +55,8 @@ def _climbing(model, patch, time, slide, frames, watch) -> Slid:
 def refuse_missed(done) -> None:
     """NotConverged where a step missed its residual."""
     if done.missed:
-        raise NotConverged(f"{done.missed} steps of the prescribed slide did not reach the required accuracy of the "
-                           "force; raise accuracy.steps_per_cycle", "")
+        raise NotConverged(f"in {done.missed} time steps of the prescribed slide the friction force has an error "
+                           "above the limit; raise accuracy.steps_per_cycle", "")
 
 
 def climbed_fields(patch, contact, states) -> tuple:

@@ -99,8 +99,8 @@ def refuse_long_sum(model, law, samples: int, points: int, slide) -> None:
     per_step = max(float(np.abs(np.diff(slide)).mean()), 1e-300)
     strips = min(samples, 2 * reach / per_step + 64)
     if 6 * strips * samples * points > MOST_WORK:
-        raise Missing(f"the direct quadrature would form {6 * strips * samples * points:.1e} products, "
-                      f"more than {MOST_WORK:.0e}; lower accuracy.steps_per_cycle or slide.cycles", "")
+        raise Missing(f"the direct sum over bonds would need {6 * strips * samples * points:.1e} multiplications, more "
+                      f"than the limit of {MOST_WORK:.0e}; lower accuracy.steps_per_cycle or slide.cycles", "")
 
 
 def _pressures(model, patch, time, slide) -> tuple:

@@ -163,6 +163,6 @@ def _solved(batch: Batch | None, models: list, alone: Callable, say: Callable | 
             return out
         except Exception as error:  # the case at fault is named by its own run
             if say is not None:
-                say(f"{len(models)} cases are run one by one instead of together: {batch.name}: "
+                say(f"{len(models)} cases are run one by one, because running them together failed: {batch.name}: "
                     f"{type(error).__name__}: {error}")
     return alone(models, say)

@@ -28,7 +28,8 @@ def solve(models: Sequence[Model], say: Callable | None = None, keep: Callable |
             if keep is not None:
                 keep(case, result)
         except (PatchfemError, MemoryError) as error:
-            found.fail(case, str(error) or "out of memory; make contact.element_size larger or the run shorter")
+            found.fail(case, str(error) or "not enough memory; make contact.element_size larger, or make the run "
+                                           "shorter")
         except Exception as error:  # a defect of one case must not cost the answers of a thousand others
             found.fail(case, f"internal fault, please report it: {type(error).__name__}: {error}")
         else:

@@ -163,7 +163,7 @@ def warnings_of(model) -> list:
                                          *([UNKNOWN] if face.patches[1] is None else [])])
 
 
-UNKNOWN = "no error is estimated on so few elements along the interface; leave out contact.element_size"
+UNKNOWN = "the interface has too few elements for an estimate of the error; leave out contact.element_size"
 
 
 def notes_of(model) -> list:

@@ -138,7 +138,7 @@ def _level(asked, ends: tuple, count: int, start) -> PointLevel:
     moved = normal.product(force)
     opening, touches = gap + theta * x - closing + moved, force > 0
     if not opening.min() >= -OVERLAP * np.abs(moved).max():
-        raise NotConverged(f"contact: an overlap of {-opening.min():.1e} m is left at {count} points")
+        raise NotConverged(f"contact: at {count} points the pieces still overlap by up to {-opening.min():.1e} m")
     values, found = _values(asked, (normal, shear), force, np.where(touches, 0.0, opening))
     values |= {"approach": closing, "rotation": asked.gap.angle + theta}
     cell = asked.length / count

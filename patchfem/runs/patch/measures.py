@@ -41,8 +41,8 @@ def plane_band(asked, patch: Patch) -> list:
     try:
         mine, theirs = values(patch), values(pressed(other, pair_beside(other, patch.pair)))
     except PatchfemError as error:
-        return [f"{_assumed(asked)}; the true state lies between plane strain and plane stress; for plane "
-                f"{other.plane} the contact could not be solved ({error})"]
+        return [f"{_assumed(asked)}; the true state lies between plane strain and plane stress; how much the two "
+                f"differ is not known, because for plane {other.plane} the contact could not be solved ({error})"]
     return band_words(asked, mine, theirs)
 
 
@@ -55,7 +55,7 @@ def other_plane(asked):
 
 
 def _assumed(asked) -> str:
-    return f"plane {asked.plane} is assumed for pieces {asked.width / asked.height:.2g} times as wide as tall"
+    return f"plane {asked.plane} is assumed, and the pieces are {asked.width / asked.height:.2g} times as wide as tall"
 
 
 def band_words(asked, mine: dict, theirs: dict) -> list:
@@ -66,8 +66,8 @@ def band_words(asked, mine: dict, theirs: dict) -> list:
     shares = [(name, theirs[name] / mine[name] - 1) for name in (first, *BANDED) if name != "approach" and mine[name]]
     parts += [f"{name} by {100 * share:+.2g} %" for name, share in shares if abs(share) > 1e-3]
     other = "stress" if asked.plane == "strain" else "strain"
-    return [f"{_assumed(asked)}; the true state lies between plane strain and plane stress; with plane {other} the "
-            f"changes are: {', '.join(parts)}"] \
+    return [f"{_assumed(asked)}; the true state lies between plane strain and plane stress; plane {other} would change "
+            f"the results by these amounts: {', '.join(parts)}"] \
         if parts else []
 
 
@@ -237,11 +237,11 @@ def _unbounded(patch: Patch) -> str:
     x, cells = patch.x, np.diff(patch.x)
     bears = patch.strips.pressure.any(axis=0) if patch.strips is not None else patch.active
     if patch.sharp and bears[[0, -1]].any():
-        return "unbounded: the contact reaches a sharp corner of one piece on the longer face of the other"
+        return "unbounded: a sharp corner of one piece presses on the longer face of the other piece"
     for place in patch.jumps:
         beside = np.abs(x - place) <= 1.5 * cells[np.clip(np.searchsorted(x, place), 1, cells.size) - 1]
         if bears[beside].any():
-            return f"unbounded: the contact reaches the edge of the step at {place:.4g} m, a sharp corner"
+            return f"unbounded, because the contact reaches a sharp corner, the edge of the step at {place:.4g} m"
     return ""
 
 

@@ -66,18 +66,19 @@ def groups(model: Model) -> dict:
 def face_words(name: str, one) -> list:
     """Sentences of a plan on the patch of an InterfaceLaw between the places that `name` says."""
     shears = say(one.numbers.static * one.load / block_shear(one.patch), 3)
-    found = f"its pieces shear elastically by {shears} or more before it slips as a whole" if one.soft else \
-        "it moves as one point under the same load; add [structure.interface.contact.shear] to let it slip part by part"
+    found = f"the pieces shear elastically by {shears} or more before the whole patch slips" if one.soft else \
+        ("the patch moves as one point under the same load; add [structure.interface.contact.shear] to let the patch "
+         "slip part by part")
     return [f"interface {name} has a patch of its own: {found}"]
 
 
 def assembled(asked) -> str:
     """The sentence on what assembles the stiffness of the pieces of a `PatchModel`."""
     if asked.mesh is not None:
-        return ("the stiffness of contact.mesh is assembled by scikit-fem, or by a stencil for a piece that is a "
-                "tensor grid")
-    return "the stiffness is assembled by scikit-fem, as the shaped ends are not a tensor grid" if asked.outlined else \
-        "the stiffness is assembled by the stencil of a tensor grid"
+        return ("the stiffness of a piece in contact.mesh is assembled by a stencil if the mesh of the piece is a "
+                "tensor grid, and otherwise by scikit-fem")
+    return ("the stiffness is assembled by scikit-fem, because the mesh of the shaped ends is not a tensor grid") if \
+        asked.outlined else "the stiffness is assembled by the stencil of a tensor grid"
 
 
 def verdict(found: dict, asked) -> list:
@@ -96,10 +97,10 @@ def _of_tilt(found: dict, asked) -> list:
     if tilt is None:
         return []
     if gap.profile is not None or asked.strips is not None or len(gap.shapes) > 1:
-        return [f"tilt is {tilt:.3g} of the tilt at which flat pieces would start to open, but these pieces are not "
-                "flat"]
+        return [f"the tilt is {tilt:.3g} times the tilt at which an edge of flat pieces would start to open, but these "
+                "pieces are not flat"]
     if tilt <= 1:
-        part = "full contact" if tilt <= FULL else "full contact, or all but an edge"
+        part = "the pieces touch everywhere" + ", except perhaps near an edge" * (tilt > FULL)
     else:
-        part = f"partial contact, roughly {100 / sqrt(tilt):.0f} % or less"
-    return [f"tilt is {tilt:.3g} of the tilt at which an edge starts to open: {part}"]
+        part = f"the pieces touch along about {100 / sqrt(tilt):.0f} % of the length or less"
+    return [f"the tilt is {tilt:.3g} times the tilt at which an edge starts to open: {part}"]

@@ -81,15 +81,16 @@ def static(what, patch, coarse, seconds, warnings, *_) -> Result:
 
 def strained(asked, patch) -> list:
     """Warnings where the answer leaves small strains, or where cells of a given size lock."""
-    beyond = ["the contact reaches the point of a rounded end where the slope is 0.097, beyond which no contact is "
-              "computed; lower the tilt or the load"] if beyond_gentle(patch) else []
+    beyond = ["on a rounded end the contact reaches the point where the slope is 0.097, and beyond this point no "
+              "contact is computed; lower the tilt or the load"] if beyond_gentle(patch) else []
     return strained_by(asked, patch.pressure.sigma_n.max(initial=0.0), patch.pressure.approach, beyond)
 
 
 def strained_by(asked, top: float, approach: float, beyond=()) -> list:
     """The warnings of `strained` from the largest nodal pressure [Pa] and the approach [m]; beyond: one in between."""
     out, stuff = [], _materials(asked)
-    words = "the peak pressure is {:.3g} of the lowest Young's modulus", "the approach is {:.3g} of the pieces' height"
+    words = "the peak pressure is {:.3g} of the lowest Young's modulus", \
+        "the approach is {:.3g} of the total height of the two pieces"
     for share, what in zip(_strains(asked, top, approach), words):
         if share > SMALL:
             out.append(what.format(share) + f", beyond the small strains that are assumed ({SMALL:g})")
@@ -97,8 +98,8 @@ def strained_by(asked, top: float, approach: float, beyond=()) -> list:
     stiff = max(m.poisson for m in stuff)
     if asked.plane == "strain" and stiff > LOCKS and not asked.chosen:
         cure = "split the elements of contact.mesh" if asked.mesh is not None else "leave out contact.element_size"
-        out.append(f"Poisson's ratio {stiff:g} in plane strain (limit {LOCKS:g}): the elements lock as Poisson's ratio "
-                   f"nears 0.5, so errors may be up to twice the estimates; {cure}")
+        out.append("in plane strain the elements become too stiff (lock) as Poisson's ratio nears 0.5, and here the "
+                   f"ratio is {stiff:g} (limit {LOCKS:g}), so errors may be up to twice the estimates; {cure}")
     return out
 
 
@@ -129,23 +130,23 @@ def left_out(model, patch, coarse) -> list:
     out = [f"scikit-fem assembles the stiffness of the {' and the '.join(by_forms)} piece"] if by_forms else []
     out += [*drawn_otherwise(patch.pair), *slender(asked, patch.pressure.load / patch.pieces.interface.weight.sum())]
     if patch.sharper and patch.averaging is not None:
-        out.append(f"static measures are computed on points {say(patch.averaging, 3)} apart where this gives a smaller "
-                   f"error (short waves as in infinite layers); fields and motion come from the mesh of {patch.x.size} "
-                   "interface points")
+        out.append("those static measures for which the error is then smaller are computed on points "
+                   f"{say(patch.averaging, 3)} apart, with short waves treated as in infinite layers; fields and "
+                   f"motion are computed on the mesh of {patch.x.size} interface points")
     elif patch.sharper:
-        out.append("static measures are computed on Gauss-Lobatto cells of order 4 where this gives a smaller error; "
-                   f"fields and motion come from the bilinear mesh of {patch.x.size} interface points")
+        out.append("those static measures for which the error is then smaller are computed on Gauss-Lobatto cells of "
+                   f"order 4; fields and motion are computed on the bilinear mesh of {patch.x.size} interface points")
     elif patch.averaging is not None and not asked.gap.rough:
-        out.append(f"the profile is averaged over {say(patch.averaging, 3)} where it carries load; the errors include "
-                   "the effect of the choice of this length")
+        out.append("where the profile carries load, its heights are averaged over a length of "
+                   f"{say(patch.averaging, 3)}; the errors include the effect of the choice of this length")
     if asked.skin is not None and patch.pressure.load > 0:
         bears = patch.pieces.interface.weight @ (patch.pressure.sigma_n > 0)
         out += skin.ranged(asked, float(patch.pressure.load / bears))
     if patch.strips is not None:
         out.append(patch.strips.note)
     if patch.pair.coupling > COUPLED and model.kind != "patch":
-        out.append(f"the pieces differ: the coupling between shear and normal motion, {patch.pair.coupling:.2g} of the "
-                   "tangential compliance, is neglected")
+        out.append("the pieces have different elasticity, which couples shear and normal motion; this coupling, "
+                   f"{patch.pair.coupling:.2g} of the tangential compliance, is neglected")
     if model.kind == "patch":
         out += frictionless(asked, patch)
     if coarse[0] is not None and patch.pressure.outcome is not Outcome.NO_CONTACT:
@@ -168,9 +169,9 @@ def frictionless(asked, patch) -> list:
     stuck = normal - cross @ np.linalg.solve(patch.pieces.tangential[here], cross.T)
     more = one @ np.linalg.solve(stuck, one) / (one @ np.linalg.solve(normal, one)) - 1
     beta = abs(_dundurs(asked))
-    return [f"the pieces differ (Dundurs' beta {beta:.2g} at the interface) and the pressure is that of a frictionless "
-            f"contact; with perfect stick normal_stiffness would be {100 * more:.2g} % larger, with friction the "
-            "stiffness lies in between"]
+    return [f"the pieces have different elasticity (Dundurs' beta {beta:.2g} at the interface), and the pressure is "
+            f"computed without friction; if the pieces stuck perfectly, normal_stiffness would be {100 * more:.2g} % "
+            "larger; with friction the stiffness lies between the two values"]
 
 
 def _dundurs(asked) -> float:
@@ -194,11 +195,11 @@ def drawn_otherwise(pair) -> list:
         count, area = recognise.holes(body)
         if count:
             out.append(f"contact.mesh: the {side} piece has {count} hole{'s' * (count > 1)} inside, {area:.3g} m2 in "
-                       "all; fill any hole that is not intended")
+                       "all; if a hole is not intended, close it in the mesh")
         held, whole = recognise.held_share(body)
         if held < WHOLE * whole:
-            out.append(f"contact.mesh: {side}_far covers {held:.6g} m of a face of {whole:.6g} m, {held / whole:.3g} "
-                       "of its length; the rest of that face is free")
+            out.append(f"contact.mesh: the held nodes `{side}_far` cover {held:.6g} m of a face of {whole:.6g} m, "
+                       f"{held / whole:.3g} of the length of this face; the rest of the face is free")
     return out
 
 
@@ -217,7 +218,7 @@ def slender(asked, mean: float) -> list:
         stiff = young / (1 - nu**2) if asked.plane == "strain" else young
         share = mean / (np.pi**2 * stiff * asked.length**2 / (48 * piece.height**2))
         if piece.height > asked.length and share > BENT:
-            out.append(f"the {side} piece is {piece.height / asked.length:.3g} times as tall as long and carries "
-                       f"{share:.2g} of its sideways buckling load (limit {BENT:g}); the growth of the lever arm by "
-                       "bending is neglected")
+            out.append(f"the {side} piece is {piece.height / asked.length:.3g} times as tall as it is long and carries "
+                       f"{share:.2g} of the load at which it would buckle sideways (limit {BENT:g}); the computation "
+                       "neglects that bending lengthens the lever arm of the load")
     return out

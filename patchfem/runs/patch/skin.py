@@ -53,10 +53,10 @@ def ranged(asked, pressure: float) -> list:
                 f"{say(2 * asked.gap.average)}; if rms_height comes from the same trace as the profile, give the rms "
                 "values of the shorter waves only (patchfem profile --cutoff prints them)"]
     return [f"contact.asperities: under the mean pressure of {short(pressure, 'Pa', 3)} the peaks{waves} have "
-            f"a stiffness of {mean_stiffness(asked, pressure):.3g} Pa/m{half}; Persson's theory, which includes "
-            "waves of all lengths, "
-            f'gives {soft:.3g} to {stiff:.3g} Pa/m, which law = "exponential" with decay_length = '
-            f'"{sum(peaks.PERSSON) / 2 * part.rms_height * 1e6:.3g} um" gives as well', *told]
+            f"a stiffness of {mean_stiffness(asked, pressure):.3g} Pa/m{half}; Persson's theory, which includes waves "
+            "of all lengths, "
+            f'gives {soft:.3g} to {stiff:.3g} Pa/m; to use the stiffness of that theory, set law = "exponential" and '
+            f'decay_length = "{sum(peaks.PERSSON) / 2 * part.rms_height * 1e6:.3g} um"', *told]
 
 
 def _half(asked, coarse, pressure: float) -> str:

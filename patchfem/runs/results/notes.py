@@ -22,10 +22,10 @@ def climbing_as_one(model, patch) -> list:
         return []
     limit = model.friction.static * patch.pressure.sigma_n * patch.pieces.interface.weight
     apart = float((patch.giving @ limit).max())
-    return [f"{model.soft} with grooves: all points rise together, with the height and slope at the slide of the "
-            f"holders; for a point at its friction limit this slide is wrong by up to {say(apart, 3)}, which is "
-            f"{apart / model.grooves.wavelength:.2g} of the wavelength; the normal force is distributed over the "
-            "points in proportion to the load"]
+    return [f"{model.soft} with grooves: the height and the slope of the grooves are taken at the slide of the holders "
+            f"and are the same for all points; a point at its friction limit slides by up to {say(apart, 3)} less than "
+            f"the holders, which is {apart / model.grooves.wavelength:.2g} of the wavelength; the normal force at each "
+            "point is in proportion to the total load"]
 
 
 def warming(model, patch, response, work: float | None = None) -> list:
@@ -45,8 +45,9 @@ def unripe(law, speed: float) -> list:
     if a <= RIPE:
         return []
     least = law.ratio / (1 / (RIPE * law.length) - law.rest_growth / speed**2)  # ripening(law, speed) = RIPE with it
-    return [f'at the peak speed of {speed:.3g} m/s bonds need {a:.2g} of their length to form (limit {RIPE:g}), so the '
-            'law as printed in the report gives less friction than eqs. 2.18-2.21; set friction.slip_growth = '
+    return [f'at the peak speed of {speed:.3g} m/s a bond slides by {a:.2g} of its length while it forms (limit '
+            f'{RIPE:g}), so the law as printed in the report gives less friction than eqs. 2.18-2.21; set '
+            'friction.slip_growth = '
             f'"{0.95e6 * least:.2g} um", or friction.reading = "stretch"']
 
 
@@ -85,12 +86,13 @@ def of_growth(law, peak: float | None) -> list:
             "of later bonds grows"]
     out = []
     if law.order > 1:
-        out.append(f"order = {law.order:g} with a growing bond length does not limit friction: a bond that formed "
-                   "while the bond length was small pulls harder and breaks later as the bond length grows; set order "
-                   "<= 1 to stay near mu_s N")
+        out.append(f"with friction.order = {law.order:g} and a growing bond length, friction has no limit: as the bond "
+                   "length grows, a bond that formed while the length was small pulls harder and breaks later; set "
+                   "friction.order <= 1 to keep friction near mu_s N")
     if peak is not None and peak > 1 + BOUND:
         out.append(f'friction reaches {peak:.3g} mu_s N, because bonds that formed while the bond length was small '
-                   'persist as the bond length grows; set reading = "report" with order <= 0 to stay within mu_s N')
+                   'last longer as the bond length grows; to keep friction within mu_s N set friction.reading = '
+                   '"report" and friction.order <= 0')
     return out
 
 
@@ -108,12 +110,12 @@ def work_check_warning(values: dict, steps: int | None, harmonics: int | None = 
     if harmonics:
         remedy = more_harmonics(harmonics)
     elif steps and halvings > FARTHEST:
-        remedy = f"{steps} steps per cycle do not resolve this motion with this method"
+        remedy = f"with this method {steps} steps per cycle are too few for this motion"
     else:
         remedy = f"set accuracy.steps_per_cycle = {steps * 2**halvings}" if steps else \
-            "compare with accuracy.method = \"march\""
-    return [f"work_check is {found.value:.2g} (limit {BOOKS:g}): friction work by the trapezoidal rule on the samples "
-            f"differs from the energy balance of the run; {remedy}"]
+            "compare with a run with accuracy.method = \"march\""
+    return [f"work_check is {found.value:.2g} (limit {BOOKS:g}): the friction work computed from the samples by the "
+            f"trapezoidal rule differs from the friction work in the energy balance; {remedy}"]
 
 
 def more_harmonics(found: int, sharp: float = 0.0) -> str:
@@ -131,12 +133,12 @@ def heating(model, patch, work: float, duration: float) -> list:
     loaded area: two alike pieces share it and warm by half as much.
     """
     if patch is None:
-        return ["the warming by friction is not estimated: [normal] has no contact area"]
+        return ["the warming by friction is not estimated, because a contact given by [normal] has no area"]
     kind = model.patch.substrate
     known = materials.THERMAL.get(kind.name) if kind.name in materials.MATERIALS else None
     if known is None:
-        return ["the warming by friction is not estimated: the conductivity of contact.substrate is not known; choose "
-                f"a material of the table ({', '.join(materials.THERMAL)})"]
+        return ["the warming by friction is not estimated, because the conductivity of contact.substrate is not "
+                f"known; choose one of the materials {', '.join(materials.THERMAL)}"]
 
     area = float(patch.pieces.interface.weight[patch.active].sum())
     if not (area > 0 and duration > 0 and np.isfinite(work)):
@@ -145,10 +147,10 @@ def heating(model, patch, work: float, duration: float) -> list:
     flux, stuff = work / duration / area, (known.conductivity, known.heat_capacity * kind.density)
     rises = [f"{temperature.surface_rise(flux, duration, *stuff):.2g} K after {duration:.3g} s"]
     if period is not None:
-        rises.insert(0, f"{temperature.surface_rise(flux, period, *stuff):.2g} K in a cycle")
-    return [f"friction of {work / duration:.2g} W on {1e6 * area:.3g} mm2 would raise the surface temperature by "
-            f"{', '.join(rises)} if one half-space took all the heat; the run keeps friction.temperature.surface as "
-            "given"]
+        rises.insert(0, f"{temperature.surface_rise(flux, period, *stuff):.2g} K after one cycle")
+    return [f"friction dissipates {work / duration:.2g} W on {1e6 * area:.3g} mm2; if one half-space took all this "
+            f"heat, the surface temperature would rise by {', '.join(rises)}; the run does not include this rise and "
+            "keeps friction.temperature.surface as given"]
 
 
 def _cycle(model) -> float | None:

@@ -29,8 +29,9 @@ def travelled(patch, slide) -> list:
     largest, contact = largest_slide(slide), contact_length(patch)
     if not contact > 0 or largest < FAR * contact:
         return []
-    return [f"slide amplitude {say(largest, 3)} is {largest / contact:.2g} of the contact length {say(contact)}: the "
-            f"pressure is taken as unchanged and the overhang of the pieces is not modelled (limit {FAR:g})"]
+    return [f"the slide amplitude, {say(largest, 3)}, is {largest / contact:.2g} of the contact length {say(contact)} "
+            f"(limit {FAR:g}): the computation keeps the pressure unchanged and neglects that the ends of the pieces "
+            "no longer overlap"]
 
 
 def outcome_on_piece(outcome, asked, patch, slide, lateral=None):

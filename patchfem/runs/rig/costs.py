@@ -147,22 +147,22 @@ def dear_events(model: Model) -> str:
     """Why the march is to run what the engine of events takes: its events cost more than steps and more than an exact
     motion is worth."""
     worth = PATIENCE if steps_wanted(model) > MOST_STEPS else max(WORTH, seconds_of_steps(model))
-    return "yielding events cost more than time steps" if seconds_of_pieces(model) > worth else ""
+    return "time steps are faster than the exact solution" if seconds_of_pieces(model) > worth else ""
 
 
 def dear_elements(model: Model) -> str:
     """Why the march is to run elements that stick or slip: the scene names its steps, or as of `dear_events`."""
-    return "its steps are named" if model.accuracy.steps_per_cycle is not None else dear_events(model)
+    return "accuracy.steps_per_cycle is set" if model.accuracy.steps_per_cycle is not None else dear_events(model)
 
 
 def refuse_endless(model: Model, numerics=None) -> None:
     """Raise Missing when a run from event to event would take longer than LONGEST seconds."""
     seconds = seconds_of_pieces(model)
     if seconds > LONGEST:
-        raise Missing(f'the exact motion (about {pieces_per_cycle(model):.2g} time intervals per cycle, set by events, '
-                      f'rows of the drive and the fastest free vibration) would take about {seconds:.0f} s, more than '
-                      f'{LONGEST:.0f} s; lower drive.cycles or the stiffness of modes and elements, or use '
-                      'accuracy.method = "march"', "")
+        raise Missing(f'the exact solution (about {pieces_per_cycle(model):.2g} time intervals per cycle, set by '
+                      'events, rows of the drive and the fastest free vibration) would need a computing time of about '
+                      f'{seconds:.0f} s, more than the limit of {LONGEST:.0f} s; lower drive.cycles or the stiffness '
+                      'of modes and elements, or use accuracy.method = "march"', "")
 
 
 def exact_cost(model: Model, numerics, unknowns: dict) -> tuple:
@@ -173,8 +173,8 @@ def exact_cost(model: Model, numerics, unknowns: dict) -> tuple:
 def exact_words(model: Model, engine: str) -> list:
     """The sentence of a plan on which engine takes the elements, and why."""
     count, exact, march = expected_elements(model)[0], expected_seconds(model), seconds_of_steps(model)
-    return [f"{count} element{'s' * (count > 1)} by engine {engine}: about {exact:.2g} s by the exact solution between "
-            f"yield events, about {march:.2g} s by time steps at this tolerance"]
+    return [f"{count} element{'s' * (count > 1)} by engine {engine}; computing time: about {exact:.2g} s with the "
+            f"exact solution between yield events, about {march:.2g} s with time steps at this tolerance"]
 
 
 def not_smooth(model: Model) -> str:

@@ -139,7 +139,7 @@ class Finder(NamedTuple):
 FINDERS = {one.name: one for one in (
     Finder("events", "the exact solution from event to event", "steady.maps EventFinder", "exact"),
     Finder("yields", "the exact solution between yield events", "steady.maps YieldFinder", "piecewise"),
-    Finder("march", "a time integration whose start "
+    Finder("march", "a time integration whose initial state "
                     "is corrected until the motion repeats", "steady.marched MarchFinder", "march"),
     Finder("balance", "harmonic balance", "steady.balance BalanceFinder", "harmonic"))}
 
@@ -318,8 +318,8 @@ def unbalanced(engine: Engine, measures: dict) -> str:
     bar = max(CLOSED, found.error or 0.0) if engine.closes is None else engine.closes
     if not found.value > bar:  # a motion that is not finite has been seen before
         return ""
-    return (f"the energy balance of engine {engine.name} is off by {found.value:.2g} of the energy exchanged, more "
-            f"than the limit of {bar:.2g}, so a step created or lost energy")
+    return (f"the energy balance of engine {engine.name} has an error of {found.value:.2g} of the energy exchanged, "
+            f"more than the limit of {bar:.2g}, so the numerical method created or lost energy")
 
 
 @lru_cache(8)
@@ -340,7 +340,7 @@ def knobs_idle(model: Model, engine: str) -> list:
     """Sentences on the knobs of [accuracy] that a rig names and that the engine it is run by does not take."""
     by = steady_by(model).like if ENGINES[engine].steady else engine
     where = {"steps_per_cycle": f"for engine '{engine}', which has no steps,",
-             "harmonics": "where the steady motion is exact from event to event"}
+             "harmonics": "if the steady motion is found by the exact solution from event to event"}
     plain = f"for engine '{engine}'"
     return [f"accuracy.{knob} has no meaning {where.get(knob, plain)} and is not used"
             for knob in pinned(model.accuracy) if not acts(knob, model.kind, by)]

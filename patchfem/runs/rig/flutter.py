@@ -10,12 +10,13 @@ from .interface import contact_model
 from .steady.balance import BalanceFinder
 
 NAME = "flutter_amplitude"
-ALONE = "no mode that gains energy moves an interface, so friction cannot dissipate it"
-NONE = (f"no unstable limit cycle was found at amplitudes of {limit_cycles.LOW:g} to {limit_cycles.HIGH:g} times 4 "
-        "F/(pi |c| omega), where F is the friction force and c the damping")
-UNBALANCED = ("limit cycles of bonds are known only for the stretch reading of order 1 with constant length, no "
-              "breakaway and pieces rigid in shear")
-SLIDES = "no motion was found in which the interface always slides and friction dissipates what the mode gains"
+ALONE = "no mode with negative damping moves an interface, so friction cannot dissipate the energy of such a mode"
+NONE = (f"no unstable limit cycle was found at amplitudes between {limit_cycles.LOW:g} and {limit_cycles.HIGH:g} times "
+        "4 F/(pi |c| omega), where F is the friction force and c is the damping coefficient")
+UNBALANCED = ('with bonds limit cycles can be computed only for friction.reading = "stretch", order = 1, a constant '
+              'bond length, breakaway = 0 and pieces that are rigid in shear')
+SLIDES = ("no motion was found in which the interface always slides and friction dissipates the energy that the mode "
+          "gains")
 
 
 def flutter_of(run) -> tuple:
@@ -23,7 +24,7 @@ def flutter_of(run) -> tuple:
     that does not last, with its error, or the reason why it is not known."""
     model, unit, floor = run.model, TABLE[NAME].unit, TABLE[NAME].floor
     found, reason = _cycles(model, run.numerics, run.patch)
-    far = [f"the run ended after {run.raw.response.time[-1]:.4g} s, where the motion exceeded {BEYOND:g} m"] \
+    far = [f"the run ended after {run.raw.response.time[-1]:.4g} s, when the motion exceeded {BEYOND:g} m"] \
         if run.raw.outcome is Outcome.EXCEEDS_TRAVEL and model.rig.travel == BEYOND else []
     edges = [one for one in found if not one.lasts]
     if not edges:
@@ -33,29 +34,29 @@ def flutter_of(run) -> tuple:
     alone = has(model.friction.law, "set-valued") and model.rig.modes.omega.size == 1  # nothing rings in a stick
     falls = f" to the limit cycle of {say(below[-1].amplitude, 3)}, which is stable" if below else " to rest" * alone
     return {NAME: Measure(edge.amplitude, unit, edge.error, floor)}, [
-        "a mode of negative damping gains energy: without a drive it has an unstable oscillation of "
-        f"{say(edge.amplitude, 4)} at the output at {edge.omega / 6.283185307179586:.4g} Hz; a smaller free "
-        f"oscillation of this mode decays{falls}, a larger one grows", *far]
+        "a mode of negative damping gains energy: without a drive this mode has an unstable steady oscillation of "
+        f"{say(edge.amplitude, 4)} at the output, at {edge.omega / 6.283185307179586:.4g} Hz; a free oscillation of "
+        f"smaller amplitude decays{falls}, and a free oscillation of larger amplitude grows", *far]
 
 
 def _cycles(model, numerics, patch) -> tuple:
     """(list of `limit_cycles.Cycle`, the sentence where it holds none that does not last)."""
     rig, f = model.rig, model.friction
     if len(rig.interfaces) != 1 or f is None:
-        return [], "limit cycles are known for one interface only"
+        return [], "limit cycles can be computed for one interface only"
     modes, row = rig.modes, rig.modes.interfaces[0]
     if not row[limit_cycles.unstable_modes(modes)].any():
         return [], ALONE
     load = patch.pressure.load if patch is not None else model.point.load
     if reason := ENGINES["harmonic"].lacks(model, steady=True):
-        return [], f"limit cycles are not known {reason}"
+        return [], f"limit cycles cannot be computed {reason}"
     contact = contact_model(model, numerics, patch)
     try:
         if contact.set_valued:
             if rig.bends:
-                return [], "limit cycles of rigid friction are not known with a nonlinear spring"
+                return [], "with rigid friction limit cycles cannot be computed if the rig has a nonlinear spring"
             if not modes.omega.all():
-                return [], "limit cycles of rigid friction are not known with a mode of 0 Hz"
+                return [], "with rigid friction limit cycles cannot be computed if the rig has a mode of 0 Hz"
             static, kinetic = contact.element.numbers[1:3]
             return limit_cycles.of_relay(modes, row, kinetic, static), SLIDES
         finder = BalanceFinder(model, numerics, patch)

@@ -92,8 +92,8 @@ def level_measures(rig, levels, probe, tolerance: float, rubs: bool, coarser=())
         out["jump_level"] = Measure(size * leap[0], unit, width, width)
     else:
         out["jump_level"] = Measure(None, unit, None, TABLE["jump_level"].floor, reason=
-                                    f"no two neighbouring levels have an amplitude ratio of at least {JUMP:g} times "
-                                    "the ratio of the levels")
+                                    "the amplitude does not jump: between neighbouring drive levels the ratio of the "
+                                    f"amplitudes is always below {JUMP:g} times the ratio of the levels")
     if (loop := hysteresis(levels)) is not None:
         out["level_hysteresis"] = Measure(float(loop[0]), "m", float(loop[1]), 1e-10)
     return out

@@ -256,9 +256,10 @@ def refuse_unresolved(model: Model, numerics: Numerics) -> None:
     swing = pace * drive.period / numerics.steps
     if swing > MOST_SWING:
         wanted = ceil(pace * drive.period)
-        raise Missing(f"a step of {drive.period / numerics.steps:.2g} s does not resolve the block on its bonds, which "
-                      f"oscillates at {pace / (2 * pi):.3g} Hz; set accuracy.steps_per_cycle = {wanted}, raise "
-                      "structure.moving_mass or friction.bond_length, or use reading = \"stretch\" with order = 1", "")
+        raise Missing(f"a time step of {drive.period / numerics.steps:.2g} s is too long for the vibration of the "
+                      f"block on its bonds, at {pace / (2 * pi):.3g} Hz; set accuracy.steps_per_cycle = {wanted}, "
+                      "raise structure.moving_mass or friction.bond_length, or use reading = \"stretch\" with "
+                      "order = 1", "")
 
 
 def refuse_long_list(model: Model, numerics: Numerics, limit: float = LONGEST) -> None:
@@ -270,6 +271,7 @@ def refuse_long_list(model: Model, numerics: Numerics, limit: float = LONGEST) -
         refuse_unresolved(model, numerics)
     entries, seconds = bonds_cost(model, numerics)
     if seconds > limit:
-        raise Missing(f"the bond list (about {entries:.0f} entries) would take about {seconds:.0f} s, "
-                      f"more than {limit:.0f} s; lower drive.cycles or accuracy.steps_per_cycle, loosen accuracy.tail "
-                      "or accuracy.merge, or use reading = \"stretch\" with order = 1", "")
+        raise Missing(f"the sum over the list of bonds (about {entries:.0f} entries) would need a computing time of "
+                      f"about {seconds:.0f} s, more than the limit of {limit:.0f} s; lower drive.cycles or "
+                      "accuracy.steps_per_cycle, raise accuracy.tail or accuracy.merge, or use reading = \"stretch\" "
+                      "with order = 1", "")

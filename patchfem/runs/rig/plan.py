@@ -169,13 +169,13 @@ def first_words(rig, found: dict, chain: dict) -> list:
     soft = [name for name, link in chain.items() if name != "mode" and not isinstance(link, str)
             and link < STIFF * rig.stiffness]
     if d >= 1 and soft:
-        return [f"D = {d:.3g} >= 1, but the block still moves, because the interface is elastic: {soft[-1]} "
-                f"{chain[soft[-1]]:.4g} N/m against {rig.stiffness:.4g} N/m of the mode"]
+        return [f"D = {d:.3g} >= 1, but the block still moves, because the interface is elastic: its stiffness "
+                f"({soft[-1]}) is {chain[soft[-1]]:.4g} N/m and the stiffness of the mode is {rig.stiffness:.4g} N/m"]
     if d >= 1:
-        return [f"D = {d:.3g} >= 1: the block should stick"]
+        return [f"D = {d:.3g} >= 1: friction should hold the block, so that it sticks"]
     if d > pi / 4:
-        return [f"D = {d:.3g} between pi/4 and 1: stick-slip at resonance"]
-    return [f"D = {d:.3g} below pi/4: at resonance friction alone does not bound the motion"]
+        return [f"D = {d:.3g} lies between pi/4 and 1: at resonance the block alternates between stick and slip"]
+    return [f"D = {d:.3g} is below pi/4: at resonance friction alone does not limit the amplitude"]
 
 
 def sum_words(model: Model) -> list:
@@ -196,30 +196,32 @@ def summed_words(model: Model, numerics) -> list:
     if not has(model.friction.law, "bonds"):
         return [] if PIECES.lacks(model) else exact_words(model, numerics.engine)
     found = lists.quadrature_of(model, numerics)
-    out = ["the sum over bonds is by " + found.said()]
+    out = ["method of the sum over bonds: " + found.said()]
     if found.engine == "recursion":
         return out
     if lists.lists_grow(model):
-        stiff = "an order above 0 gives it one" if lists.limp(model) else "reading = \"stretch\" gives it a stiffness"
+        stiff = "set friction.order above 0 to give the block a stiffness" if lists.limp(model) else \
+            "set friction.reading = \"stretch\" to give the block a finite stiffness"
         out.append(f"{_held_words(model)}; {stiff}")
     if (seconds := lists.bonds_cost(model, numerics)[1]) > parameters.LONGEST:
-        out.append(f"`run` will refuse this scene: the bond list would take about {seconds:.0f} s, more than "
-                   f"{parameters.LONGEST:.0f} s")
+        out.append("`run` will refuse this scene: the sum over the list of bonds would need a computing time of about "
+                   f"{seconds:.0f} s, more than the limit of {parameters.LONGEST:.0f} s")
     return out
 
 
 def _held_words(model: Model) -> str:
     """How bonds hold the block whose list of them grows."""
-    turns = "the block reverses in almost every step, and each reversal makes the list of bonds longer"
+    turns = "the block reverses its motion in almost every time step, and each reversal makes the list of bonds longer"
     if lists.stalls(model):
-        return ("the law as printed in the report keeps the block from sliding from its release on, so that the block "
-                "vibrates on its bonds or reverses in almost every step; the estimate is for the slowest case")
+        return ("with the law as printed in the report the block does not slide after its release: it vibrates on its "
+                "bonds or reverses its motion in almost every time step; the estimated computing time is that of the "
+                "slowest case")
     if lists.limp(model):
-        return f"bonds of order 0 keep the block from sliding but give it no stiffness: {turns}"
+        return f"bonds of order 0 keep the block from sliding, but they have no stiffness: {turns}"
     if lists.chatters(model):
-        return f"the law as printed in the report keeps the block from sliding, however small its stroke: {turns}"
-    return ("the law as printed in the report keeps the block from sliding at some level, or nearly so: the list of "
-            "bonds grows with every step")
+        return f"with the law as printed in the report the block does not slide at all: {turns}"
+    return ("with the law as printed in the report the block hardly slides at one of the drive levels or more: the "
+            "list of bonds grows with every time step")
 
 
 def steady_cost(model: Model, numerics, unknowns: dict) -> tuple:

@@ -14,9 +14,9 @@ from .costs import dear_elements
 from .engines import ENGINES, PIECES
 from .solution import borne
 
-AS_ONE_POINT = ("the shape of the patch does not affect the motion: with a rigid slide, constant load and the pressure "
-                "on the upper piece the patch moves exactly as one point under the same load; add [contact.shear] to "
-                "let it slip part by part")
+AS_ONE_POINT = ("the shape of the patch does not affect the motion: with pieces that are rigid in shear, a constant "
+                "load and a pressure that moves with the upper piece, the patch moves exactly as one point under the "
+                "same load; add [contact.shear] to let the patch slip part by part")
 
 
 def warnings_of(run) -> list:
@@ -53,8 +53,8 @@ def notes_of(run) -> list:
     if len(rig.interfaces):
         out += ENGINES[run.numerics.engine].call("notes", model, run.numerics, run.patch, raw) or []
     if raw.levels and rig.onset[0] == "slip" and raw.held > 0:
-        out.append(f"onset_level: slip counts from an amplitude of {length(raw.held)}, a thousandth of the elastic "
-                   "range of the interface; below it a part of the interface may already slip")
+        out.append(f"onset_level: slip counts only if its amplitude is above {length(raw.held)}, a thousandth of the "
+                   "elastic range of the interface; a part of the interface may slip earlier")
     return [*rig.kept, *out, *creeping_note(f), *run.rings.notes, *ended]
 
 
@@ -63,16 +63,18 @@ def _across(run) -> list:
     if not run.model.rig.strips_slide_apart or run.patch.strips.offsets.size < 2 or not run.patch.strips.load:
         return []
     swing, share = strips.across(run.patch, run.raw.window, run.drive.period)
-    return [f"the yaw moves the ends of the patch by up to {length(swing)} across x, which "
-            f"friction{' and wear leave' if run.model.wear is not None else ' leaves'} out: with the yaw the slide "
-            f"path in the last cycle would be {100 * share:.2g} % longer, averaged by pressure"] if swing > 0 else []
+    return [f"the yaw moves the ends of the patch by up to {length(swing)} across x, but the "
+            f"friction{' and the wear are' if run.model.wear is not None else ' is'} computed without this motion; "
+            f"with this motion the path of the slide in the last cycle would be {100 * share:.2g} % longer (mean over "
+            "the patch, weighted by the pressure)"] if swing > 0 else []
 
 
 def creeping_note(friction) -> list:
     """The sentence on a law that never holds."""
     if friction is None or not has(friction.law, "creeps"):
         return []
-    return [f"law '{friction.law}' never sticks: under a constant force of half its friction limit it creeps at "
+    return [f"law '{friction.law}' never sticks: under a constant force of half the friction limit the interface "
+            "creeps at "
             f"{1e3 * 0.5493 * friction.reference_speed:.3g} mm/s"]
 
 
@@ -112,10 +114,10 @@ def unmoved_elements(model, numerics, patch, raw) -> list:
     for group, slide in zip(pieces.YieldingElements(model, numerics, patch).groups, slides.T):
         most, half = float(group.yield_slide.max(initial=0.0)), float(np.ptp(slide)) / 2
         if most > half:
-            return [f'part of the joint yields only at {length(most)} and never slips in this motion of '
-                    f'{length(half)}: this part keeps the force left in it by earlier motion, so the steady motion is '
-                    'not unique; the motion given here has no mean force; set accuracy.method = "auto" for the motion '
-                    'that is reached from rest']
+            return [f'a part of the joint slips only at a slide above {length(most)}, but the slide in this motion is '
+                    f'{length(half)}, so this part never slips and keeps the force that earlier motion left in it; the '
+                    'steady motion is therefore not unique; the motion given here has no mean force; for the motion '
+                    'that is reached from rest set accuracy.method = "auto"']
     return []
 
 
@@ -135,10 +137,10 @@ def created_warning(model, book: dict, cycles: float) -> list:
         return []
     return [f'the law as printed in the report created {made / cycles:.3g} J per cycle, '
             f'{100 * made / max(work, 1e-300):.3g} '
-            '% of what it dissipated; set reading = "stretch", which creates none']
+            '% of the energy that it dissipated; with friction.reading = "stretch" no energy is created']
 
 
 def modes_note(model, kept: int, nodes: int) -> list:
     """The sentence on the shear modes of points whose normal force changes."""
-    return [f"{model.soft}: the load changes with the motion, so no exact set of elements exists; {kept} "
-            f"tangential modes of {nodes} nodes are used instead (accuracy.shear_modes)"]
+    return [f"{model.soft}: the normal load changes with the motion, so the patch cannot be replaced exactly by a set "
+            f"of elements; {kept} tangential modes of the {nodes} nodes are used instead (key accuracy.shear_modes)"]

@@ -57,7 +57,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     """Run a plan of kind rig or linear; arguments as `run.run` has them, patch and coarse of its [contact]."""
     model, rig = what.model, what.model.rig
     if rig.start is None and rig.kind != "free" and not np.any(rig.modes.base):
-        raise PatchfemError("the drive excites no mode, so nothing moves; give base or output for a mode",
+        raise PatchfemError("the drive excites no mode, so nothing moves; give a mode the key `base` or `output`",
                             "drive.kind")
     numerics = choose(model, per_point)
     engine = ENGINES[numerics.engine]

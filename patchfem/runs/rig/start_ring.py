@@ -44,12 +44,12 @@ def start_ring(outcome, measures: dict, window, drive, cycles: float, tolerance:
     if not missed:
         return StartRing(measures | wide, {}, [])
     until = max(_until(one, measures, drive, cycles) for one in missed.values())
-    remedy = f"set drive.cycles = {until:g} to let the free vibration from the start decay" if until else \
-        "the free vibration from the start has not decayed; give the modes in [[structure.mode]] more damping"
+    remedy = f"set drive.cycles = {until:g} to let the free vibration that began at the start decay" if until else \
+        "the free vibration that began at the start has not decayed; give the modes in [[structure.mode]] more damping"
     ring = measures.get("ring_frequency")
     pitch = f" at {ring.value:.5g} Hz (damping {measures['ring_damping'].value:.2g})" if ring is not None else ""
-    note = (f"the free vibration from the start has not decayed{pitch}: loop_area contains energy that the interface "
-            f"stores and gives back, not only what it dissipates; {remedy}")
+    note = (f"the free vibration that began at the start has not decayed{pitch}: loop_area contains not only the "
+            f"energy that the interface dissipates but also energy that it stores and gives back; {remedy}")
     return StartRing(measures | wide, dict.fromkeys(missed, remedy), [note])
 
 

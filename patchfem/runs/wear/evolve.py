@@ -122,7 +122,8 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
     PatchfemError for an explicit jump beyond the critical one and for a slide in two directions.
     """
     if model.slide is not None and model.slide.across is not None:
-        text = unbuilt("with a slide in two directions", "leave out [wear] or the lateral column")
+        text = unbuilt("with a slide in two directions", "leave out [wear], or leave the column `lateral` out of "
+                                                         "slide.file")
         raise PatchfemError(text, "wear")
     clock, wear, motion, stopped = perf_counter(), model.wear, _Motion(model, patch), ""
     asked = Wearing(presser(model.patch, patch.pair), motion, areas(model.patch, patch.pieces.interface),
@@ -139,7 +140,7 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
         try:
             state = _jumped(model, asked, state)
         except _Unbounded as why:
-            stopped = f"wear was computed up to cycle {state.cycle:.6g} of {wear.cycles:.6g}: {why}"
+            stopped = f"wear was computed only up to cycle {state.cycle:.6g} of {wear.cycles:.6g}: {why}"
             break
         patch = pressed(model.patch, patch.pair, frozen_array(state.depth))
         moments = (*moments, _moment(patch, state, motion))
@@ -219,8 +220,8 @@ def _before(model, patch, area):
     begun.refuse_others(patch.x, patch.gap)
     depth = frozen_array(model.wear.depth_before(patch.x, area))
     if (gone := worn_through(model, depth)) is not None:
-        raise PatchfemError(f"{begun.path}: the coating of the {gone[0]} piece was worn through there; choose a run "
-                            "in which it was not", "wear.start")
+        raise PatchfemError(f"{begun.path}: in that run the coating of the {gone[0]} piece was worn through; choose a "
+                            "run in which this coating was not worn through", "wear.start")
     return pressed(model.patch, patch.pair, depth)
 
 
@@ -297,18 +298,19 @@ def load_state(path: Path, key: str) -> tuple:
         with np.load(path, allow_pickle=False) as file:
             found = {name: file[name] for name in file.files}
         if str(found["key"]) != key:
-            raise PatchfemError(f"{path.parent.name}: the saved state belongs to another scene or version; run "
-                                "without --resume")
+            raise PatchfemError(f"{path.parent.name}: the state saved there belongs to another scene or to another "
+                                "version of patchfem; run without --resume")
         whole = {name: found[f"state_{name}"] for name in STATE}
         state = Worn(**{name: float(value) if value.ndim == 0 else value for name, value in whole.items()})
         columns = [found[f"moment_{name}"] for name in MOMENT]
         moments = tuple(Moment(float(row[0]), *row[1:-1], float(row[-1]), values)
                         for *row, values in zip(*columns, json.loads(str(found["values"])), strict=True))
     except FileNotFoundError:
-        raise PatchfemError(f"{path.parent.name}: no interrupted run is saved there; run without --resume") from None
+        raise PatchfemError(f"{path.parent.name}: this folder contains no interrupted run; run without "
+                            "--resume") from None
     except PatchfemError:
         raise
     except Exception as error:  # a damaged archive has many ways to fail
-        raise PatchfemError(f"{path.parent.name}: the saved state cannot be read ({error}); run without "
+        raise PatchfemError(f"{path.parent.name}: the state saved there cannot be read ({error}); run without "
                             "--resume") from None
     return state, moments

@@ -72,7 +72,8 @@ def _ended(model, found, gone: dict) -> list:
     if model.patch.strips is not None:
         place += f" of the strip at y = {say(float(found.patch.strips.offsets[strip]), 3)}"
     return [f"the coating of the {name} piece, {say(thickness)}, is worn through at {place} after "
-            f"{found.state.cycle:.6g} of {model.wear.cycles:.6g} cycles; the measures are of the patch at that cycle"]
+            f"{found.state.cycle:.6g} of {model.wear.cycles:.6g} cycles; the measures are those of the patch at that "
+            "cycle"]
 
 
 def jumped(model, found, measures: dict) -> dict:
@@ -104,9 +105,9 @@ def _deep(model, found) -> list:
     for share, piece, name in ((model.wear.upper_share, asked.upper, "upper"),
                                (1 - model.wear.upper_share, asked.lower, "lower")):
         if share * depth > 0.2 * (piece.thickness or piece.height):
-            out.append(f"the {name} piece lost up to {say(share * depth, 3)}, more than 0.2 of its "
-                       f"{'coating' if piece.coating is not None else 'height'}, but the stiffness of the unworn piece "
-                       "is still used")
+            out.append(f"up to {say(share * depth, 3)} is worn off the {name} piece, more than 0.2 of "
+                       f"{'the thickness of its coating' if piece.coating is not None else 'its height'}, but the "
+                       "computation still uses the stiffness of the unworn piece")
     return out
 
 
@@ -178,12 +179,12 @@ def _beyond_table(model, found) -> list:
     deep, out = [mean_depth(found.patch, one.depth) for one in found.moments], []
     if deep[-1] > change.depth[-1]:
         out.append(f"the mean worn depth, {say(deep[-1], 3)}, is larger than the last value of wear.friction.depth, "
-                   f"{say(change.depth[-1], 3)}, and friction is taken as constant beyond that value; add a row with a "
-                   f"depth of at least {say(deep[-1], 3)}")
+                   f"{say(change.depth[-1], 3)}, and beyond that depth friction is taken as constant; extend the table "
+                   f"wear.friction to a depth of at least {say(deep[-1], 3)}")
     past = max(sum(one < row < two for row in change.depth) for one, two in pairwise(deep)) if len(deep) > 1 else 0
     if model.wear.jumps and past > 1:
-        out.append(f"one jump of the wear passes {past} rows of wear.friction and misses the values between them; "
-                   "leave out wear.jumps")
+        out.append(f"one jump of the wear passes {past} rows of the table wear.friction at once, so the values of some "
+                   "rows are not used; leave out wear.jumps")
     return out
 
 

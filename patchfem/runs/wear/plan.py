@@ -99,8 +99,8 @@ def cost(model, points: int, motion: float) -> float:
 
 def verdict(model) -> str:
     """A sentence on the jumps and on what they share."""
-    motion = "with the motion computed again after each" if _anew(model) else \
-        "with one motion for all of them, because wear does not change it"
-    many = f"{model.wear.jumps} jumps" if model.wear.jumps else (f"about {jumps_about(model)} jumps, chosen during the "
-                                                                 "run,")
+    motion = "with the motion computed again after each jump" if _anew(model) else \
+        "with the motion computed only once, because wear does not change it"
+    many = f"{model.wear.jumps} jumps" if model.wear.jumps else (f"about {jumps_about(model)} jumps (the run chooses "
+                                                                 "their number)")
     return f"wear: {model.wear.cycles:.6g} cycles in {many} {motion}"

@@ -174,7 +174,7 @@ def test_exact_engine_of_a_scene(tmp_path):
         assert contact_model(found, numerics, None).contact == f"dynamics.contacts.{kind}_kernels"
         used = quadrature_of(found, numerics).engine
         assert used == engine or engine == "auto"
-        assert any(f"the sum over bonds is by {used}" in line for line in plan(found).verdict)
+        assert any(f"method of the sum over bonds: {used}" in line for line in plan(found).verdict)
 
 
 def test_refuses_engines_that_cannot_sum_the_law(tmp_path):
@@ -187,7 +187,7 @@ def test_refuses_engines_that_cannot_sum_the_law(tmp_path):
 def test_exact_warning_of_energy_created(tmp_path):
     found = build(rig(tmp_path))
     assert created_warning(found, {"created": 2e-6, "dissipated": 1e-3}, 4) == [
-        'the law as printed in the report created 5e-07 J per cycle, 0.2 % of what it dissipated; set reading = '
-        '"stretch", which creates none']
+        'the law as printed in the report created 5e-07 J per cycle, 0.2 % of the energy that it dissipated; '
+        'with friction.reading = "stretch" no energy is created']
     assert created_warning(found, {"created": 0.0, "dissipated": 1e-3}, 4) == []
     assert created_warning(build(rig(tmp_path, reading="stretch")), {"created": 1.0, "dissipated": 1.0}, 4) == []

@@ -152,7 +152,8 @@ def test_refuses_wrong_temperatures_in_a_scene(sets, says):
 
 def test_refuses_a_scene_whose_rates_leave_the_range():
     scene = loads(POINT + GROWING + WARM + SLIDE, sets=["friction.temperature.surface=1 K"])
-    with pytest.raises(PatchfemError, match=r"scene.toml:\d+: friction.temperature: rest_growth would be 1e-"):
+    with pytest.raises(PatchfemError, match=r"scene.toml:\d+: friction.temperature: at the surface temperature "
+                                            r"rest_growth would be 1e-"):
         plan(scene)
 
 
@@ -184,17 +185,17 @@ def test_exact_rise_of_a_half_space_under_constant_heat(time, printed, within):
 
 def test_exact_the_rise_is_reported_beside_the_table_only():
     text = SMALL_PATCH + GROWING + WARM + TRIANGLE
-    lines = [w for w in run(plan(loads(text)), estimate=False).warnings if "would raise the surface temperature" in w]
-    assert len(lines) == 1 and "in a cycle" in lines[0] and "the run keeps" in lines[0]
+    lines = [w for w in run(plan(loads(text)), estimate=False).warnings if "the surface temperature would rise" in w]
+    assert len(lines) == 1 and "after one cycle" in lines[0] and "and keeps" in lines[0]
     found = run(plan(loads(SMALL_PATCH + GROWING + TRIANGLE)), estimate=False)
     assert not any("warm" in w for w in found.warnings)
     power = np.trapezoid(found.response.force, found.response.slide) / found.response.time[-1]
-    assert f"friction of {power:.1g}"[:14] in lines[0]
+    assert f"friction dissipates {power:.1g}"[:22] in lines[0]
     rig = run(plan(loads(SMALL_PATCH + GROWING + WARM + SHORT, sets=["accuracy.steps_per_cycle=100"])), estimate=False)
     power = rig.extra["book"]["friction"] / rig.response.time[-1]
-    assert any(f"friction of {power:.2g} W" in w and "in a cycle" in w for w in rig.warnings) and power > 0
+    assert any(f"friction dissipates {power:.2g} W" in w and "after one cycle" in w for w in rig.warnings) and power > 0
     none = run(plan(loads(POINT + GROWING + WARM + TRIANGLE)), estimate=False).warnings
-    assert any("no contact area" in w for w in none)
+    assert any("has no area" in w for w in none)
     own = text.replace(SUBSTRATE, 'substrate = {young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"}')
     assert any("conductivity" in w for w in run(plan(loads(own)), estimate=False).warnings)
 

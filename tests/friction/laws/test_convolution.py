@@ -281,7 +281,7 @@ def test_exact_the_plan_names_the_law():
 
 def test_refuses_an_uneven_pressure_on_a_rig():
     scene = loads(SMALL_PATCH + AVERAGED + SHORT, sets=["contact.tilt.angle=0.1 mrad"])
-    with pytest.raises(PatchfemError, match=r"friction.law: 'convolution' on a pressure that is not symmetric "
+    with pytest.raises(PatchfemError, match=r"friction.law: law 'convolution' with a pressure that is not symmetric "
                                             r"\(slip force .* N forward, .* N back\) is not supported yet"):
         run(plan(scene), estimate=False)
 

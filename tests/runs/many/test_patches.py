@@ -74,7 +74,7 @@ def test_exact_cases_of_every_kind_beside_each_other():
     texts.append(texts[0] + 'quadrature = "merged"\n')
     mine = same(meshed([build(scene.loads(text)) for text in texts]))
     said = [" ".join(mine.warnings.get(case, []) + mine.notes.get(case, [])) for case in range(len(texts))]
-    for part in ("beyond the small strains", "times as tall as long", "accuracy.quadrature = 'merged' has no meaning"):
+    for part in ("beyond the small strains", "times as tall as it is", "accuracy.quadrature = 'merged' has no meaning"):
         assert any(part in one for one in said), part
 
 

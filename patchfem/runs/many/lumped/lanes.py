@@ -243,8 +243,8 @@ def answered(models: Sequence[Model], cases: tuple, steps, exactly: Callable) ->
         wrong = contradicted(found, ones, looked, exact, times)
     if wrong:
         exact[:] = True
-        note = (f"in a check of {len(looked)} cases the fast engine differed from the exact one in {wrong}, so all "
-                "cases were computed by the exact engine")
+        note = (f"in {len(looked)} cases the fast engine was checked against the exact engine and differed from it in "
+                f"{wrong}, so all cases were computed by the exact engine")
     if (places := np.flatnonzero(exact)).size:
         lumped.take_out(found, places)
         found.place(places, exactly(places.tolist(), False))

@@ -28,8 +28,8 @@ from ..solution import Solution, sampled_loop
 from .curves import LAST, SHOWN, Shown, unlasting
 from .marched import disturbed, lasts, left_grooves
 
-ADRIFT = ('the steady motion that harmonic balance found on the grooves is unstable: another steady motion is reached '
-          'from rest; use accuracy.method = "march"')
+ADRIFT = ('the steady motion that harmonic balance found on the grooves is unstable, and from rest another steady '
+          'motion is reached; use accuracy.method = "march"')
 CYCLES, STEPS, FEW = 30, 256, 31  # of the march that a balance over grooves starts from, and its harmonics
 SAMPLES = 4096  # of the cycle that measures are read off
 
@@ -153,9 +153,9 @@ class BalanceFinder:
             return found, stable, ()
         found = periodic_point(self.modes, drive, self.group, self.harmonics, self.tolerance, start=lasts[0])
         sizes = ", ".join(say(one.amplitude(self.modes.output), 3) for one in every)
-        note = f"at this drive {len(every)} steady motions exist ({sizes}), {len(lasts)} of them stable" + (
-            "" if len(lasts) == 1 else "; the smallest stable motion is shown; accuracy.method = \"march\" gives the "
-                                       "motion reached from rest")
+        note = f"at this drive {len(every)} steady motions exist (amplitudes {sizes}), {len(lasts)} of them stable" + (
+            "" if len(lasts) == 1 else "; the stable motion of smallest amplitude is shown; accuracy.method = "
+                                       "\"march\" gives the motion that is reached from rest")
         return found, with_stability(found, self.modes), (note,)
 
     def shown(self, drive, near=None) -> Shown:

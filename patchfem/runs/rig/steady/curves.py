@@ -50,7 +50,7 @@ def exact_errors(values: dict, left: float) -> dict:
 def unlasting(multipliers) -> str:
     """The sentence on a steady motion that does not last; multipliers: Floquet's (m,)."""
     size = np.abs(multipliers).max()
-    return f"the steady motion that was found is unstable: a disturbance grows {size:.3g} times in a cycle; " \
+    return f"the steady motion that was found is unstable: a disturbance grows by the factor {size:.3g} per cycle; " \
         'use accuracy.method = "march"'
 
 
@@ -153,7 +153,7 @@ def motion_at_levels(finder, drive):
         sine = BaseSine(level, drive.segments[0].omega, drive.moving)
         return finder.shown(sine, points[number].near if number >= 0 else None).level
 
-    lost_ones = f"{len(said)} of {len(points)} levels no steady motion was found: "
+    lost_ones = f"no steady motion was found at {len(said)} of {len(points)} drive levels; at the first of them: "
     notes = tuple(f"{lost_ones}{one}" for one in said[:1])
     return replace(best[0], extra=best[0].extra | {"curve": curve_columns(points), "at": best[1]}, probe=probe,
                    levels=tuple(one.level for one in points), notes=(*best[0].notes, *notes))

@@ -73,8 +73,9 @@ class MarchFinder(Followed):
         if run.outcome is not None and run.outcome is not Outcome.EXCEEDS_TRAVEL:
             raise NotConverged(run.message)
         if run.outcome is None and left > LOOSE:
-            raise NotConverged(f"no periodic motion was found within {orbits.MOST} cycles: from one cycle to the next "
-                               f'the motion changes by {left:.2g} of its size; use accuracy.method = "march"')
+            raise NotConverged(f"no periodic motion was found within {orbits.MOST} cycles: "
+                               f"the motion still changes by {left:.2g} of its amplitude from one cycle to the next; "
+                               'use accuracy.method = "march"')
         return run, left
 
     def _read(self, run, steps: int, frames: int = 0) -> tuple:
