@@ -100,7 +100,7 @@ def test_always_a_batch_that_is_contradicted_is_exact(monkeypatch):
     monkeypatch.setattr(lanes, "runs_of", wrong)
     found, ones = many.answers(cases), lumped_answers(cases)
     assert all(one["engine"] == "exact" for one in found.numerics.values())
-    assert all("checked against the exact engine in" in notes[-1] and "loop_area" in notes[-1]
+    assert all("checked against the exact engine and" in notes[-1] and "loop_area" in notes[-1]
                for notes in found.notes.values())
     assert len(found.notes) == 64
     np.testing.assert_array_equal(found.values["loop_area"], ones.values["loop_area"])
