@@ -259,10 +259,11 @@ def _finer_under(seen, coarse) -> str:
     tighter = min((found for one in every if (found := _climbing(*one)) is not None), default=None)
     if tighter is None:
         seconds, most = max(ladder.next_seconds(one.patch) for one, _ in every), ladder.SPENT[False]
-        why = f"no accuracy.tolerance leads to a finer mesh: the next one would take about {plain(seconds, 2)} CPU s, " \
-            f"and a run with motion spends at most {most:g} CPU s on its mesh" if seconds > most else \
+        why = f"no accuracy.tolerance leads to a finer mesh: the next one would take about {plain(seconds, 2)} " \
+            f"CPU s, and a run with motion spends at most {most:g} CPU s on its mesh" if seconds > most else \
             "no accuracy.tolerance leads to a finer mesh"
-        return f"the mesh ({nodes} interface nodes) causes this error, and {why}; use the value with its stated error"
+        return (f"the mesh ({nodes} interface nodes) causes this error, and {why}; use the value with its stated "
+                "error")
     return (f"the mesh ({nodes} interface nodes) causes this error; set accuracy.tolerance = {tighter:.3g} for a "
             "finer mesh")
 
