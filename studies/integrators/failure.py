@@ -38,7 +38,7 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
-REPRODUCED = ("in part: the failures and their cure. The curves are not reproduced, because the report "
+REPRODUCED = ("in part: the failures and their cure are reproduced. The curves are not reproduced, because the report "
               "gives neither its step nor its tolerance")
 DRAWN = {"Fig 17, 18: displacement 1e-2": "displacement", "Fig 19, 20: velocity 1e-4": "velocity",
          "static branch, force 1e-6": "force, static branch", "Fig 21, 22: elastic 0.01, velocity 1e-6": "elastic"}

@@ -1,8 +1,9 @@
-"""Do computed numbers and Table 1 of the report support its ten conclusions?
+"""Do computed numbers and Table 1 of the report support the ten conclusions of the report?
 
-Six hold fully (1, 3, 5, 7, 8, 10) and four partly. Conclusion 2: a damping ratio of 0.003 limits the motion too, at 218
-mil. Conclusion 4: only a block that runs away moves as a sine. Conclusion 6: slip begins 47 degrees before the input's
-maximum. Conclusion 9: the exact velocity reaches zero without a jump; only the acceleration jumps.
+Six hold fully (1, 3, 5, 7, 8, 10) and four partly. Conclusion 2: not only stiffening but also a damping ratio of 0.003
+limits the motion, at 218 mil. Conclusion 4: only a block that runs away moves as a sine. Conclusion 6: slip begins 47
+degrees before the input's maximum. Conclusion 9: the exact velocity reaches zero without a jump; only the acceleration
+jumps.
 
 `conclusions.md` has every claim in short, what is found and the number, written by this study. The block is that of
 Figs 2 and 3: one mode at 143 Hz, an onset of 4.14 g, a damping ratio of 0.003.
@@ -68,9 +69,9 @@ def first() -> Conclusion:
     return Conclusion(1, "slip begins at the same level at all frequencies", HOLDS,
                       f"The six onsets of slip in Table 1 have the mean {np.exp(onset.mean()):.2f} g and a standard "
                       f"deviation of {100 * onset.std(ddof=1):.1f} %. A fitted power law of the frequency has the "
-                      f"exponent {line.slope:.1f} ± {half:.1f} (95 %). The two series at 135 Hz differ as much as all "
-                      "frequencies do. A Coulomb block begins to slip at the same level, mu N/m, at "
-                      f"{', '.join(map(str, held))} Hz.")
+                      f"exponent {line.slope:.1f} ± {half:.1f} (95 %). The onsets of the two series at 135 Hz "
+                      "differ as much as the onsets at all frequencies do. A Coulomb block begins to slip at the "
+                      f"same level, mu N/m, at {', '.join(map(str, held))} Hz.")
 
 
 def second() -> Conclusion:
@@ -80,9 +81,10 @@ def second() -> Conclusion:
     share = 0.75 * cubic * (10 * MIL)**2 / (0.8546 * (2 * np.pi * 143)**2)
     return Conclusion(2, "above a certain level the motion diverges; only the stiffening of the flexures limits it",
                       PART, f"A rigid block diverges from {knee():.2f} g on, and a block that climbs 80 um grooves "
-                      "at 8.0 g. But a damping ratio of 0.003 limits the rigid block too: at 8 g it reaches "
-                      f"{value['relative_displacement_amplitude'] / MIL:.0f} mil. To limit the block to 10 mil, the "
-                      f"flexures would have to be {100 * share:.0f} % stiffer in a cycle of this amplitude.")
+                      "at 8.0 g. But a damping ratio of 0.003 limits the rigid block too: at 8 g its amplitude "
+                      f"is {value['relative_displacement_amplitude'] / MIL:.0f} mil. To limit the block to 10 mil, the "
+                      f"flexures would have to be {100 * share:.0f} % stiffer in a cycle of this amplitude "
+                      "than in small cycles.")
 
 
 @lru_cache
@@ -118,7 +120,7 @@ def fourth() -> Conclusion:
                       "The third harmonic of the block's acceleration, divided by the first, is " + ", ".join(
                           f"{one:.2f} at {level:g} g" for level, one in share.items())
                       + f". But at 6 g the block moves by {moved:.0f} mil. If a block climbs grooves and moves by less "
-                      "than 1 mil, as the rig did, this ratio increases: 0.23 at 5 g, 0.35 at 8 g.")
+                      "than 1 mil, as the rig did, this ratio increases with the level: 0.23 at 5 g, 0.35 at 8 g.")
 
 
 def fifth() -> Conclusion:
@@ -142,7 +144,7 @@ def seventh() -> Conclusion:
         float(level))[0]]
     return Conclusion(7, "the masses are stuck while the input displacement returns through zero", HOLDS,
                       f"At 5 g the block is stuck from {stop:.0f} to {180 + release:.0f} degrees; the input is zero at "
-                      f"180 degrees. The block is stuck at this zero at every level from {levels[0]:.1f} to "
+                      f"180 degrees. The block is stuck at this phase at every level from {levels[0]:.1f} to "
                       f"{levels[-1]:.1f} g (in steps of 0.1 g). From {knee():.2f} g on the block never stops.")
 
 
@@ -154,7 +156,7 @@ def eighth() -> Conclusion:
     lag = -np.degrees(np.angle(block_of / base))
     return Conclusion(8, "the masses slip again and follow the input, lagging", HOLDS,
                       f"At 5 g the block slips again at {180 + phases(5.0)[0]:.0f} degrees. The first harmonic of its "
-                      f"motion lags by {lag:.0f} degrees.")
+                      f"motion lags by {lag:.0f} degrees behind the input.")
 
 
 def ninth() -> Conclusion:
@@ -172,7 +174,7 @@ def tenth() -> Conclusion:
     turns = figure_5.turns(figure_5.motion()).size
     return Conclusion(10, "the analysis shows no ringing, because its model has one degree of freedom", HOLDS,
                       "A stuck block has no part left that could move, and a sliding block swings at its natural "
-                      "frequency, which is also that of the drive. Driven at a tenth of its natural frequency, the "
+                      "frequency, which is also the drive frequency. Driven at a tenth of its natural frequency, the "
                       f"same model does ring: the block reverses {turns} times a cycle (Fig. 5).")
 
 

@@ -1,8 +1,8 @@
 """Does a released block come to rest after the time pi N0/w0, about 11 units, as eq. 3.11 and Fig. 15 say?
 
-Partly. With N0 rounded up, eq. 3.11 is exact to 3e-16 of x0. Then the 11 units follow from N0 = 7 and w0 = 2 (10.996),
-or from N0 = 5 and w0 = 1.414 (11.107). As printed, N0 is not rounded: w0 = 1 and k x0/F = 8 give N0 = 3.5 and a time of
-10.996. At that time the block still moves; it rests at 12.566.
+Partly. If N0 is rounded up to a whole number, eq. 3.11 is exact to 3e-16 of x0. The 11 units then follow from N0 = 7
+and w0 = 2 (10.996), or from N0 = 5 and w0 = 1.414 (11.107). The report prints N0 without rounding: w0 = 1 and k x0/F =
+8 then give N0 = 3.5 and a time of 10.996. At that time the block still moves; it rests at 12.566.
 
 The report prints N0 = (k x0/F - 1)/2 without a word of rounding. (-1)^N0 is no real number then, and the size that goes
 with it is F/k whatever the start: every block would rest where friction just holds it. In truth the block stops at the

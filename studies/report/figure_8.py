@@ -40,8 +40,8 @@ from patchfem.scene.scene import loads
 
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
-REPRODUCED = ("in part: the ringing, in an example with assumed numbers. The report gives neither the scales of the "
-              "figure nor data of the assembly")
+REPRODUCED = ("in part: the ringing is reproduced in an example with assumed numbers. The report gives neither the "
+              "scales of the figure nor data of the assembly")
 STROKE, OWN, DAMPING, MASS, HEAVY = 50e-6, 500.0, 0.01, 1.0, 1e6  # m, Hz, 1, kg, kg: as figure_8.toml has them
 FREQUENCIES = (2.0, 5.0, 10.0, 20.0, 40.0)  # of the slider [Hz]
 LIMIT = 0.3 * 26 * 4.4482216152605  # N

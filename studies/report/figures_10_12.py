@@ -1,8 +1,8 @@
 """Do two rubbing masses ring below resonance, as in Fig. 10, but not near or above resonance, as in Figs 11 and 12?
 
-Yes. Driven at 0.1 w0, the rubbed mass reverses about 14 times a cycle, while the motion of the driven mass stays within
-5 % of a sine. From 0.5 w0 on, each mass reverses about twice a cycle. At w0 the motion of the rubbed mass is a sine to
-0.2 %.
+Yes. At a drive frequency of 0.1 w0, the rubbed mass reverses its motion about 14 times a cycle; the motion of the
+driven mass stays within 5 % of a sine. From 0.5 w0 on, each mass reverses about twice a cycle. At w0 the motion of the
+rubbed mass is a sine to 0.2 %.
 
 Equations 2.6 and 2.7 with friction 0.1 P0, V0 = 0.01 P0/sqrt(K m) and 2 % of damping. Half peak to peak of x1 and x2 in
 P0/k: 0.128 and 0.921 at 0.1 w0, 3.18 and 21.82 at w0, 0.0051 and 0.0402 at 5 w0. The ringing is not loudest in Fig. 10

@@ -1,5 +1,5 @@
-"""Do Figs 30 and 31 show what the report reads from them: waves of 80 um that are isotropic before the tests, much
-lower after the tests, and then lowest along x?
+"""The report reads from Figs 30 and 31 that the waves of 80 um are isotropic before the tests, that they are much lower
+after the tests, and that after the tests the waves along x are the lowest. Do the figures show this?
 
 Partly. The study cuts sets of four traces from a synthetic surface, on which wear multiplies the height of the waves by
 0.55 along x and 0.67 along y. In 7 of 20 such sets `compare` finds that the waves along x became lower, and in 5 sets
@@ -50,7 +50,7 @@ from patchfem.surface.roughness.report import interval_of
 
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
-REPRODUCED = ("in part: on synthetic surfaces, compared with four heights that are printed above the curves. The "
+REPRODUCED = ("in part: synthetic surfaces were compared with the four heights that are printed above the curves. The "
               "curves themselves could not be read, and four traces cannot prove everything that the report says")
 PRINTED = ((30.5626e-6, 21.5831e-6), (17.8602e-6, 14.8619e-6))  # heads of Figs 30 and 31 [m]: first and second scan
 STROKES, SETS, APART = (2, 4), 20, 160  # steps of 3.2 um; sets of four traces; lines between before and after

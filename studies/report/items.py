@@ -1,4 +1,4 @@
-"""Which items of the report can be computed here, and by which scene, study and test?
+"""Which items of the report can this program compute, and with which scene, study and test?
 
 See items.md in this folder, which this script writes.
 
@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 HERE = Path(__file__).parent
+SHOWN = {"nothing": "nothing to compute"}
 VERDICTS = {"works": "work", "in part": "work in part", "missing": "are missing", "nothing": "have nothing to compute"}
 
 
@@ -72,7 +73,7 @@ ITEMS = (
     Item("2.C, eqs 2.14, 2.15, Figs 13, 14", "weights of a bond along and across the path", LOOP, _figure("_13"),
          "tests/friction/bonds/test_spread.py", "works"),
     Item("2.C, eqs 2.16, 2.17", "the nonlocal law as printed", PRINTED, "studies/rig/readings.py",
-         "tests/friction/bonds/test_list_truths.py", "in part: the program refuses this law over grooves"),
+         "tests/friction/bonds/test_list_truths.py", "in part: the program refuses to combine this law with grooves"),
     Item("2.C, eq. 2.17", "the nonlocal law on pieces that deform in shear", RIG, "studies/rig/readings.py",
          "tests/dynamics/march/test_shear_lists.py", "works"),
     Item("2.C, eq. 2.17", "the law uses the normal stress at the place where a bond formed", LOOP, "",
@@ -96,11 +97,11 @@ ITEMS = (
     Item("3.C.2, Fig. 16", "two masses with a rigid-body mode and friction on the second mass", TWO,
          "studies/integrators/failure.py", "tests/studies/test_integrators.py", "works"),
     Item("3.C.2, Figs 17, 18",
-         "if steps are accepted by their displacement, mass 2 moves although friction should hold it", BLOCK,
+         "if the displacement decides whether a step is accepted, mass 2 moves although friction should hold it", BLOCK,
          "studies/integrators/failure.py", "tests/studies/test_integrators.py", "works"),
     Item("3.C.2, Figs 19, 20",
-         "if steps are accepted by their velocity, mass 2 does not drift, but the friction force is erratic", BLOCK,
-         "studies/integrators/failure.py", "tests/studies/test_integrators.py", "works"),
+         "if the velocity decides whether a step is accepted, mass 2 does not drift, but the friction force is erratic",
+         BLOCK, "studies/integrators/failure.py", "tests/studies/test_integrators.py", "works"),
     Item("3.C.3, eq. 3.12, Figs 21, 22", "the simplified law, elastic up to the friction limit", BLOCK,
          "studies/integrators/failure.py", "tests/dynamics/events/test_elastic_plastic.py", "works"),
     Item("4.A", "threaded rods and flexures act as springs; the load is a weight on a cable", RIG, "",
@@ -118,7 +119,8 @@ ITEMS = (
     Item("4.B", "rocking at 73 Hz and yaw at 129 Hz, in addition to the axial mode", RIG, "studies/table_1/unfitted.py",
          "tests/studies/test_table_1.py", "works"),
     Item("4.B, Fig. 27", "with a load of 26 lbf: nearly critically damped in the vicinity of 148 Hz", GROOVED,
-         _figure("_27"), MODAL, "in part: the critically damped mode lies at 101, 128 to 135 or 295 Hz, not at 148 Hz"),
+         _figure("_27"), MODAL, "in part: the critically damped mode lies at 101 Hz, at 128 to 135 Hz or at 295 Hz, "
+         "depending on the model, but not at 148 Hz"),
     Item("4.B, Fig. 27", "rocking and yaw are suppressed when the pieces rub", RIG, "studies/report/engaged.py",
          RIG_DID, "works"),
     Item("4.B", "asymmetric friction would have excited yaw", RIG, "studies/misalignment/roll.py",
@@ -138,8 +140,8 @@ ITEMS = (
     Item("4.D, Figs 30, 31", "surface profiles: waves of 80 um length and 13 to 18 um height, lower after the tests",
          "", _figure("s_30_31"), FIGURES, "in part: on synthetic surfaces; the printed curves could not be read"),
     Item("4.D, Figs 2, 3, 32, 33",
-         "at 5 g: computed q = 0.15 and measured 0.23 mil; computed acceleration 5 g and measured 6 g", BLOCK,
-         _figure("s_2_3"), FIGURES, "works"),
+         "at 5 g: amplitude computed as q = 0.15 and measured as 0.23 mil; acceleration computed as 5 g and measured "
+         "as 6 g", BLOCK, _figure("s_2_3"), FIGURES, "works"),
     Item("4.D", "the analysis predicts no slip at 4 g and divergence at 8 g", BLOCK, _figure("s_2_3"), FIGURES,
          "works"),
     Item("Table 1", "absolute accelerations at four frequencies and several levels", RIG, "studies/table_1/ladder.py",
@@ -151,7 +153,7 @@ ITEMS = (
     Item("Table 1", "repeated readings at 135 and 143 Hz", RIG, "studies/report/repeats.py",
          "tests/studies/test_table_1_repeats.py", "works"),
     _conclusion(1, "slip begins at the same level at all frequencies"),
-    _conclusion(2, "above a certain level the motion diverges; stiffening limits it"),
+    _conclusion(2, "above a certain level the motion diverges; stiffening limits the motion"),
     _conclusion(3, "sticking and slipping make the mass ring"),
     _conclusion(4, "responses can be nearly sinusoidal above certain levels"),
     _conclusion(5, "only a portion of the area rubbed, because the pieces were not well aligned"),
@@ -161,8 +163,9 @@ ITEMS = (
     _conclusion(9, "when the mass sticks, its velocity drops and its acceleration jumps"),
     _conclusion(10, "a model of one degree of freedom does not ring"),
     Item("Table 1, 4.D", "levels of runaway: from 6 g on at 135 Hz, 8 g at 143 Hz", GROOVED,
-         "studies/report/runaways.py", RIG_DID, "in part: with friction far off the axis the rig also runs away first "
-         "at 135 Hz, but with 8 to 11 times the measured displacement; no model fitted to Table 1 does"),
+         "studies/report/runaways.py", RIG_DID, "in part: with friction far off the axis the computed rig also has its "
+         "lowest level of runaway at 135 Hz, but its displacement is 8 to 11 times the measured one; no model fitted "
+         "to Table 1 has its lowest level of runaway at 135 Hz"),
     Item("5", "relative and absolute acceleration", BLOCK, _figure("s_2_3"),
          "tests/response/test_measures.py", "works"),
     Item("2.C, reference 2", "the nonlocal law of Oden and Pires, which averages over x", LOOP,
@@ -190,8 +193,8 @@ ITEMS = (
     Item("5, conclusion 2", "stiffening of the flexures at large motion", "studies/table_1/rigid.toml",
          "studies/report/conclusions.py", CONCLUDED, "works"),
     Item("1", "the friction of many asperities, derived from that of one", "", "studies/misalignment/rough_skin.py",
-         "tests/contact/test_skin.py", "in part: stiffness and pressure of many asperities, but no friction law "
-         "derived from them"),
+         "tests/contact/test_skin.py", "in part: stiffness and pressure of many asperities are computed, but no "
+         "friction law is derived from them"),
 )
 
 
@@ -205,12 +208,12 @@ def table(items=ITEMS) -> str:
     counts = [(sum(one.verdict.split(":")[0] == verdict for one in items), words) for verdict, words in
               VERDICTS.items()]
     rows = [f"| {number} | {one.place} | {one.said} | {link(one.scene)} | {link(one.study)} | {link(one.test)} | "
-            f"{one.verdict} |" for number, one in enumerate(items, 1)]
+            f"{SHOWN.get(one.verdict, one.verdict)} |" for number, one in enumerate(items, 1)]
     return "\n".join([
         "# The report, item by item", "This page is generated by `items.py`. The verdict says whether this program can "
-        "compute the item. Whether the report is right is said by the study of the item and, for the conclusions, by "
-        "[their table](conclusions.md).", "",
-        f"Of {len(items)} items {', '.join(f'{count} {words}' for count, words in counts)}.", "",
+        "compute the item. The study of the item says whether the report is right; for the ten conclusions, [a table]"
+        "(conclusions.md) says this.", "",
+        f"Of {len(items)} items, {', '.join(f'{count} {words}' for count, words in counts)}.", "",
         "| | section of the report | what the report says | scene | study | test | verdict |",
         "|---|---|---|---|---|---|---|", *rows, ""])
 

@@ -88,11 +88,15 @@ def table(found: list, seconds: dict) -> str:
     known = [seconds[one.path] for one in found if seconds.get(one.path) is not None]
     return "\n".join([
         "# All studies in one table", "`table.py` generates this page from the studies. Computing times are CPU "
-        f"seconds of one core. {len(known)} of {len(found)} studies were measured and take {sum(known):.0f} s together."
-        " A dash means that the study was not measured yet, or that it needs a file or another program. "
+        f"seconds of one core. The times of {len(known)} of {len(found)} studies were measured; their sum is "
+        f"{sum(known):.0f} s. A dash means that the time was not measured yet, or that the study needs a file or "
+        "another program. "
         f"Studies that take more than {LONG} s are marked \"long\".", "",
-        f"{len(figures)} of the studies compute figures of the report: {yes} reproduce their figure, the others only a "
-        "part of it. [The ten conclusions of the report](conclusions.md) have their own table.", "",
+        f"{len(figures)} of the studies compute figures of the report. {yes} of these studies reproduce their figure "
+        "completely, the others only a part of their figure. [The ten conclusions of the report](conclusions.md) have "
+        "their own table.", "", "Table 1 of the report lists measured accelerations and displacements of the rig. "
+        "The score of a model is the root mean square of ln(computed/measured) for Table 1. Three scores separated "
+        "by slashes are those of all readings, of the accelerations and of the displacements.", "",
         "| study | question | answer | computing time [s] | is the figure of the report reproduced? |",
         "|---|---|---|---|---|", *rows, ""])
 
