@@ -91,7 +91,8 @@ SCREEN = {
               "cite": (start, "BibTeX of a scene's sources", "joint.toml")}}
 VERBS = {verb: row[0] for verbs in SCREEN.values() for verb, row in verbs.items()}
 
-OUT_OF_MEMORY = "out of memory; `patchfem plan` names what needs most memory and the key that sets its size"
+OUT_OF_MEMORY = ("out of memory; `patchfem plan` names the part of the computation that needs most "
+                 "memory and the key that sets the size of this part")
 
 app = App(name="patchfem", version=__version__, help_format="plaintext", suppress_keyboard_interrupt=False,
           help="friction, vibration and wear of two rubbing surfaces.")

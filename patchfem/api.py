@@ -186,8 +186,8 @@ def backbone(scene: str | Path | Scene | Model, /, *, mode: str = "",
     model = joint.freed(build(scene, **sets))
     ways = backbones.WAYS if _word(method, "backbone: method") == "all" else (method,)
     if unknown := set(ways) - set(backbones.WAYS):
-        raise PatchfemError(f"backbone: method {unknown.pop()!r} is not known; use one of {', '.join(backbones.WAYS)}, "
-                            "or all")
+        raise PatchfemError(f"backbone: method {unknown.pop()!r} does not exist; use one of "
+                            f"{', '.join(backbones.WAYS)}, or 'all'")
     wanted = None if amplitudes is None else axes.lengths(_lengths(amplitudes), "amplitudes")
     found = backbones.backbone(model, _word(mode, "backbone: mode"), wanted, ways)
     return backbone_files.contents(found, model.source.title).to_xarray()
@@ -209,7 +209,7 @@ def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *
     "failed" and its message. Raises SceneError if no case is valid.
     """
     if over is not None and not isinstance(over, Mapping):
-        raise PatchfemError(f"sweep: over must be a dict of keys and their values, not {over!r:.60}")
+        raise PatchfemError(f"sweep: `over` must be a dict of keys and their values, not {over!r:.60}")
     if wrong := oversized(over or {}):
         raise SceneError(wrong)
     asked = case_models.Asked(*_text_of(scene), of=of)
@@ -237,7 +237,7 @@ class SweepPlots:
         does not contain.
         """
         if not hasattr(dataset, "coords") or not any(str(name).endswith("_error") for name in dataset):
-            raise PatchfemError("plot.sweep: the Dataset of pf.sweep is needed, with measures and their errors")
+            raise PatchfemError("plot.sweep: give the Dataset that pf.sweep returns, with measures and their errors")
         figure = swept.draw.figure(dataset, measure, onto=ax)
         return figure.axes[0] if ax is None else ax
 
@@ -250,7 +250,7 @@ class SweepPlots:
         """
         ways = [way for way in backbones.WAYS if f"{way.replace('-', '_')}_amplitude" in getattr(dataset, "coords", ())]
         if not ways:
-            raise PatchfemError("plot.backbone: the Dataset of pf.backbone with at least one curve is needed"
+            raise PatchfemError("plot.backbone: give a Dataset of pf.backbone that contains at least one curve"
                                 + "".join(f"; {why}" for why in [getattr(dataset, "attrs", {}).get("missing")] if why))
         curves = {way: SimpleNamespace(**{name: dataset[f"{way.replace('-', '_')}_{name}"].values
                                           for name in backbone_files.COLUMNS}) for way in ways}
@@ -296,7 +296,7 @@ def fit(scene: str | Path | Scene, /, *, to: str | Path = "", free: Mapping[str,
     """
     found, tell = load(scene, **sets), _on_stderr if say is None else say
     if not isinstance(free, Mapping | None):
-        raise PatchfemError(f"fit: free must be a dict of keys and their ranges (low, high), not {free!r:.60}")
+        raise PatchfemError(f"fit: `free` must be a dict of keys and their ranges (low, high), not {free!r:.60}")
     asked = [f"{key}={_ends_of(key, ends)}" for key, ends in (free or {}).items()]
     slides = "" if amplitudes is None else _lengths(amplitudes)
     options = fits.Options(_words(hold, "fit: hold"), _words(offset, "fit: offset"), warm_up, leave_out, starts, seed,

@@ -22,7 +22,8 @@ class Estimate:
     band: word('frequency band in which to find modes, such as "20 Hz..400 Hz"') = ""
     decay: flag("treat the record as a free decay; frequency and damping are then computed without a record of the "
                 "input") = False
-    begin: word('time at which the free decay begins, such as "0.2 s"; default: time of the largest value') = ""
+    begin: word('time at which the free decay begins, such as "0.2 s"; default: time of the largest '
+                'value of the record') = ""
 
 
 def import_(file: Path, /, *, out: Annotated[Path, Parameter(

@@ -28,7 +28,8 @@ from .shared import (
 
 
 def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False,
-        resume: flag("continue an interrupted run, if it has [wear] or is integrated in time") = False,
+        resume: flag("continue an interrupted run; possible with [wear] and for a run that is integrated in "
+                     "time") = False,
         fresh: flag("compute the stiffness of the pieces again instead of taking it from the cache") = False,
         no_page: NoPage = False, quiet: Quiet = False,
         verbose: flag("print also the computing time of each part of the run", "-v", "--verbose") = False):
@@ -43,7 +44,7 @@ def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False
                       "state; run the scene again without --resume")
     if verbose:
         compiles = plan.compile_words(what.compile_seconds)
-        talk(f"about {what.seconds:.1f} s{compiles}, {what.steps} steps, engine {what.engine}")
+        talk(f"about {what.seconds:.1f} s of computing time{compiles}, {what.steps} steps, engine {what.engine}")
     target = placed(out, what.model.source.path.stem)
     with progress_bar(quiet or json_) as progress:
         written = folder.run_into(what, target, talk, progress, fresh, resume)
@@ -101,6 +102,6 @@ def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
         print(f"fields: {target / 'fields.vtkhdf'} for ParaView 5.13 or newer; for older versions run `patchfem export "
               f"{place} -o {shlex.quote(str(target / 'fields.pvd'))}`")
     if inside := sorted(target.glob("interfaces/*")):
-        print(f"fields: those of every interface are in {target / 'interfaces'}; to show them, run `patchfem view "
-              f"{shlex.quote(str(inside[0]))}`")
+        print(f"fields of each interface: in {target / 'interfaces'}; to show those of the first interface, run "
+              f"`patchfem view {shlex.quote(str(inside[0]))}`")
     sys.stdout.flush()

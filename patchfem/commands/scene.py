@@ -119,7 +119,7 @@ def _print_plan(answer: dict, probe: bool, verbose: bool) -> None:
         print("         the shear stiffness of the pieces is an upper estimate; use --probe to compute it")
     for one in answer.get("modes", ()):
         held = "" if one["stuck_frequency"] is None else f", {one['stuck_frequency']:.5g} Hz while the contact sticks"
-        print(f"mode     {one['name']} {one['free_frequency']:.5g} Hz free{held}")
+        print(f"mode     {one['name']} {one['free_frequency']:.5g} Hz without contact{held}")
     for name, value in answer["groups"].items():
         print(f"group    {_group(value, name)}")
     if verbose:

@@ -110,8 +110,8 @@ class Rows:
              "curve of frequency and damping against amplitude")] = None
     seed: Annotated[int, Parameter(help="seed of the random starts, such as 1")] = 0
     unstable: Annotated[Literal["bound", "out", "read"], Parameter(
-        help="how the fit uses rows with the flag U, such as out: bound (as lower bounds), out (not at all) or read "
-             "(like all other rows)")] = "bound"
+        help="how the fit uses rows with the flag U (unstable in the test), such as out: bound uses their readings as "
+             "lower bounds, out leaves these rows out, read uses them like all other rows")] = "bound"
     placebo: texts('repeat the fit with each of these values, such as "structure.mode.yaw.frequency=110 Hz,138 Hz", to '
                    "check whether the value in the scene fits the measured rows best") = ()
     resume: flag("continue an interrupted fit; starts already finished are not repeated") = False
@@ -128,9 +128,10 @@ def fit(scene: Path, /, *, to: word(
                          'default: amplitudes from the onset of slip upwards') = "",
         hold: texts('rows to hold out: the fit predicts them but does not use them, such as "frequency=135 Hz,150 '
                     'Hz"') = (),
-        offset: texts("for a loop: offset to fit as well, such as force (constant over the record) or displacement "
-                      "(of the first row from the position without stress); may be repeated") = (),
-        warm_up: flag("for a loop: run the whole cycles of the record once before the cycles that are fitted") = False,
+        offset: texts("for a loop: offset to fit as well, such as force (a constant force over the whole record) or "
+                      "displacement (distance of the first row from the stress-free position); may be repeated") = (),
+        warm_up: flag("for a loop: compute the whole cycles of the record once, as a run-in, before the fitted "
+                      "cycles") = False,
         rows: Annotated[Rows, Parameter(name="*")] = Rows(),
         out: Out = None, set_: Sets = (), json_: Json = False, quiet: Quiet = False):
     """Fit values of keys of SCENE to measurements. A bench is fitted to a friction loop. A rig is fitted to rows of

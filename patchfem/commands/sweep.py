@@ -37,7 +37,7 @@ class Over:
     sobol: Annotated[int, Parameter(name="--sobol", show_default=False, help="number of cases from Sobol's sequence, "
                                                                              "such as 256; a power of 2 is best")] = 0
     seed: Annotated[int, Parameter(name="--seed", help="seed of the random cases, such as 1")] = 0
-    of: word("measure that the answer and the first picture of the page are about, such as equivalent_damping",
+    of: word("measure that the printed answer and the first picture of the page show, such as equivalent_damping",
              "--of") = ""
 
     def given(self) -> bool:

@@ -19,8 +19,8 @@ WAYS = {"balance": "The curve belongs to the periodic motion that the rig would 
                    "slow decay follows this motion, and so does a test in phase resonance.",
         "decay": "The curve belongs to a free decay from the largest amplitude; frequency and damping are evaluated "
                  "from one turning point to the next.",
-        "quasi-static": "The frequency follows from a static force that is distributed like the mode with the contact "
-                        "stuck, the damping from the loops of the friction law."}
+        "quasi-static": "The frequency follows from the deflection under a static force that is distributed like the "
+                        "mode with the contact stuck. The damping follows from the loops of the friction law."}
 COLOURS = {"balance": "accent", "decay": "warm", "quasi-static": "#2f9e63"}
 LISTED, MOST_LISTED = 9, 25  # amplitudes in the table on the screen of a curve of more, and the most of others
 
@@ -152,8 +152,7 @@ def sentences(found: Backbone) -> list:
         out.append(f"The energy that the contact dissipates per cycle grows with the amplitude {' and '.join(powers)}.")
     if found.flutter is not None:
         out.append(f"At amplitudes above {scales.short(found.flutter, 'm', 3)} the mode gains energy, because "
-                   f"friction no longer "
-                   "dissipates enough.")
+                   "friction dissipates less than the negative damping supplies.")
     return out
 
 

@@ -68,7 +68,7 @@ def draw(knob: str, runs: list, tolerance: float, names: list):
     the measures shown.
     """
     figure, axes = drawing(2, 4.6, sharex=True, sharey=True)
-    for axis, part, title in ((axes[0], "errors", "error that the run states"),
+    for axis, part, title in ((axes[0], "errors", "error estimated by the run"),
                               (axes[1], "distances", "difference from the best run")):
         axis.set(xscale="log", yscale="log", xlabel="CPU seconds of a run", title=title)
         for number, name in enumerate(names):
@@ -80,9 +80,9 @@ def draw(knob: str, runs: list, tolerance: float, names: list):
     axes[0].set_ylim(low, high * (high / low)**(0.05 + 0.06 * max(len(group) for group in groups)))
     for axis in axes:
         _name_runs(axis, groups)
-    axes[0].set_ylabel("relative to the measure")
+    axes[0].set_ylabel("error or difference, divided by the measure")
     stars = "; star: setting that follows from the scene's tolerance" if any(one.value is None for one in runs) else ""
-    by = "tolerance of the mesh" if runs[0].words.startswith("element size by tolerance") else AXES[knob]
+    by = "tolerance of the mesh" if runs[0].words.startswith("element size set by the tolerance") else AXES[knob]
     figure.suptitle(f"What accuracy costs, by {by}{stars}", fontsize=11)
     labelled = [axis.get_legend_handles_labels() for axis in axes]
     handles = {label: handle for found in labelled for handle, label in zip(*found, strict=True)}

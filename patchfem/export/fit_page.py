@@ -19,15 +19,15 @@ def page(answer: dict, lines: Sequence, folder: Path) -> str:
     short = "; ".join(f"{escape(key)} = {_short(one)}" for key, one in values.items())
     law = f"{answer['law']}: " if "law" in answer else ""
     told = [lines[0], *(lines[1 + len(values):] if isinstance(answer.get("rms"), dict) or "offsets" in answer else ())]
-    bars = " Brackets hold the intervals of 95 %." if any(one.get("interval") for one in values.values()) else ""
+    bars = " Brackets enclose 95 % intervals." if any(one.get("interval") for one in values.values()) else ""
     lead = (f"<div class=verdict><b>{law}{short}</b><p>{escape('; '.join(' '.join(one.split()) for one in told))}."
             f"{bars}</p></div>{warned(answer['warnings'])}")
     sections = [Section("values", "Fitted values", _values(values))]
     if (folder / PICTURE).is_file():
         caption = {"rows": "Computed against measured readings; the line is where both are equal",
-                   "decay": "Frequency and damping ratio over the amplitude: measured with errors, and fitted",
-                   "patch": "The patch and each law in its place, over the amplitude of the slide"}
-        text = caption.get(answer["quantity"], "Measured and fitted; on the right what is left over, row by row")
+                   "decay": "Frequency and damping ratio against amplitude: measured values with errors, and the fit",
+                   "patch": "Stiffness and loss per cycle of the patch and of each fitted law, against slide amplitude"}
+        text = caption.get(answer["quantity"], "Measured and fitted values; on the right the residual of each row")
         picture = (folder / PICTURE).read_text("utf-8")
         sections.append(Section("picture", "Measured and fitted", figure(0, picture, f"{text}.", text)))
     if len(answer.get("correlation", ())) > 1:
@@ -67,4 +67,5 @@ def _correlation(answer: dict, names: list) -> str:
     rows = [[escape(name), *("&ndash;" if one is None else f"{one:.2f}" for one in row)]
             for name, row in zip(names, answer["correlation"])]
     return table(("key", *(f">{escape(name)}" for name in names)), rows) + \
-        "<p class=soft>Near 1 or -1 the measurement determines only a combination of two values.</p>"
+        "<p class=soft>If a correlation is near 1 or -1, the measurement determines only a combination of these two " \
+        "values.</p>"

@@ -133,8 +133,9 @@ def sentences(law: str, answer: dict) -> list:
             f"{'larger' if loss['largest'] > 0 else 'smaller'} than that of the patch (at {there}) and differs by "
             f"{_percent(loss['rms'])} rms; where this energy is below a thousandth of 4 x force x slide, the "
             f"difference is given relative to that thousandth.",
-            "The error of a mode's frequency is then at most about half that of the stiffness; the error of its "
-            "friction damping is at most the sum of both."]
+            "If this law replaces the patch, the relative error of a mode's frequency is at most about half the error "
+            "of the stiffness. The relative error of the friction damping of this mode is at most the sum of the "
+            "errors of the stiffness and of the dissipated energy."]
 
 
 def _percent(share: float) -> str:

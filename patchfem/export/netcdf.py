@@ -19,7 +19,7 @@ CACHE = 1 << 18  # bytes of each variable that stay in memory until its file is 
 
 LONG = {
     "relative_displacement": ("m", "displacement of the output relative to the base"),
-    "slide": ("m", "slide of the interface; friction_force over this slide is the friction loop"),
+    "slide": ("m", "slide of the interface; friction_force plotted against slide gives the friction loop"),
     "relative_velocity": ("m s-1", "velocity of the output relative to the base"),
     "absolute_acceleration": ("m s-2", "acceleration at the output, base motion included"),
     "base_acceleration": ("m s-2", "acceleration of the base"),
@@ -51,9 +51,11 @@ BETWEEN = {"relative_displacement": "displacement of the first mass of an interf
            "relative_velocity": "velocity of the first mass of an interface relative to the second",
            "friction_force": "friction force of an interface, positive when it opposes positive slip",
            "normal_load": "normal load on an interface",
-           "lateral_displacement": "motion of the first of the lateral pair of an interface relative to the second",
-           "lateral_velocity": "velocity of the first of the lateral pair of an interface relative to the second",
-           "lateral_force": "friction force on the lateral pair of an interface, positive when it opposes slip there"}
+           "lateral_displacement": "displacement of the first mass of the lateral pair of an interface relative to the "
+                                   "second",
+           "lateral_velocity": "velocity of the first mass of the lateral pair of an interface relative to the second",
+           "lateral_force": "friction force on the lateral pair of an interface, positive when it opposes positive "
+                            "slip of this pair"}
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -205,10 +207,13 @@ def with_decay(data: Contents, decay) -> Contents:
 
 def with_spectra(data: Contents, found) -> Contents:
     """The contents with `response.stationary.Spectra` over frequency."""
-    columns = {"base_acceleration_spectrum": ("m2 s-3", found.drive, "one-sided density of the base acceleration"),
-               "relative_displacement_spectrum": ("m2 Hz-1", found.place, "one-sided density of the output"),
-               "absolute_acceleration_spectrum": ("m2 s-3", found.acceleration, "one-sided density of acceleration"),
-               "gain": ("s2", np.abs(found.gain), "magnitude of H1, output over base acceleration"),
+    columns = {"base_acceleration_spectrum": ("m2 s-3", found.drive, "one-sided spectral density of the base "
+                                              "acceleration"),
+               "relative_displacement_spectrum": ("m2 Hz-1", found.place, "one-sided spectral density of the "
+                                                  "displacement of the output"),
+               "absolute_acceleration_spectrum": ("m2 s-3", found.acceleration, "one-sided spectral density of "
+                                                  "the acceleration at the output"),
+               "gain": ("s2", np.abs(found.gain), "magnitude of H1, displacement of the output over base acceleration"),
                "phase": ("rad", np.angle(found.gain), "phase of H1"), "coherence": ("1", found.coherence, "coherence")}
     return data.also({name: ("frequency", values, {"units": unit, "long_name": text})
                       for name, (unit, values, text) in columns.items()},

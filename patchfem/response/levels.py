@@ -49,7 +49,7 @@ def no_onset(kind: str, length: float | None = None) -> str:
     """The reason why a run of levels has no onset; arguments as in `past_onset`."""
     what = {"slip": "slips", "gauge": f"has an amplitude at the output above {say(length)}" if length else ""}.get(
         kind, f"has an acceleration whose third harmonic is more than {DISTORTED:g} of its first harmonic")
-    return f"no rising level {what}"
+    return f"no level of the rising sequence {what}"
 
 
 def bracket(levels, past: Callable[[Level], bool]) -> tuple | None:

@@ -12,7 +12,7 @@ from .rows import TABLE
 
 ACCELERATIONS = ("absolute_acceleration_fundamental", "acceleration_distortion")
 SHARED = 0.05  # of the slide, carried by another mode, from which no damping ratio is one of the first
-IN_PLANE = "the interface slides in a plane, and this belongs to one direction"
+IN_PLANE = "the interface slides in a plane, but this measure is defined only for one direction"
 CYCLIC = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", *ACCELERATIONS)
 HOLDS = "the whole interface sticks throughout the last cycles"
 UNBOUNDED = "no bounded motion exists at this drive"
@@ -68,7 +68,7 @@ def unclosed(values, window, drive) -> dict:
 
 def _of_phase(values, drive) -> str:
     if not sinusoidal(drive):
-        return "the drive is not a sine at the end, so the start of slip has no phase"
+        return "the drive is not a sine at the end of the run, so the start of slip has no phase"
     stuck = getattr(values.get("stick_fraction"), "value", values.get("stick_fraction"))
     if stuck == 1.0:
         return f"{HOLDS}, so no slip starts"
@@ -77,7 +77,7 @@ def _of_phase(values, drive) -> str:
 
 def _of_cycles(name: str, values, window, drive, beside: float) -> str:
     if not sinusoidal(drive):
-        return "this measure exists only for a drive that is a sine at the end"
+        return "this measure exists only for a drive that is a sine at the end of the run"
     if not whole(window.time[-1] - window.time[0], drive):
         return "the run contains no whole cycle of the drive"
     if name in ACCELERATIONS and ACCELERATIONS[0] in values:

@@ -243,9 +243,9 @@ ROWS = (
         "if the output does not move",
         lambda s: s.waves.get("acceleration_distortion")),
     Row("drift_per_cycle", "m", 1e-11,
-        "drift of the slide per cycle: (mean slide over the last cycle of the window - mean slide over its first "
-        "cycle)/(number of cycles between these two cycles); if the interface slides in a plane, the length of this "
-        "vector",
+        "drift of the slide per cycle: (mean slide over the last cycle of the window - mean slide over the "
+        "first cycle of the window)/(number of cycles between these two cycles); if the interface slides in a plane, "
+        "the length of this vector",
         lambda s: drift_of(s) if s.own.drift is None else s.own.drift,
         term=("slip amplitude (without slip: amplitude of the motion)", _moved), halves=FOURTH),
     Row("slip_amplitude", "m", 1e-10,
@@ -254,14 +254,14 @@ ROWS = (
         "interface slides in a plane, half the largest distance between two points of the path of irreversible slide",
         lambda s: s.slip.get("slip_amplitude"), group="friction"),
     Row("stick_fraction", "1", 1e-3,
-        "share of the time of the last cycles in which the interface as a whole sticks, which means that more than "
-        "half of the change of the slide (weighted as in slip_amplitude) is elastic; part of a patch, or some sliders "
-        "of law 'iwan', may slip during this time",
+        "share of the time of the last cycles during which the interface as a whole sticks; the interface sticks as a "
+        "whole while more than half of the change of the slide (weighted as in `slip_amplitude`) is elastic; part of a "
+        "patch, or some sliders of law 'iwan', may slip during this time",
         lambda s: s.slip.get("stick_fraction"), 0.35, group="friction", term=("1", lambda _: 1.0),
         halves=(2.5, 0.5)),
     Row("slip_start_phase", "rad", 1e-3,
-        "phase of the base displacement at which slip starts after stick, modulo pi; slip here means the weighted mean "
-        "that slip_amplitude defines; this phase is printed in degrees",
+        "phase of the base displacement at which slip starts after stick, modulo pi; slip is the weighted mean "
+        "defined under `slip_amplitude`; the phase is printed in degrees",
         lambda s: s.slip.get("slip_start_phase"), 1.0, group="friction", term=("pi", lambda _: np.pi),
         halves=(2.5, 1.0)),
     Row("normal_load", "N", 0.0, "normal load on the interface, sum over all pairs", lambda s: s.load,
@@ -275,15 +275,16 @@ ROWS = (
         "first harmonic of the friction force (only the part in phase with the slide) divided by the first harmonic of "
         "the slide; negative if friction holds the spring deflected during stick",
         lambda s: s.cycle.get("equivalent_stiffness"), group="friction",
-        term=("magnitude of the ratio of both parts (in phase and out of phase)", first_harmonic)),
+        term=("magnitude of the complex ratio of the two first harmonics", first_harmonic)),
     Row("secant_stiffness", "N m-1", 1.0,
         "friction force at the largest slide of a cycle minus friction force at the smallest slide, divided by the "
-        "range of the slide; if the force jumps there, the mean of the forces before and after the jump is used",
+        "range of the slide; if the force jumps at the largest or the smallest slide, the mean of the forces "
+        "before and after the jump is used",
         lambda s: s.cycle.get("secant_stiffness"), group="friction", halves=FOURTH),
     Row("equivalent_damping", "1", 1e-8,
         "equivalent damping ratio of friction in the first mode that is not rigid, averaged over the last cycles: "
-        "loop_area/(2 pi K A^2), where K = moving_mass omega_1^2 and A is half the range of the slide in a cycle, "
-        "divided by the key `slide` of this mode; null if other modes contribute more than 5 % of the slide",
+        "loop_area/(2 pi K A^2), where K = moving_mass omega_1^2 and A = (half the range of the slide in a "
+        "cycle)/(value of the key `slide` of this mode); null if other modes contribute more than 5 % of the slide",
         lambda s: s.cycle.get("equivalent_damping"), group="friction", halves=FOURTH),
     Row("friction_work", "J", 1e-10, "work done on all interfaces together over the whole run; with method `harmonic`, "
                                      "over two cycles",
@@ -303,7 +304,8 @@ ROWS = (
     Row("open_fraction", "1", 1e-3, "share of the time of the last cycles in which the surfaces are not in contact",
         lambda s: s.of_load(lambda load: np.mean(load <= 0)), 4.0, group="friction", term=("1", lambda _: 1.0)),
     Row("relative_displacement_amplitude_steady", "m", 1e-10,
-        "steady amplitude, extrapolated if the motion has not settled or will still change by 2 % of the tolerance"),
+        "steady amplitude; extrapolated if the motion has not settled or may still change by more than 0.02 tolerance "
+        "× amplitude"),
     Row("peak_frequency", "Hz", 0.0, "drive frequency at which the curve of steady amplitudes has its maximum"),
     Row("friction_ratio_end", "1", 1e-9, "friction force divided by normal load at the end of the slide",
         group="friction"),
@@ -327,8 +329,8 @@ ROWS = (
     Row("ring_frequency", "Hz", 1e-3, "frequency of the free vibration (ringing) during stick"),
     Row("ring_damping", "1", 1e-6, "damping ratio of the free vibration (ringing) during stick"),
     Row("onset_level", "m s-2", 0.0,
-        "drive level at the onset of slip, as drive.onset defines this onset, found by bisection between two levels; "
-        "in N for a force drive", group="friction"),
+        "drive level at the onset of slip, found by bisection between two levels; the key `drive.onset` defines what "
+        "counts as the onset; in N for a force drive", group="friction"),
     Row("jump_level", "m s-2", 0.0,
         "drive level just after the largest jump of the amplitude; a jump is a step between two levels at which the "
         "ratio of the amplitudes is at least 1.5 times the ratio of the levels; in N for a force drive"),

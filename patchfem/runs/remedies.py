@@ -113,7 +113,7 @@ def _finer_mesh(seen, wide: dict, coarse) -> str:
                 "error")
     tighter = _climbing(seen, coarse)
     if tighter is None:
-        finer = f"points closer than {say(seen.patch.averaging, 3)}" if seen.patch.averaging and \
+        finer = f"points less than {say(seen.patch.averaging, 3)} apart" if seen.patch.averaging and \
             seen.patch.sharper else f"a mesh finer than {nodes} interface nodes"
         return (f"{finer} would take too long; use "
                 f"{'these values with their stated errors' if len(wide) > 1 else 'this value with its stated error'}")
@@ -236,8 +236,8 @@ def _unproven(model, steps: int, name: str, wide: dict) -> str:
 
     Steps that are left out are doubled until the displacement is met.
     """
-    seen = (f"the steps per cycle were doubled twice, up to {steps}, and the second doubling changed {name} no less "
-            "than the first")
+    seen = (f"the steps per cycle were doubled twice, up to {steps}, and the second doubling changed {name} at least "
+            "as much as the first")
     if exact := _stepless(model):
         return f"{seen}, so more steps may not help; {exact}"
     if model.kind == "rig" and model.accuracy.steps_per_cycle is not None and 2 * steps <= costs.MOST_STEPS and \

@@ -341,7 +341,7 @@ def test_exact_time_is_made_up_only_where_no_law_feels_it(tmp_path):
     loop.write_text(text)
     found = fit_loop(scene_of(tmp_path, "elastic-plastic"), loop, free_of("friction.static", "friction.bond_length"))
     assert found.found.values == pytest.approx([0.31, 2.3e-6], rel=1e-6) and "evenly spaced" in found.warnings[0]
-    with pytest.raises(PatchfemError, match=r"loop.csv:1: law 'tanh' needs the times of the rows here"):
+    with pytest.raises(PatchfemError, match=r"loop.csv:1: law 'tanh' needs the times of the rows of this record"):
         fit_loop(scene_of(tmp_path, "tanh"), loop, free_of("friction.static"))
     pace = '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "2 mm/s"\n'
     where = np.concatenate([np.linspace(0, 10, 11), np.linspace(9, -10, 20)])
@@ -373,7 +373,7 @@ def test_exact_the_verb_writes_a_scene_that_runs_to_the_fitted_loop(tmp_path, as
                                                                     "report.html", "scene.fitted.toml"]
     one = found["values"]["friction.static"]
     page = (tmp_path / "out/report.html").read_text("utf-8")
-    assert unheard(page) == [] and page.count("<svg") == 1 and "Brackets hold the intervals of 95 %" in page
+    assert unheard(page) == [] and page.count("<svg") == 1 and "Brackets enclose 95 % intervals" in page
     value, _, (low, high) = told_of(one)
     assert f"<b>friction.static = {value} ({low} to {high});" in page
     assert f"<td>friction.static</td><td class=n>{value}</td><td class=n>{low} .. {high}</td>" in page

@@ -183,7 +183,7 @@ def test_always_what_slips_while_the_interface_holds_is_said(more, part):
             for name, (value, error, unit) in found.items()}})
 
     holds = "The interface sticks: no slip in the last cycles" + \
-        (" beyond the error of this mesh; a slip zone smaller than an element cannot be seen." if more else ".")
+        (" beyond the error of this mesh; a slip zone smaller than an element cannot be detected." if more else ".")
     assert said((1.6583e-6, 1.6e-9), (1e-9, 1e-12)) == \
         f"The interface as a whole sticks, but {part} (1.6583 ± 0.0016 uJ per cycle)."
     assert said((1e-9, 2e-9), (1e-9, 1e-12)) == f"The interface as a whole sticks, but {part} (by 1.0000 ± 0.0010 nm)."

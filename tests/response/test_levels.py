@@ -69,7 +69,7 @@ def test_exact_onset_of_a_rigid_block_is_mu_n_over_m(levels):
 
 def test_exact_no_onset_where_every_level_holds():
     _, found = measured('law = "coulomb"', '["1 g", "3 g"]')
-    assert found["onset_level"].value is None and found["onset_level"].reason == "no rising level slips"
+    assert found["onset_level"].value is None and found["onset_level"].reason == "no level of the rising sequence slips"
     assert found["jump_level"].value is None and f"below {JUMP:g} times" in found["jump_level"].reason
 
 
@@ -103,7 +103,7 @@ def test_exact_onset_by_a_gauge_is_where_the_output_passes_its_length():
     below, above = (alone((onset.value + way * onset.error) / G_N).measures[NAME].value for way in (-1, 1))
     assert below < 2.54e-6 < above < 1.03 * 2.54e-6
     never = run(plan(loads(text.replace('onset = "slip"', 'onset = "gauge"\nonset_length = "1 m"')))).measures
-    assert never["onset_level"].reason == "no rising level has an amplitude at the output above 1 m"
+    assert never["onset_level"].reason == "no level of the rising sequence has an amplitude at the output above 1 m"
 
 
 @pytest.mark.share(0)

@@ -402,8 +402,8 @@ def decay(found) -> list:
         error, y = getattr(found, f"{name}_error"), getattr(found, name)
         known = np.isfinite(error)
         x = found.amplitude[known] * scale
-        out.append(chart(f"{label.capitalize()} of the decay", axis("half of an "
-                                                                    "oscillation", unit, True), axis(label, of), [
+        out.append(chart(f"{label.capitalize()} of the decay", axis("half the peak-to-peak motion", unit,
+                                                                    True), axis(label, of), [
             line(x, y[known], "accent"),
             mark("dots", "accent", "", x=x, y=y[known], errors=error[known], shape="circle")] * bool(known.any())))
     return out

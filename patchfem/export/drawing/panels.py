@@ -34,11 +34,11 @@ class Panel:
     def title(self, scaled: bool = True) -> str:
         """Head of the panel: how much its motion is magnified, and where `scaled` which stress the top colour stands
         for."""
-        text = "drawn to scale" if self.factor == 0 else f"motion and gap {self.factor:g} times as large"
+        text = "drawn to scale" if self.factor == 0 else f"motion and gap magnified {self.factor:g} times"
         unit, scale = axis_unit([self.top], "Pa")
-        text += f", top colour {self.top * scale:.3g} {unit} and more" if self.over and scaled else ""
+        text += f", top colour: {self.top * scale:.3g} {unit} or more" if self.over and scaled else ""
         if self.aside != 1:
-            return text + f"\nthe slide of {self.slide * 1e3:.3g} um {self.aside:g} times as large"
+            return text + f"\nthe slide of {self.slide * 1e3:.3g} um magnified {self.aside:g} times"
         return text + (f"\nthe slide of {self.slide * 1e3:.3g} "
                        "um, drawn to scale" if self.slide and self.factor > 1 else "")
 

@@ -7,11 +7,11 @@ import numpy as np
 LINE, TRIANGLE, QUAD = 3, 5, 9  # cell types of VTK
 NAMES = ("lower", "upper", "interface")
 PARTS = (*NAMES, "strips")  # the last of a patch that wears in strips; the place of a name is its code in `part`
-MEANINGS = {"stress_error": "contribution of a cell to the estimated error of the stress (Zienkiewicz-Zhu): the "
-                            "square root of a ratio, the strain energy of the difference between recovered and "
-                            "computed stress in the cell divided by the strain energy of both pieces; the squares of "
-                            "all cells add up to the square of the total; large values show where the mesh is coarse, "
-                            "but the total is not a bound on the error of the stress"}
+MEANINGS = {"stress_error": "contribution of a cell to the estimated error of the stress (Zienkiewicz-Zhu): "
+                            "sqrt(e/E), where e is the strain energy of the difference between recovered and computed "
+                            "stress in the cell, and E is the strain energy of both pieces; the squares of all cells "
+                            "add up to the square of the total error; large values show where the mesh is too coarse; "
+                            "the total error is only an estimate, not a bound on the error of the stress"}
 CODES = {"part": dict(enumerate(PARTS)), "material": {0: "substrate", 1: "coating"},
          "status": {0: "open", 1: "stick", 2: "slip"}}
 

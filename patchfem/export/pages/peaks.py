@@ -194,8 +194,9 @@ def table(peaks: list) -> str:
     rows = [[escape(one.held), *cells, told(*one.width, unit="Hz") if np.isfinite(one.width[0]) else "&ndash;"]
             for one, cells in zip(peaks, cells_of)]
     return (f"<p class=soft>The largest {linked(label(peaks[0].name), peaks[0].name)} of each curve is found from a "
-            "parabola of 1/y&sup2; over f&sup2; through the largest case and its neighbours. The errors combine the "
-            "errors of the cases and the differences from polynomials through more cases. For an unsettled case the "
+            "parabola of 1/y&sup2; against f&sup2; through the case with the largest value and its two neighbours in "
+            "frequency. The stated errors combine the errors of these cases with the differences between this parabola "
+            "and polynomials through more cases. For an unsettled case the "
             "estimate of the steady value is used if the error of this estimate is at most 1 %; otherwise the case is "
             "left out. A half-power width is given if the curve falls to its peak/&radic;2 on both sides within the "
             "swept range.</p>"

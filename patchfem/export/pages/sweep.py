@@ -37,12 +37,12 @@ def page(table: dict, told: Lead | None = None) -> str:
                         "<p>No case has a value to draw.</p>"),
                 *_change(table, told.limits),
                 *(Section(*one) for one in (("peaks", "Peaks", peaks.table(told.peaks)),
-                                            ("ranking", "What matters most", ranked.picture(told.ranks)),
+                                            ("ranking", "Keys that matter most", ranked.picture(told.ranks)),
                                             ("scatter", "Scatter of the answers", ranked.spread(told.spread)))
                   if one[2]),
                 Section("cases", "Cases", _cases(table)),
                 Section("measures", "What the measures mean", _meanings(table)),
-                Section("again", "The same again", _again(table))]
+                Section("again", "How to repeat the sweep", _again(table))]
     return document.document(table["title"] or "patchfem sweep", _lead(table, told), sections,
                              *((data, ("figures.js", "explorer.js")) if data["measures"] else (None, ())))
 

@@ -123,7 +123,7 @@ def _holds(patch: bool, cycles: str) -> str:
     """The sentence where no slip is found. On a patch an edge where the pressure ends slips under any force: on a mesh
     that does not show it, nothing is said of what lies within an element."""
     return f"The interface sticks: no slip in the last {cycles}" + \
-        (" beyond the error of this mesh; a slip zone smaller than an element cannot be seen." if patch else ".")
+        (" beyond the error of this mesh; a slip zone smaller than an element cannot be detected." if patch else ".")
 
 
 def _slid(slip: dict | None, done: str, patch: bool) -> str:

@@ -40,8 +40,10 @@ def lines_of(told: Told | None, cutoff: float | None) -> list:
     soft, stiff = (1 / (share * fine.height) for share in reversed(PERSSON))
     decay = sum(PERSSON) / 2 * fine.height
     half = one["stiffness_half_sampled"]
-    sampled = "with every second sample of the trace there is no such surface" if half is None else \
-        f"with every second sample of the trace the ratio is {_per(half)}, {100 * (half / one['stiffness'] - 1):+.2g} %"
+    sampled = ("with every second sample of the trace, height, slope and curvature do not fit any Greenwood-Williamson "
+               "surface") if half is None else \
+        f"with every second sample of the trace the ratio is {_per(half)}, a change of " \
+        f"{100 * (half / one['stiffness'] - 1):+.2g} %"
     return ["  paste this into a scene if the other face is smooth (Greenwood-Williamson peaks, radius "
             f"{short(one['radius'], 'm', 3)}, {one['density']:.3g} 1/m^2):",
             "    [contact.asperities]", '    law = "hertz"', f'    rms_height = "{fine.height * 1e6:.5g} um"',

@@ -36,8 +36,8 @@ WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_ma
          "track_pile_up_left": "track, pile-up at its beginning", "track_pile_up_right": "track, pile-up at its end",
          "track_depth_floor": "track depth, floor", "track_area_gross": "track, lost area",
          "track_pile_up": "track, pile-up", "track_area_net": "track, lost area minus pile-up",
-         "hidden_wear": "mean wear that a wedge may hide",
-         "worn_volume": "worn volume", "grown_volume": "grown volume", "worn_share": "worn share of the region",
+         "hidden_wear": "mean wear that a tilt may hide",
+         "worn_volume": "worn volume", "grown_volume": "grown volume", "worn_share": "share of the region that is worn",
          "shift_x": "shift along x", "shift_y": "shift along y", "rotation": "rotation",
          "worn_depth_mean_from_abbott": "worn depth, mean, from Abbott curves"}
 DRAWN = 1_000_000  # heights that a histogram and an Abbott curve are drawn from, spread over a larger scan

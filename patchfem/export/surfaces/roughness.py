@@ -17,14 +17,14 @@ from . import asperities, pictures
 from .areal import write_columns, write_profile, write_x3p
 
 ALONG = ("PSm", "RSm", "dominant_wavelength", "Sal")  # lengths along the surface; all others are heights
-AREAL = ("Interval: 5 to 95 % for the mean over all scans of this size, on a surface with Gaussian heights and the "
-         "spectrum of this scan; it is wider if the kurtosis is above 3. It does not cover a surface that differs from "
-         "place to place, nor waves longer than the scan.")
+AREAL = ("Interval: 90 % interval (from 5 % to 95 %) of the mean over all scans of this size, for a surface with "
+         "Gaussian heights and the spectrum of this scan. A kurtosis above 3 makes the interval wider. The interval "
+         "holds neither for a surface that differs from place to place nor for waves longer than the scan.")
 MEANS = ("Interval: 95 % of the mean, by Student's t from the scatter of the files, each with equal weight; an error "
          "common to all, such as calibration, is not included. Scatter: standard deviation of one file.")
-INTERVAL = ("Interval: 5 to 95 % for the mean over all traces of this length, on a surface with Gaussian heights and "
-            "the spectrum of this trace; it is wider if the kurtosis is above 3. It does not cover a surface that "
-            "differs from place to place.")
+INTERVAL = ("Interval: 90 % interval (from 5 % to 95 %) of the mean over all traces of this length, for a surface with "
+            "Gaussian heights and the spectrum of this trace. A kurtosis above 3 makes the interval wider. The "
+            "interval does not hold for a surface that differs from place to place.")
 
 
 def shown(one: Quantity, unit: tuple | None = None) -> tuple:

@@ -306,7 +306,7 @@ def _track(x, depth, off: float, area: float) -> dict:
     return {"from": ends[0], "to": ends[1], "hidden_wear": _with(under, off, *TEXTS["hidden_wear"]),
             "depth_mean": _with(area / width, off + area / width * sum(cells) / width, "m", "area lost divided by the "
                                                                                             "width"),
-            "depth_floor": _with(floor, off, "m", "mean over the deepest fifth of its width"),
+            "depth_floor": _with(floor, off, "m", "mean depth over the deepest fifth of the width"),
             "area_net": _with(area, off * width, "m2", "lost area minus pile-up; pile-up is zero in a computed run"),
             "area_gross": _with(area, off * width, "m2", "lost area"),
             "pile_up": Quantity(0.0, 0.0, 0.0, "m2", "computed wear makes no pile-up")}
@@ -385,7 +385,7 @@ def _rows(one: Lost) -> list:
     words = WORDS | {"track_from": "worn part from", "track_to": "worn part to", "track_depth": "worn part, mean",
                      "track_depth_floor": "worn part, floor",
                      "track_hidden_wear": "worn part, uniform wear and wedge",
-                     "hidden_wear": "uniform wear and wedge, mean", "worn_share": "worn share of the patch"}
+                     "hidden_wear": "uniform wear and wedge, mean", "worn_share": "share of the patch that is worn"}
     of_part = ("track_from", "track_to", "track_depth", "track_depth_floor", "track_hidden_wear")
     shown_of = one.values | {name: track[name] for name in of_part if name in track}
     return [(words[name], each) for name, each in shown_of.items()]
@@ -413,8 +413,8 @@ def write_page(path: Path, one: Lost, found: tuple) -> None:
             for name, each in _rows(one)]
     body = [figure(number, *each) for number, each in enumerate(_figures(one))]
     body.append(table(("quantity", ">value", ">interval", "unit", "meaning"), rows))
-    body.append("<p class=soft>The intervals are the numerical errors of the runs, which contain the true error in 19 "
-                "of 20 scenes.</p>")
+    body.append("<p class=soft>The intervals follow from the numerical errors that the runs state. In 19 of 20 "
+                "scenes the stated error is at least as large as the true error.</p>")
     runs = [figure("p", pressures([(each.x, each.pressure, name) for each, (_, name) in
                                    zip((one.before, one.after), SIDES)]), "Normal stress of the pressed patch"
                    f"{'' if one.after.y is None else ', mean over the width'}.",

@@ -34,8 +34,9 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
     found = with_errors(fine.values, *others, least=1e-10)
     fields, created, power = {}, fine.values["energy_created"], np.abs(np.diff(fine.ledger[0])).sum()
     if f.reading == "report" and created > 1e-6 * power:
-        warnings = [*warnings, f"the law as printed in the report created {created:.3g} J, {100 * created / power:.2g} "
-                               '% of the work exchanged; with friction.reading = "stretch" no energy is created']
+        warnings = [*warnings, f"the law as printed in the report created {created:.3g} J, "
+                               f'which is {100 * created / power:.2g} % of the work exchanged; with friction.reading = '
+                               '"stretch" no energy is created']
     warnings = [*warnings, *warming(model, patch, fine), *work_check_warning(found, steps)]
     if patch is not None:
         warnings = [*warnings, *_overhang(model.patch, patch, fine)]
@@ -61,6 +62,6 @@ def _overhang(asked, patch, fine) -> list:
                    "computation neglects that their edges no longer overlap")
     lost = 1 - float(fine.load.min() / fine.load[0]) if fine.load[0] > 0 else 0.0
     if lost > 0.01:
-        out.append("the upper piece slides off the pressed area: at the end the contact no longer carries "
-                   f"{100 * lost:.0f} % of the load")
+        out.append("the upper piece slides off the pressed area: at worst the computed contact carries "
+                   f"{100 * lost:.0f} % less than the given load")
     return [*out, *travelled(patch, fine.slide)]

@@ -70,9 +70,9 @@ def refuses(model: Model) -> str:
     """Why all points of a model move; "" where a few may stand for them."""
     if model.patch is None or not model.soft or model.friction is None or not has(model.friction.law, "bonds") \
             or listed(model.friction):
-        return "the case is not a patch with bonds behind shear"
+        return "the case is not an elastic patch with a law of bonds"
     if model.rig.load_varies or model.patch.strips is not None or model.grooves is not None or model.wear is not None:
-        return "its load changes, or it wears"
+        return "its load changes, or it has strips, grooves or wear"
     return "" if engine_of(model) is MARCH else "the case is not integrated in time"
 
 
@@ -90,16 +90,16 @@ def no_lanes(model: Model) -> str:
     """Why a model that is not refused does not march in lanes; "" where it may."""
     rig, law = model.rig, model.bonds
     if rig.waveform != "sine" or rig.kind != "base" or rig.levels or rig.start is not None or rig.bends or rig.names:
-        return "the case is not a rig at rest under one sine of the base"
+        return "the case is not a rig that starts at rest and is driven by a base motion of one sine"
     if rig.modes.gauge is not None or rig.richer is not None or np.isfinite(rig.travel):
         return "the case has a gauge, a reduced structure or a stop"
     if rig.cycles != int(rig.cycles) or rig.cycles < 20:
-        return "the case has too few or broken cycles"
+        return "the case has fewer than 20 cycles, or a number of cycles that is not whole"
     if law.grows or law.order != 1 or law.initial != 1 or law.breakaway or law.ratio != 1 or not law.static > 0:
         return "its bonds change in number or length"
     if model.heat is not None or model.accuracy.shear_modes is not None or unread(model):
-        return "it warms, names its modes, or its table of measured responses cannot be read"
-    return "" if lanes.fits(rig.modes) else "its modes are too many"
+        return "it has [friction.temperature], accuracy.shear_modes, or an unreadable table of measured responses"
+    return "" if lanes.fits(rig.modes) else "it has too many modes"
 
 
 def solve(models: Sequence[Model], say=None) -> Answers:

@@ -98,8 +98,9 @@ def strained_by(asked, top: float, approach: float, beyond=()) -> list:
     stiff = max(m.poisson for m in stuff)
     if asked.plane == "strain" and stiff > LOCKS and not asked.chosen:
         cure = "split the elements of contact.mesh" if asked.mesh is not None else "leave out contact.element_size"
-        out.append("in plane strain the elements become too stiff (lock) as Poisson's ratio nears 0.5, and here the "
-                   f"ratio is {stiff:g} (limit {LOCKS:g}), so errors may be up to twice the estimates; {cure}")
+        out.append("in plane strain the elements become too stiff (lock) as Poisson's ratio nears 0.5; here "
+                   f"Poisson's ratio is {stiff:g} (limit {LOCKS:g}), so the true errors may be "
+                   f"twice the estimates; {cure}")
     return out
 
 
@@ -130,14 +131,15 @@ def left_out(model, patch, coarse) -> list:
     out = [f"scikit-fem assembles the stiffness of the {' and the '.join(by_forms)} piece"] if by_forms else []
     out += [*drawn_otherwise(patch.pair), *slender(asked, patch.pressure.load / patch.pieces.interface.weight.sum())]
     if patch.sharper and patch.averaging is not None:
-        out.append("those static measures for which the error is then smaller are computed on points "
-                   f"{say(patch.averaging, 3)} apart, with short waves treated as in infinite layers; fields and "
-                   f"motion are computed on the mesh of {patch.x.size} interface points")
+        out.append("a static measure is computed on points "
+                   f"{say(patch.averaging, 3)} apart if its error is then smaller; on these points short waves are "
+                   f"treated as in infinite layers; fields and motion are computed on the mesh of {patch.x.size} "
+                   "interface points")
     elif patch.sharper:
-        out.append("those static measures for which the error is then smaller are computed on Gauss-Lobatto cells of "
-                   f"order 4; fields and motion are computed on the bilinear mesh of {patch.x.size} interface points")
+        out.append("a static measure is computed on Gauss-Lobatto cells of order 4 if its error is then smaller; "
+                   f"fields and motion are computed on the bilinear mesh of {patch.x.size} interface points")
     elif patch.averaging is not None and not asked.gap.rough:
-        out.append("where the profile carries load, its heights are averaged over a length of "
+        out.append("where the profile is in contact, its heights are averaged over a length of "
                    f"{say(patch.averaging, 3)}; the errors include the effect of the choice of this length")
     if asked.skin is not None and patch.pressure.load > 0:
         bears = patch.pieces.interface.weight @ (patch.pressure.sigma_n > 0)
@@ -145,8 +147,9 @@ def left_out(model, patch, coarse) -> list:
     if patch.strips is not None:
         out.append(patch.strips.note)
     if patch.pair.coupling > COUPLED and model.kind != "patch":
-        out.append("the pieces have different elasticity, which couples shear and normal motion; this coupling, "
-                   f"{patch.pair.coupling:.2g} of the tangential compliance, is neglected")
+        out.append("the pieces have different elasticity, which couples shear and normal motion; this coupling is "
+                   f"neglected; under a shear force the largest normal displacement is {patch.pair.coupling:.2g} times "
+                   "the largest slide")
     if model.kind == "patch":
         out += frictionless(asked, patch)
     if coarse[0] is not None and patch.pressure.outcome is not Outcome.NO_CONTACT:

@@ -66,7 +66,7 @@ def _half(asked, coarse, pressure: float) -> str:
     except PatchfemError:
         one = None
     if one is None:
-        return "no such surface"
+        return "no surface of such peaks"
     new = {"radius": one.radius, "density": one.density, "height_deviation": one.deviation}
     return f"{mean_stiffness(replace(asked, skin=asked.skin.model_copy(update=new)), pressure):.3g} Pa/m"
 

@@ -220,8 +220,8 @@ def _held_words(model: Model) -> str:
         return f"bonds of order 0 keep the block from sliding, but they have no stiffness: {turns}"
     if lists.chatters(model):
         return f"with the law as printed in the report the block does not slide at all: {turns}"
-    return ("with the law as printed in the report the block hardly slides at one of the drive levels or more: the "
-            "list of bonds grows with every time step")
+    return ("with the law as printed in the report the block hardly slides at one or more of the drive levels: the "
+            "list of bonds becomes longer in every time step")
 
 
 def steady_cost(model: Model, numerics, unknowns: dict) -> tuple:

@@ -140,8 +140,8 @@ class Asperities(Table):
     normal_stiffness: key(quantity("foundation stiffness", gt=0) | None, "pressure of the layer divided by its "
                           "compression; for law 'exponential', the slope of pressure over compression "
                           "at first touch") = None
-    decay_length: key(Length | None, "compression over which the pressure of law 'exponential' grows by a "
-                      "factor e") = None
+    decay_length: key(Length | None, "compression over which the pressure of law 'exponential' grows by "
+                      "the factor e = 2.718") = None
     radius: key(Length | None, "tip radius of the peaks",
                 "with law `hertz`, unless `from` or `rms_height` is given") = None
     density: key(quantity("areal density", gt=0) | None, "number of peaks per area", "with `radius`") = None
@@ -150,7 +150,8 @@ class Asperities(Table):
                "piece is taken as smooth",
                "with law `hertz`, unless `radius` or `rms_height` is given") = Field(None, alias="from")
     rms_height: key(Length | None, "root mean square height of the rough piece; if both pieces are rough, the root of "
-                    "the sum of the two squared values, also for slope and curvature",
+                    "the sum of the squares of their two values; the same rule holds for `rms_slope` and "
+                    "`rms_curvature`",
                     "with law `hertz`, unless `radius` or `from` is given") = None
     rms_slope: key(Positive | None, "root mean square slope of the rough piece", "with `rms_height`") = None
     rms_curvature: key(quantity("curvature", gt=0) | None, "root mean square curvature of the rough piece",

@@ -49,7 +49,7 @@ class Normal(Table):
                    "`phase`); while this expression is negative, the load is 0", "with `frequency`") = None
     frequency: key(Frequency | None, "frequency of the oscillating load", "with `amplitude`") = None
     phase: key(quantity("angle") | None, "phase of the oscillating load at t = 0") = None
-    width: key(Length | None, "width of the contact perpendicular to the path, which `friction.spread` uses",
+    width: key(Length | None, "width of the contact perpendicular to the path; needed for the key `friction.spread`",
                "with `friction.spread`") = None
     grooves: Grooves | None = None
 
@@ -194,8 +194,9 @@ class Interface(Friction):
     between: key(Between, "numbers of the two masses that rub, counted from 1; 0 is the base; the slide is the motion "
                  "of the first mass minus the motion of the second")
     lateral: key(Between | None, "for an interface that slides in a plane: numbers of a second pair of masses or "
-                 "boundary coordinates; the motion of the first minus the motion of the second is the slide across "
-                 "`between`; the friction force, the resultant of both directions, is at most static times load") = None
+                 "boundary coordinates; the motion of the first minus the motion of the second is the slide "
+                 "perpendicular to the slide of the pair `between`; the friction force, which is the resultant of both "
+                 "directions, is at most `static` times `load`") = None
     load: key(Force | None, "normal force on the interface; a patch, [structure.interface.contact], may be given in "
               "place of this key", "unless [structure.interface.contact] is given") = None
     contact: Contact | None = None

@@ -102,7 +102,7 @@ def test_always_drawn_cases_are_ranked_and_their_scatter_told(drawn):
                for one in shares)
     assert "depends most on" in told["answer"] and "90 % of the 128 random cases have" in told["answer"]
     page = (out / "report.html").read_text("utf-8")
-    assert "What matters most" in page and "Scatter of the answers" in page and "<svg viewBox" in page
+    assert "Keys that matter most" in page and "Scatter of the answers" in page and "<svg viewBox" in page
     from patchfem.export.sweeps.page import read_table
 
     again = lead_of(read_table(out))  # what `patchfem report` draws from the files

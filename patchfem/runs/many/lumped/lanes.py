@@ -103,7 +103,7 @@ def asks_more(model: Model) -> str:
 def _manifold(friction) -> str:
     """Why a law of a stretch has more than that to follow; "" where it has not."""
     grows = has(friction.law, "bonds") and (listed(friction) or friction.slip_growth is not None)
-    return "its bonds grow, or have more than one stretch" if grows else ""
+    return "its bonds grow, or are computed as a list of bonds" if grows else ""
 
 
 def _creates(model: Model):

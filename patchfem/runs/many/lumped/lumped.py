@@ -39,7 +39,7 @@ def not_one_sine(rig) -> str:
     if rig.richer is not None:
         return "its structure is reduced"
     if rig.modes.omega.size != 1 or not isinstance(rig.drive, BaseSine) or rig.levels:
-        return "the case is not one mode under one sine"
+        return "the case is not one mode driven by one sine"
     if np.isfinite(rig.travel):
         return "its motion may reach a stop, or may gain energy"
     if rig.cycles != int(rig.cycles) or not rig.modes.base[0] or not rig.modes.slide[0] or not rig.modes.output[0]:

@@ -39,7 +39,7 @@ def refuses(model) -> str:
     """Why the law, the cycles or the engine of a model are not of this batch; "" where they are."""
     f = model.friction
     if not _holds(model) and not has(f.law, "cells") and f.law != "elastic-plastic":
-        return "its law is not made of elements"
+        return "its law is not a set of friction elements"
     if not SHORTEST <= model.rig.cycles <= LONGEST:
         return "its cycles are too few or too many"
     if _holds(model) and not f.static > 0:

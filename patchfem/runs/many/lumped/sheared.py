@@ -50,12 +50,12 @@ def refuses(model: Model) -> str:
     if model.patch is None or not model.soft or model.patch.strips is not None or model.grooves is not None:
         return "the case is not a patch that slips part by part"
     if model.wear is not None or model.heat is not None or unread(model):
-        return "the case wears, warms, or its table of measured responses cannot be read"
+        return "it has [wear] or [friction.temperature], or its table of measured responses cannot be read"
     if why := not_one_sine(model.rig):
         return why
     if model.friction.law != "elastic-plastic" and (not has(model.friction.law, "set-valued")
                                                     or has(model.friction.law, "averaged")):
-        return "the points of its patch do not yield at a force"
+        return "the points of its patch have no slip force"
     if not pieces.SHORTEST <= model.rig.cycles <= pieces.LONGEST:
         return "its cycles are too few or too many"
     return "" if engine_of(model) is PIECES else "its engine is not the piecewise one"
