@@ -162,8 +162,8 @@ def backbone(model: Model, mode: str = "", amplitudes=None, methods=WAYS, progre
         joint = _joint(model, mode)
         wanted = _default(joint) if amplitudes is None else np.unique(np.asarray(amplitudes, float))
         if wanted[-1] > joint.model.rig.travel:
-            raise PatchfemError(f"the largest amplitude, {say(wanted[-1], 3)}, is above this travel; give smaller "
-                                "amplitudes with --amplitudes", "structure.travel")
+            raise PatchfemError(f"the largest amplitude, {say(wanted[-1], 3)}, is larger than the travel of the "
+                                "flexure; give smaller amplitudes with --amplitudes", "structure.travel")
         curves, missing, richer = {}, {}, model.rig.richer
         other = None if richer is None else _joint(replace(model, rig=richer), mode)
         for way in methods:
@@ -187,8 +187,8 @@ def _beside(curve: Curve, other: Curve) -> Curve:
     a, ends = curve.amplitude, other.amplitude[[0, -1]] * [1 - CLOSE, 1 + CLOSE]
     curve = curve.at((a >= ends[0]) & (a <= ends[1]))
     if not curve.amplitude.size:
-        raise NotConverged("a check with more modes of the structure found no free motion at these amplitudes; raise "
-                           "structure.reduced.modes")
+        raise NotConverged("the check by a computation with more modes of the structure found no free motion at these "
+                           "amplitudes; raise structure.reduced.modes")
     frequency, damping = (OF_MODES * np.abs(np.interp(curve.amplitude, other.amplitude, theirs) - own) for own, theirs
                           in ((curve.frequency, other.frequency), (curve.damping, other.damping)))
     return curve._replace(frequency_error=curve.frequency_error + frequency,
@@ -552,7 +552,8 @@ def _static(joint: Joint, amplitudes) -> Curve:
     of the contact alone on a bench."""
     _refuse(joint, "static curve")
     if _rigid(joint.model):
-        raise PatchfemError("rigid friction has no finite stiffness, so the sticking mode has no static curve")
+        raise PatchfemError("rigid friction has no finite stiffness, so a static curve cannot be computed for the mode "
+                            "of the sticking contact")
     if (known := _in_closed_form(joint, amplitudes)) is not None:
         return known
     try:
@@ -850,9 +851,9 @@ def _regimes(joint: Joint, wanted, micro: float | None) -> list:
         return [f"the smallest amplitude, {say(wanted[0], 3)}, lies above the range of micro-slip, which ends at about "
                 f"{say(edge, 2)}; to get the exponent of micro-slip, begin --amplitudes at "
                 f"{say(LOW / MICRO * edge, 2)}"]
-    return [f"the exponent of micro-slip cannot be determined: fewer than two amplitudes below {say(edge, 2)} have a "
-            f"loss of at least {RESOLVED:g} times the error of the loss; give amplitudes up to {say(edge, 2)}, or a "
-            "smaller accuracy.tolerance"]
+    return [f"the exponent of micro-slip cannot be determined: fewer than two amplitudes below {say(edge, 2)} have an "
+            f"energy loss of at least {RESOLVED:g} times the error of the loss; give amplitudes up to {say(edge, 2)}, "
+            "or a smaller accuracy.tolerance"]
 
 
 def _edge(one: Curve) -> float | None:
@@ -875,10 +876,11 @@ def _unworn(model: Model) -> tuple:
     return () if model.wear is None else ("these curves are for unworn pieces: [wear] is ignored",)
 
 
-LEFT_OUT = {"balance": "harmonic balance did not converge there; the curve may turn back to smaller amplitudes, or the "
-                       "mode may stop oscillating",
+LEFT_OUT = {"balance": "harmonic balance did not converge at these amplitudes; the curve may turn back to smaller "
+                       "amplitudes, or the mode may stop oscillating",
             "quasi-static": "the static curve does not reach these amplitudes",
-            "decay": "the free decay, or one of the coarser decays that check it, gave no frequency and damping there"}
+            "decay": "at these amplitudes the free decay, or a coarser decay computed as a check, gave no frequency "
+                     "and damping"}
 
 
 def _gaps(wanted, curves: dict) -> list:
@@ -899,13 +901,14 @@ def _secant(joint: Joint, wanted, curves: dict) -> list:
     """A sentence on what a static curve in slip is, where no balance stands beside it."""
     slips = not joint.linear and _limit(joint) and wanted[-1] > MICRO * _amplitude_of(joint, _knee(joint))
     return ["--method quasi-static takes the stiffness from the two turning points of the motion under a force of "
-            "fixed shape; --method balance takes the stiffness from the first harmonic of the force, which is lower "
-            "once the contact slips; quasi-static frequencies are therefore higher than those of balance"] \
+            "fixed shape; --method balance takes the stiffness from the first harmonic of the force, and this "
+            "stiffness is lower once the contact slips. The frequencies by quasi-static are therefore higher than the "
+            "frequencies by balance"] \
         if slips and "quasi-static" in curves and "balance" not in curves else []
 
 
-WHY = {"decay": "a decay gives the mean over a cycle, and there the amplitude falls by a fraction of {:.2g} in one "
-                "cycle",
+WHY = {"decay": "a decay gives mean values over a cycle, and at this amplitude one cycle reduces the amplitude by the "
+                "fraction {:.2g}",
        "quasi-static": "the static curve uses the secant stiffness under a force of fixed shape; harmonic balance uses "
                        "the first harmonic of the force"}
 

@@ -88,7 +88,7 @@ def curve(model: Model, knob: str, say=None) -> list:
                 done += 1
                 runs[-1:] = [_one_run(runs[-1], found)] if runs and found.same_as(runs[-1]) else [*runs[-1:], found]
         if done < 3:
-            raise PatchfemError(f"cost --over {knob}: fewer than three values of this setting could be run", "")
+            raise PatchfemError(f"cost --over {knob}: runs with fewer than three values of this setting succeeded", "")
     best = _best(runs)
     return [one if one is best else replace(one, distances=_distances(one, best)) for one in runs]
 
@@ -215,15 +215,15 @@ def sentence(runs: list, tolerance: float) -> str:
     the best one."""
     names, percent = _stated(runs), f"{100 * tolerance:g} %"
     if one := quickest(runs, tolerance):
-        return f"{one.words}: {_seconds(one)} per run, with all measures within {percent}"
+        return f"{one.words}: {_seconds(one)} per run, with an error of at most {percent} in every measure"
 
     known = [one for one in runs if one.errors or one.distances]
     share, name, least = min(((*_worst(one, names, tolerance), one) for one in known), key=lambda found: found[0])
     if share >= STUCK * max(_worst(one, [name], tolerance)[0] for one in known if name in one.values):
-        return (f"no run has all measures within {percent}: with every setting the error of {name} is "
+        return (f"no run has an error of at most {percent} in every measure: with every setting the error of {name} is "
                 f"{100 * share:.2g} %")
-    return (f"no run has all measures within {percent}: the best run, with {least.words}, has an error of "
-            f"{100 * share:.2g} % in {name} and takes {_seconds(least)}")
+    return (f"no run has an error of at most {percent} in every measure: the best run, with {least.words}, has an "
+            f"error of {100 * share:.2g} % in {name} and takes {_seconds(least)}")
 
 
 def worst_of(runs: list, tolerance: float) -> set:

@@ -79,8 +79,8 @@ def fit_loop(scene: Scene, to: Path, free, hold=(), say=None, options: LoopOptio
     offsets = offsets_of(options.offsets, loop)
     everything = [*wanted, *(one.range for one in offsets)]
     if used <= len(everything):
-        raise PatchfemError(f"{to}: only {used} rows are used for the fit (not held out), too few to determine "
-                            f"{len(everything)} values and their intervals")
+        raise PatchfemError(f"{to}: only {used} rows are used for the fit (rows that are held out do not count), too "
+                            f"few to determine {len(everything)} values and their intervals")
     bench = BenchModel(scene, loop, wanted, offsets, options.warm, say)
     scale = float(np.abs(loop.reading[~held]).max())
 
@@ -125,7 +125,7 @@ def _refined(bench, residual, wanted, say) -> tuple:
             last = _counted(fit(residual, low, high, start=found.values, starts=1, bars="series"), before)
             return replace(last, agreed=agreed), change
         if say:
-            say(f"{bench.pieces} time steps between two rows")
+            say(f"{bench.pieces} time steps between neighbouring rows of the record")
         start, starts = found.values, 1
 
 
@@ -164,8 +164,8 @@ def _doubts(fitted: Fitted, led: bool) -> list:
     rms, step_error = fitted.rms, fitted.step_error
     out, peak, used = [], float(np.abs(loop.reading).max()), np.count_nonzero(~held)
     if rms > 1e-6 * peak and rows < FEWER * used:
-        out.append(f"the deviations of neighbouring rows are correlated, so for the intervals the {used} rows count as "
-                   f"{max(rows, 1):.3g} independent rows; a part of the deviation is systematic")
+        out.append("the deviations of neighbouring rows are correlated, so the intervals are computed as if the "
+                   f"{used} rows were {max(rows, 1):.3g} independent rows; a part of the deviation is systematic")
     if abs(loop.reading[0]) > 0.2 * peak and not has(scene.friction.law, "memoryless") and not held[0] and not led:
         out.append(f"the force in the first row is {abs(loop.reading[0]) / peak:.0%} of the largest force, but the "
                    "model starts without force: use --warm-up, hold out the first cycle, or give a record that begins "

@@ -144,7 +144,7 @@ def fit_decay(scene: Scene, to: Path, free, say=None, starts: int = 3) -> Fitted
     start, box = own_values(scene, wanted), space([one.low for one in wanted], [one.high for one in wanted])
     ways = _known(curve, [start, *map(box.values, spread_points(OTHERS, len(start)))])
     if say:
-        say(f"{amplitude.size} amplitudes by {' and '.join(ways)}")
+        say(f"{amplitude.size} amplitudes computed by {' and '.join(ways)}")
     share, settled, tried = np.ones_like(measured), len(ways) == 1, []
     while not settled and len(tried) < ROUNDS:
         start = fitted(quick).values
@@ -162,9 +162,9 @@ def fit_decay(scene: Scene, to: Path, free, say=None, starts: int = 3) -> Fitted
     start = start if settled else min(tried)[2]
     found = fitted(model, "series")
     best, lost = model(found.values), amplitude[np.isnan(curve(found.values, ways[0])[0])]
-    warned = [f"harmonic balance found no oscillation at the amplitudes {_listed(lost)}; there the static curve is "
-              "used, times the ratio of harmonic balance to the static curve at the nearest "
-              "amplitude"] if lost.size else []
+    warned = [f"harmonic balance found no oscillation at the amplitudes {_listed(lost)}; the values used at these "
+              "amplitudes are those of the static curve, multiplied by the ratio of harmonic balance to the static "
+              "curve at the nearest amplitude with both results"] if lost.size else []
     sets = [one.assigned(value) for one, value in zip(wanted, found.values)]
     return FittedDecay(scene, Path(to), wanted, found, amplitude, measured, error, best, ways[0], sets,
                        [*scene.remarks, *warned, *remarks(found, [one.key for one in wanted])], perf_counter() - begin)

@@ -139,15 +139,15 @@ class BenchModel:
         aged = not has(law.law, "timeless") and not (has(law.law, "bonds") and law.rest_growth is None)
         if not aged and not (scene.normal is not None and scene.normal.amplitude):
             self.notes.append(f"{loop.path} has no column of time: its rows are taken as evenly spaced in time, which "
-                              f"does not affect law '{law.law}'")
+                              f"does not affect the force of law '{law.law}'")
             return np.arange(float(loop.reading.size))
         move = np.abs(np.diff(loop.displacement))
         if slide.kind in ("constant", "triangle") and move.all():
             self.notes.append(f"{loop.path} has no column of time: the times of its rows are computed from slide.speed")
             return np.concatenate([[0.0], np.cumsum(move / slide.speed)])
-        raise PatchfemError(f"{loop.path}:1: law '{law.law}' needs the times of the rows here; add a column time [s] "
-                            "(the times can be computed from slide.speed only for a constant or triangle slide without "
-                            "rests)")
+        raise PatchfemError(f"{loop.path}:1: law '{law.law}' needs the times of the rows of this record; add a column "
+                            "time [s] (the times can be computed from slide.speed only for a constant or triangle "
+                            "slide without rests)")
 
     def _note_amplitude(self) -> None:
         slide, half = self.scene.slide, float(np.ptp(self.loop.displacement)) / 2

@@ -143,10 +143,11 @@ def _coarse(model: Model, patch, left: float) -> tuple:
         return ()
     cure = "begin with larger amplitudes, at which more elements of the patch slip"
     if not model.patch.chosen:
-        cure = "leave contact.element_size out: the mesh is then refined until the loss is known well enough" \
+        cure = "leave contact.element_size out: the mesh is then refined until the energy loss is accurate enough" \
             if model.patch.mesh is None else "refine the mesh in the file"
     return (f"with this mesh ({patch.x.size} interface nodes) the energy loss has an error of {100 * left:.2g} % "
-            f"(rms); this also makes `chi` of law 'iwan' uncertain, which sets the exponent of micro-slip; {cure}",)
+            "(rms); this error also makes `chi` of law 'iwan' uncertain, and `chi` sets the exponent of micro-slip; "
+            f"{cure}",)
 
 
 def fit_law(law: str, static: float, load: float, slides, own: Curves, stiffness: float) -> OneLaw:

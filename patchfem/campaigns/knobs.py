@@ -62,7 +62,7 @@ def _split_words(level: int) -> str:
 def _by_tolerance(model: Model) -> list:
     """Meshes that tolerances choose; one named twice is that of the scene."""
     own = model.accuracy.tolerance
-    return [Setting(f"tolerance {one:g}", one, "element size by tolerance" + (f" {one:g}" if one != own else ""),
+    return [Setting(f"tolerance {one:g}", one, "element size set by the tolerance" + f" {one:g}" * (one != own),
                     replace(model, patch=replace(model.patch, mesh_tolerance=one)))
             for one in sorted({*TOLERANCES, own}, reverse=True)]
 
@@ -79,7 +79,7 @@ def _even(model: Model) -> list:
             out.append(Setting(label, size, f"element size {label}", turned))
     if model.kind == "patch":
         chosen = replace(model, patch=model.patch.sized(None))
-        out.append(Setting("by tolerance", None, "element size by tolerance", chosen))
+        out.append(Setting("by tolerance", None, "element size set by the tolerance", chosen))
     return out
 
 
@@ -94,7 +94,7 @@ def _counted(model: Model, knob: str) -> list:
             turned = model if own else _with(model, knob, value)
             out.append(Setting(str(value), float(value), words.format(value), turned))
     if not pinned and knob != "steps_per_cycle":
-        out.append(Setting("by tolerance", None, words.format("").strip() + " by tolerance", model))
+        out.append(Setting("by tolerance", None, words.format("").strip() + " set by the tolerance", model))
     return out
 
 

@@ -111,7 +111,8 @@ def wear_coefficient(model: Model, to: str, free, progress=None) -> Coefficient:
         raise PatchfemError(f"--free {KEY}: with the high bound {bounds.high:.4g} m^2/N the scene reaches only "
                             f"{target.name} = "
                             f"{curve[1][-1]:.4g}, but {target.value:.4g} was measured; "
-                            + ("the coating is then worn through before the last cycle" if curve[0][-1] < 1 else
+                            + ("with this bound as the coefficient the coating is worn through before the last "
+                               "cycle" if curve[0][-1] < 1 else
                                "raise the high bound"))
     inverse = _inverse(curve)
     value, runs, reached = float(bounds.high * inverse(target.value)), 1, math.nan

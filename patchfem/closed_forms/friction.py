@@ -46,7 +46,7 @@ def growth_factor(share, order=1.0) -> float:
     ValueError for a < 0 or p <= -1. To 1e-12, by adaptive quadrature between the scales of the integrand.
     """
     if share < 0:
-        raise ValueError(f"share must not be negative, got {share}")
+        raise ValueError(f"'share' must not be negative, got {share}")
     weight_along(1.0, order)  # refuses the order
     if share == 0:
         return 1.0
@@ -109,7 +109,7 @@ def reversal_force(back, length, order=1.0, reading="stretch", limit=1.0):
     _reading(reading)
     x = np.asarray(back, float) / length
     if np.any(x < 0):
-        raise ValueError("back must not be negative")
+        raise ValueError("'back' must not be negative")
     if reading == "report":
         if order <= -1:
             raise ValueError(f"order must exceed -1, got {order}")

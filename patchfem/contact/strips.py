@@ -35,7 +35,7 @@ from .strips_solve import (
 from .unilateral import LIMIT
 
 NEGLECTED = ("the shear between neighbouring strips is neglected; fields and pictures show the mean over the strips, "
-             "except where strips are mentioned; result.nc contains every strip")
+             "unless their captions name strips; result.nc contains every strip")
 
 
 @dataclass(frozen=True, eq=False, slots=True)

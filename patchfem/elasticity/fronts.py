@@ -128,7 +128,7 @@ def _fault(front, size, least: float) -> NotConverged:
     """What the own part of a front (k, k), its lower half, says of a matrix with diagonal entries (k,) there."""
     scale = np.sqrt(np.where(size > 0, size, 1.0))
     if eigvalsh(front / np.outer(scale, scale))[0] > -least:
-        return Strainless("a motion of the piece causes no strain")
+        return Strainless("the piece can move without any strain")
     return NotConverged("the stiffness of the piece is not positive definite")
 
 

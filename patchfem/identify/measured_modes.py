@@ -103,9 +103,9 @@ def _of_base(found: Modes) -> tuple:
 def _told(found: Modes) -> list:
     out = []
     for k, (zeta, error) in enumerate(zip(found.damping, found.error)):
-        read = "" if not found.read[k] > 0 else f"; the estimate with a window gives {found.read[k]:.4g}"
+        read = "" if not found.read[k] > 0 else f"; the estimate from windowed segments gives {found.read[k]:.4g}"
         seen = "" if found.coherence is None else f"; coherence {found.coherence[k]:.3g}"
-        out.append(f"damping {zeta:.4g} +- {error:.1g} from the record itself{read}{seen}")
+        out.append(f"damping {zeta:.4g} +- {error:.1g} from the whole record{read}{seen}")
     return out
 
 
@@ -116,9 +116,9 @@ def _noted(found: Modes, estimate: Estimate, step: float) -> list:
     if wide.any() and estimate.segments > 1:  # one whole record is cut nowhere: what it reads more is noise
         k = int(np.argmax(np.where(wide, found.read / found.damping, 0)))
         notes.append(f"segments of {estimate.segment * step:.3g} s (window {estimate.window}) widen the peak at "
-                     f"{found.frequency[k]:.5g} Hz: with segments the damping seems to be {found.read[k]:.4g}, but the "
-                     f"whole record gives {found.damping[k]:.4g}, and this value is written; a free decay (--decay) "
-                     "gives the damping without an input")
+                     f"{found.frequency[k]:.5g} Hz: the segments give the damping {found.read[k]:.4g}, but the whole "
+                     f"record gives {found.damping[k]:.4g}, and the value from the whole record is written; a free "
+                     "decay (--decay) gives the damping without an input")
     if found.misfit > LOOSE:
         notes.append(f"the modes leave {100 * found.misfit:.0f} % of the response (root mean square) unexplained: the "
                      "record is noisy, or the rig is not linear")

@@ -51,13 +51,14 @@ def space(low, high, log=None) -> Space:
     """
     low, high = np.array(low, float), np.array(high, float)
     if low.ndim != 1 or low.shape != high.shape or not low.size:
-        raise ValueError(f"low and high must be two equal rows of numbers, got shapes {low.shape} and {high.shape}")
+        raise ValueError(f"'low' and 'high' must be one-dimensional and of the same length, got shapes {low.shape} and "
+                         f"{high.shape}")
     if not (np.isfinite(low).all() and np.isfinite(high).all() and (low < high).all()):
         raise ValueError("bounds must be finite with low < high")
     wide = (low > 0) & (high > 10 * low)
     log = wide if log is None else np.array(log, bool)
     if log.shape != low.shape or (log & (low <= 0)).any():
-        raise ValueError("log needs one flag per bound, and low > 0 where it is set")
+        raise ValueError("'log' needs one flag per parameter, and 'low' must be > 0 wherever the flag is set")
     return Space(low, high, log)
 
 

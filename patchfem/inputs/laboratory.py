@@ -87,7 +87,8 @@ def _refuse_commas(path, name: str, column) -> None:
     """PatchfemError for numbers that are written with a decimal comma."""
     odd = next((number, cell) for number, cell in enumerate(column, 2) if not NUMBER.fullmatch(cell))
     if NUMBER.fullmatch(odd[1].replace(",", ".", 1)):
-        raise PatchfemError(f"{path}:{odd[0]}: {name}: '{odd[1][:40]}' has a decimal comma; export it with points")
+        raise PatchfemError(f"{path}:{odd[0]}: {name}: '{odd[1][:40]}' has a decimal comma; export the file with "
+                            "decimal points")
     if name.strip().lower() in UNITS:
         raise PatchfemError(f"{path}:{odd[0]}: {name}: '{odd[1][:40]}' is not a finite number")
 

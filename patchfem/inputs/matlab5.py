@@ -131,11 +131,11 @@ def _fields(data, at: int, order: str):
     _, names, at = _element(data, at, order)
     wide = struct.unpack(order + "i", size)[0]
     if not 0 < wide <= 64 or len(names) % wide:
-        raise ValueError("its names do not fit")
+        raise ValueError("the list of its field names has a wrong length")
     for first in range(0, len(names), wide):
         kind, body, at = _element(data, at, order)
         if kind != _MATRIX:
-            raise ValueError("a field that is not an array")
+            raise ValueError("one of its fields is not an array")
         if body:
             yield names[first:first + wide].split(b"\0")[0].decode("latin-1"), memoryview(body)
 
@@ -164,7 +164,7 @@ def _unpacked(path, body, total: int) -> bytes:
     unpack = zlib.decompressobj()
     data = unpack.decompress(body, 8 + total + 1)[8:]
     if not unpack.eof:  # there its checksum has been compared
-        raise ValueError("it ends too early or too late")
+        raise ValueError("its data are longer or shorter than announced")
     return data
 
 
@@ -187,10 +187,10 @@ def sparse_of(rows, starts, values, shape: tuple):
     they do not fit together."""
     count, wide = shape[1], np.diff(starts)
     if starts.size != count + 1 or starts[0] != 0 or (wide < 0).any() or starts[-1] > min(rows.size, values.size):
-        raise ValueError("its columns do not fit")
+        raise ValueError("the column pointers of the sparse matrix do not fit its size")
     rows, values = rows[:starts[-1]], values[:starts[-1]]
     if rows.size and not 0 <= rows.min() <= rows.max() < shape[0]:
-        raise ValueError("its rows do not fit")
+        raise ValueError("a row number lies outside the sparse matrix")
     return sparse.csc_array((values.astype(float), rows.astype(np.int64), np.asarray(starts, np.int64)), shape=shape)
 
 
@@ -215,7 +215,7 @@ def _texts(data, known: _Known, order: str) -> np.ndarray:
             kind, stored, at = _element(data, at, order)
             flag, shape, name, inner = _described(stored, order)
             if kind != _MATRIX or flag & 0xFF != _CHAR:
-                raise ValueError("a cell that is not text")
+                raise ValueError("a cell does not contain text")
             one = _Known(_CHAR, shape, name.decode("latin-1"), inner, len(stored))
             found.append(_texts(stored, one, order)[0])
     out = np.empty(len(found), dtype=object)

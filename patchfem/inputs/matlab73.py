@@ -136,4 +136,4 @@ def _limited(path, one) -> None:
     """PatchfemError for a dataset of too many numbers, or of far more bytes than it takes in the file."""
     if one.size > LARGEST or one.nbytes > max(SMALL, RATIO * one.id.get_storage_size()):
         raise PatchfemError(f"{path}: a variable of shape {one.shape[::-1]} with {one.nbytes} bytes, more than "
-                            f"{LARGEST:.1e} numbers or {RATIO} times what it takes in the file; save a part of it")
+                            f"{LARGEST:.1e} numbers or more than {RATIO} times its size in the file; save a part of it")

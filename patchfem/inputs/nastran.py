@@ -42,7 +42,7 @@ class _Strings:
             column, row = np.array(self.places, int).reshape(-1, 2).T
             out = (row < 1) | (row + sizes - 1 > self.shape[0])
             if out.any():
-                raise ValueError(f"row {(row + sizes - 1)[out][0]} of {self.shape[0]}")
+                raise ValueError(f"it uses row {(row + sizes - 1)[out][0]}, but the matrix has {self.shape[0]} rows")
             rows = np.arange(numbers.size) + np.repeat(row - 1 - np.cumsum(sizes) + sizes, sizes)
             return Cards(sparse.coo_array((numbers, (rows, np.repeat(column - 1, sizes))), self.shape).tocsr())
         except ValueError as error:
@@ -109,7 +109,7 @@ def _binary(path, data: bytes) -> dict:
             begin = place + (2 if big else 1) * wide
             place = begin + (long - 1) * wide
             if place < begin:
-                raise ValueError("a string without rows")
+                raise ValueError("one of its strings has no rows")
             entries.places.append((column, first))
             entries.parts.append(record[begin:place])
     return found
@@ -151,7 +151,7 @@ def _text(path, text: str) -> dict:
 def _fixed(text: str, width: int) -> np.ndarray:
     """Numbers in columns of a width; ValueError where one is none."""
     if len(text) % width:
-        raise ValueError(f"numbers that are not {width} letters wide")
+        raise ValueError(f"its numbers are not {width} characters wide")
     return np.frombuffer(text.upper().replace("D", "E").encode("ascii"), f"S{width}").astype(float)
 
 
@@ -199,7 +199,7 @@ def ranked(places) -> tuple:
     if not places.size:
         return places, np.zeros(0, int)
     if places.min() < 0 or places.max() >= 2**31:
-        raise ValueError(f"{places.min()} to {places.max()} are not nodes and directions")
+        raise ValueError(f"{places.min()} to {places.max()} are not possible numbers of nodes and directions")
     wide = int(places[:, 1].max()) + 1
     found, where = np.unique(places[:, 0] * wide + places[:, 1], return_inverse=True)
     return np.stack(np.divmod(found, wide), axis=1), where

@@ -152,7 +152,8 @@ def _tags(raw: Tagged, where) -> None:
     there = set(np.unique(raw.names).tolist())
     missing = {"upper_substrate", "lower_substrate"} - there | {e for e in EDGES if not len(raw.nodes.get(e, ()))}
     if missing:
-        raise PatchfemError(f"{where}: no cells or nodes are tagged {', '.join(sorted(missing))} ({raw.how})")
+        raise PatchfemError(f"{where}: no cells or nodes are tagged {', '.join(sorted(missing))} (tags of this format: "
+                            f"{raw.how})")
     unknown = there - set(CELLS)
     if unknown:
         shown = ", ".join(sorted(name or "no tag" for name in unknown)[:4])
@@ -249,7 +250,7 @@ def _interface(points, nodes, side: str, where) -> np.ndarray:
                             "from this line; give the shape of a surface by [contact.crown] or [contact.tilt]")
     if points[:, 1].min() < -close:
         raise PatchfemError(f"{where}: the {side} piece reaches {-points[:, 1].min():.6g} m across y = 0; the lower "
-                            "piece lies at y <= 0, the upper piece at y >= 0")
+                            "piece must lie at y <= 0, and the upper piece at y >= 0")
     if flat.all():
         points[nodes, 1] = 0.0
     np.maximum(points[:, 1], 0.0, out=points[:, 1])

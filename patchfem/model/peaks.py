@@ -34,7 +34,7 @@ def of_trace(path: Path, cutoff: float | None = None) -> Told:
     try:
         return _read(path, path.stat().st_mtime_ns if path.exists() else 0, cutoff)
     except PatchfemError as error:
-        cure = f"; {AT}cutoff moves it" if "cut-off" in str(error) else ""
+        cure = f"; {AT}cutoff sets this cut-off" if "cut-off" in str(error) else ""
         raise type(error)(f"{error}{cure}", f"{AT}from") from None
 
 

@@ -61,8 +61,8 @@ def _waviness(trace: Profile, cutoff: float) -> tuple:
     line = mean_line(np.interp(x, same.x, same.z), cutoff * (x.size - 1) / same.length, tilted=True)
     share = fine_share(trace, cutoff)
     said = (f"{trace.source}: waves longer than {say(cutoff)} give the shape of the gap; the shorter waves "
-            f"({100 * share:.2g} % of the rms height) belong to [contact.asperities], whose key `cutoff` sets this "
-            "limit",) if share > 0 else ()
+            f"({100 * share:.2g} % of the rms height) are represented by [contact.asperities], whose key `cutoff` sets "
+            "this limit",) if share > 0 else ()
     return replace(trace, x=frozen_array(x), z=frozen_array(line), notes=()), said
 
 
@@ -76,8 +76,8 @@ def _levelled(path: Path, x, cell: float, material: bool) -> tuple:
     trace = level(whole)
     slope, notes = float(np.polyfit(whole.x, whole.z - trace.z, 1)[0]), trace.notes
     if abs(slope) * trace.length > 1e-2 * np.ptp(trace.z):
-        notes = (*notes, f"{trace.source}: the slope of {slope:.3g} rad was subtracted; to include a tilt, give "
-                         "[contact.tilt]")
+        notes = (*notes, f"{trace.source}: the slope of {slope:.3g} rad was subtracted from the heights; to include a "
+                         "tilt, give [contact.tilt]")
     straight = bool(np.std(trace.z) <= max(NOISE, 1e-5 * np.ptp(whole.z)))
     before, after = int(trace.x[0] > x[0]), int(trace.x[-1] < x[-1])
     places = np.concatenate([x[:1][:before], trace.x, x[-1:][:after]])

@@ -102,9 +102,9 @@ def stiffness_of(one, load: float) -> float:
     if 0 < held < inf and not curved:
         return held
     why = "sticks rigidly" if held == inf else "has no single stiffness" if curved else "has no stiffness"
-    raise PatchfemError(f"{one.key}: law '{f.law}' {why} here, so its stiffness cannot be subtracted from the modes; "
-                        "add an elastic part ([contact.shear], or a law with a stiffness such as iwan), or give the "
-                        "modes without the joint", "structure.measured")
+    raise PatchfemError(f"{one.key}: law '{f.law}' {why} in this scene, so its stiffness cannot be subtracted from the "
+                        "modes; add an elastic part ([contact.shear], or a law with a stiffness such as iwan), or give "
+                        "the modes without the joint", "structure.measured")
 
 
 def _as_given(scene) -> ModalBasis:

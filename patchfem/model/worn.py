@@ -42,8 +42,8 @@ class WornBefore:
         if self.cycles < asked * (1 - 1e-9):
             cycles += f" of {asked:.6g}"
         return (f"continues from {self.path.parent.name}/{self.path.name}, where up to "
-                f"{say(float(self.depth.max()), 3)} was worn off in {cycles} cycles; cycles of this run are counted "
-                "from that state, but worn_volume and worn_depth_max are measured from the unworn pieces")
+                f"{say(float(self.depth.max()), 3)} was worn off in {cycles} cycles; the cycles of this run are "
+                "counted from that state, but its worn_volume and worn_depth_max are measured from the unworn pieces")
 
     def on(self, x) -> np.ndarray:
         """Worn depth (m,) [m] at x (m,) [m] of an interface; PatchfemError unless it is as long."""

@@ -272,8 +272,8 @@ def _spectrum(tangential, limit, bond_length: float, weakening: float) -> Spectr
     jump = values[0] / bond_length * (weakening - 1)
     if jump >= 1:
         raise PatchfemError("contact.shear with friction.kinetic below static: the patch may slip suddenly without a "
-                            f"change of the force on it (the stability number {jump:.3g} must be below 1); raise "
-                            "friction.bond_length or friction.kinetic")
+                            f"change of the force on it (the stability number is {jump:.3g}, but must be below 1); "
+                            "raise friction.bond_length or friction.kinetic")
     shape, values = (np.ones((index.size, 1)), tangential[:1, 0]) if even else (vectors / root[:, None], values)
     return Spectrum(frozen_array(index, np.int64), limit[index], shape, values, bond_length)
 

@@ -115,8 +115,8 @@ def _of_matrices(data, pairs, pushed, forced, where) -> ModalBasis:
     if n == 0:
         raise PatchfemError(f"{where}: M has no coordinate; a square matrix [kg] of at least one coordinate is needed")
     if pairs and "slide" in data:
-        raise PatchfemError(f"{where}: contains `slide`, but [[structure.interface]] defines where sliding occurs too: "
-                            "keep only one of the two")
+        raise PatchfemError(f"{where}: contains `slide`, but [[structure.interface]] also defines where sliding "
+                            "occurs: keep only one of these two descriptions")
     over = [k for pair in pairs for k in pair if k > n]
     if over or (pushed or 0) > n:
         raise PatchfemError(f"{where}: there is no coordinate {(over or [pushed])[0]}: M has {n}, numbered from 1")
@@ -168,7 +168,8 @@ def _of_modes(data, pairs, pushed, forced, mass, where) -> ModalBasis:
         raise PatchfemError(f"{where}: damping must be >= 0, not {damping.min():g}")
     # round-off of a singular D
     if damping.ndim == 2 and np.linalg.eigvalsh(damping + damping.T).min() < -1e-9 * np.abs(damping).max():
-        raise PatchfemError(f"{where}: damping adds energy; a positive matrix D [1/s] is needed")
+        raise PatchfemError(f"{where}: the damping matrix adds energy; a positive semidefinite matrix D [1/s] is "
+                            "needed")
     zeta, coupled = matrices.split(damping, omega) if damping.ndim == 2 else (frozen_array(damping), None)
     output = _numbers(data, "output", where, (n,)) if "output" in data else faces[0]
     base = -(_numbers(data, "force", where, (n,)) if "force" in data else output) if forced \

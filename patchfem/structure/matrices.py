@@ -91,9 +91,10 @@ def _modes(root, K, stretch) -> tuple:
     square, turned = eigh((unit + unit.T) / 2)
     least = len(K) * ROUND * np.abs(square).max(initial=0.0)
     if square[0] < -least:
-        raise PatchfemError(f"structure: K is not positive semidefinite: one motion has the stiffness {square[0]:.3g} "
-                            f"1/s^2 per unit of mass, which is {square[0] / square[-1]:.2g} of the largest; make the "
-                            "springs symmetric and >= 0, and write the matrix with all its digits")
+        raise PatchfemError("structure: K is not positive semidefinite: for one motion the stiffness divided by the "
+                            f"mass is {square[0]:.3g} 1/s^2, which is {square[0] / square[-1]:.2g} times the largest "
+                            "such quotient; make the springs symmetric and >= 0, and write the matrix with all its "
+                            "digits")
     return np.sqrt(np.where(square <= least, 0.0, square)), turned
 
 
@@ -174,8 +175,8 @@ def _damper(phi, C):
     D = trimmed(phi.T @ C @ phi, np.abs(phi).T @ np.abs(C) @ np.abs(phi))
     least = eigh(D, eigvals_only=True)
     if least[0] < -1e-9 * max(abs(least[-1]), abs(least[0])):  # round-off of a singular C
-        raise PatchfemError(f"structure: C adds energy: the damping of one motion is {least[0]:.3g} 1/s over its mass; "
-                            "dampers >= 0 are needed")
+        raise PatchfemError("structure: C adds energy: for one motion the damping divided by the mass is "
+                            f"{least[0]:.3g} 1/s; dampers >= 0 are needed")
     return D
 
 

@@ -104,16 +104,17 @@ def _refuse_indefinite(matrix, name: str) -> None:
     own = matrix.diagonal()
     if (own < 0).any():
         k = int(np.argmin(own))
-        raise PatchfemError(f"the {name} is not positive: the diagonal entry of coordinate {k + 1} is {own[k]:.4g}",
+        raise PatchfemError(f"the {name} matrix is not positive semidefinite: the diagonal entry of coordinate {k + 1} "
+                            f"is {own[k]:.4g}",
                             f"structure.reduced.{name}")
     beside = matrix.tocoo()
     i, j = beside.coords
     over = np.abs(beside.data) > np.sqrt(own[i]) * np.sqrt(own[j]) * (1 + 1e-9)
     if over.any():
         k = int(np.argmax(over))
-        raise PatchfemError(f"the {name} is not positive: coordinates {i[k] + 1} and {j[k] + 1} have the diagonal "
-                            f"entries {own[i[k]]:.4g} and {own[j[k]]:.4g} but the entry {beside.data[k]:.4g} between "
-                            "them",
+        raise PatchfemError(f"the {name} matrix is not positive semidefinite: coordinates {i[k] + 1} and {j[k] + 1} "
+                            f"have the diagonal entries {own[i[k]]:.4g} and {own[j[k]]:.4g} but the entry "
+                            f"{beside.data[k]:.4g} between them",
                             f"structure.reduced.{name}")
 
 
@@ -124,8 +125,8 @@ def _factor(K):
     except Strainless:
         return None
     except NotConverged:
-        raise PatchfemError("the stiffness is not positive: one motion of the coordinates has negative energy; check "
-                            "the matrix",
+        raise PatchfemError("the stiffness matrix is not positive semidefinite: one motion of the coordinates has "
+                            "negative energy; check the matrix",
                             "structure.reduced.stiffness") from None
 
 
@@ -263,11 +264,11 @@ def _strained(stiffness, mass) -> tuple:
     try:
         square, shapes = eigh((stiffness + stiffness.T) / 2, mass)
     except np.linalg.LinAlgError:
-        raise PatchfemError("the mass is not positive: one motion of the boundary moves no mass; give every boundary "
-                            "coordinate a mass", "structure.reduced.mass") from None
+        raise PatchfemError("the mass matrix is not positive definite: one motion of the boundary moves no mass; give "
+                            "every boundary coordinate a mass", "structure.reduced.mass") from None
     least = LOOSE * square[-1] * len(square)
     if square[0] < -least:
-        raise PatchfemError(f"the stiffness is not positive: one motion has the stiffness {square[0]:.3g} 1/s^2 per "
-                            f"unit of mass, which is {square[0] / square[-1]:.2g} of the "
-                            "largest", "structure.reduced.stiffness")
+        raise PatchfemError("the stiffness matrix is not positive semidefinite: for one motion the stiffness divided "
+                            f"by the mass is {square[0]:.3g} 1/s^2, which is {square[0] / square[-1]:.2g} times the "
+                            "largest such quotient", "structure.reduced.stiffness")
     return square[square > least], shapes[:, square > least]

@@ -70,8 +70,8 @@ def evened(path, x, factor: float, name: str = "x") -> tuple:
     digit = next((one for one in digits if np.abs(x / one - np.rint(x / one)).max() < 1e-4), 0.0)
     if off > 0.75 * digit:  # half a digit about the true line, a little more about the fitted one
         return x, ()
-    return even, (f"{path}: {name} is printed only to {say(digit * factor)}; the samples are taken as evenly spaced by "
-                  f"{say(step * factor)}",)
+    return even, (f"{path}: {name} is rounded to {say(digit * factor)} in the file; the samples are taken as evenly "
+                  f"spaced by {say(step * factor)}",)
 
 
 def _single(path, x, z, at, factor: float) -> tuple:

@@ -208,7 +208,7 @@ load = "100 N"
     found = backbone(pf.build("[structure]\n" + structure + rig[rig.index("[drive]"):]), "", a, ("balance",))
     one = found.curves["balance"]
     assert one.amplitude == pytest.approx(a[:2]) and one.frequency == pytest.approx(found.stuck, rel=1e-6)
-    assert "without a result" in found.notes[0] and "did not converge there; the curve" in found.notes[0]
+    assert "without a result" in found.notes[0] and "did not converge at these amplitudes; the curve" in found.notes[0]
 
 
 FOLDED = shaken('law = "elastic-plastic"\nbond_length = "1.80165 um"').replace('load = "100 N"', 'load = "12.011 N"')

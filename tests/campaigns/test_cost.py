@@ -82,14 +82,15 @@ def test_exact_the_cheapest_run_is_one_that_finer_ones_confirm():
 
 def test_exact_the_sentence_names_the_cheapest_run_or_the_worst_measure():
     runs = [made("2", 1, 4e-2, 3e-2), made("4", 2, 8e-3, 6e-3), made("8", 5, 2e-3)]
-    assert sentence(runs, 1e-2) == "a knob at 4: 2 CPU s per run, with all measures within 1 %"
+    assert sentence(runs, 1e-2) == "a knob at 4: 2 CPU s per run, with an error of at most 1 % in every measure"
     assert sentence(runs, 1e-3) == \
-        "no run has all measures within 0.1 %: the best run, with a knob at 8, has an error of 0.2 % in a and " \
-        "takes 5 CPU s"
+        ("no run has an error of at most 0.1 % in every measure: the best run, with a knob at 8, has an error of 0.2 % "
+         "in a and takes 5 CPU s")
     still = [made("2", 1, 2e-2), made("4", 2, 2e-2), made("8", 5, 2e-2)]
-    assert sentence(still, 1e-2) == "no run has all measures within 1 %: with every setting the error of a is 2 %"
+    assert sentence(still, 1e-2) == \
+        "no run has an error of at most 1 % in every measure: with every setting the error of a is 2 %"
     bold = [made("2", 1, 1e-3, 3e-2), *runs[1:]]  # states less than its distance to the best
-    assert sentence(bold, 1e-2) == "a knob at 4: 2 CPU s per run, with all measures within 1 %"
+    assert sentence(bold, 1e-2) == "a knob at 4: 2 CPU s per run, with an error of at most 1 % in every measure"
 
 
 def test_exact_the_table_has_the_measure_that_the_sentence_judges_by():

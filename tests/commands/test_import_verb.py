@@ -74,7 +74,7 @@ def test_exact_modes_of_a_record_are_the_structure_of_a_scene(shaken, tmp_path):
     modes = build(loads(FORCED + text)).rig.modes
     assert modes.omega == pytest.approx(OMEGA, rel=1e-8) and modes.mass == pytest.approx(1 / 1.2, rel=1e-6)
     assert modes.output**2 / modes.mass == pytest.approx(RESIDUE, rel=1e-6)
-    assert "# modes of shaker.uff" in text and "the estimate with a window gives" in text
+    assert "# modes of shaker.uff" in text and "the estimate from windowed segments gives" in text
 
 
 def test_exact_a_band_keeps_the_mode_in_it_and_its_damping(shaken, tmp_path):

@@ -399,7 +399,8 @@ def test_refuses_a_key_of_the_file_and_of_the_line(scene, tmp_path):
     table.write_text("normal.load [N],friction.static\n10,0.3\n", encoding="utf-8")
     answer = cli("sweep", scene, "--cases", table, "--over", "friction.static=0.1,0.2", "-o", tmp_path / "a")
     assert answer.code == 2 and answer.err == \
-        f"--over friction.static: {table} sets this key already; remove the key from one of the two\n"
+        (f"--over friction.static: {table} sets this key already; remove the key from the file or leave out this "
+         "--over\n")
 
 
 @pytest.mark.parametrize("words, says", [

@@ -492,7 +492,7 @@ def test_exact_a_run_that_misses_its_residual_is_kept_and_marked(written, tmp_pa
 
     monkeypatch.setattr(marching.Run, "_steps", missing)
     failed = cli("run", written(SCENES["rig patch"]), "-o", out, "-q", "--set", "drive.cycles=5")
-    assert failed.code == 3 and "above the required" in failed.err
+    assert failed.code == 3 and "above the permitted" in failed.err
     summary = json.loads((out / "summary.json").read_text("utf-8"))
     assert summary["outcome"] == "not_converged" and (out / "fields.vtkhdf").is_file()
     motion = summary["measures"]["relative_displacement_amplitude"]

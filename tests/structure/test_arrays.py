@@ -90,7 +90,7 @@ def test_refuses_matrices_that_lack_something(change, says):
     ({"moving_mass": None}, "lacks moving_mass > 0"), ({"slide": np.ones(3)}, "slide has shape (3,), but there are 2"),
     ({"frequency": np.array([-1.0, 2.0])}, "frequencies must be >= 0"), ({"base": np.ones(2)}, "the sum of `base`^2"),
     ({"damping": np.array([-0.1, 0.1])}, "damping must be >= 0"), ({"output": np.array([np.nan, 0])}, "not finite"),
-    ({"damping": -np.eye(2)}, "damping adds energy"), ({"damping": np.full(2, 0.1j)}, "damping is complex"),
+    ({"damping": -np.eye(2)}, "damping matrix adds energy"), ({"damping": np.full(2, 0.1j)}, "damping is complex"),
     ({"slide": np.array(["a", "b"])}, "does not contain real numbers"),
 ])  # fmt: skip
 def test_refuses_modes_that_lack_something(change, says):

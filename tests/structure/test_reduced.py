@@ -138,12 +138,13 @@ def test_exact_ratio_is_that_of_every_mode():
     assert one.damping is None and one.zeta[0] == 0 and (one.zeta[1:] == 0.02).all()
 
 
-REFUSED = {"the mass is not positive: the diagonal entry of coordinate 3": lambda K, M: M.__setitem__((2, 2), -1.0),
-           "the stiffness is not positive: coordinates 7 and 8": lambda K, M: K.__setitem__(
+REFUSED = {"the mass matrix is not positive semidefinite: the diagonal entry of coordinate 3":
+               lambda K, M: M.__setitem__((2, 2), -1.0),
+           "the stiffness matrix is not positive semidefinite: coordinates 7 and 8": lambda K, M: K.__setitem__(
                ([6, 7], [7, 6]), -1e9),
-           "the stiffness is not positive: one motion of the coordinates has negative energy":
+           "the stiffness matrix is not positive semidefinite: one motion of the coordinates has negative energy":
                lambda K, M: K.__setitem__((7, 7), 0.2 * K[7, 7]),
-           "the mass is not positive: one motion of the boundary": lambda K, M: M.__imul__(0)}
+           "the mass matrix is not positive definite: one motion of the boundary": lambda K, M: M.__imul__(0)}
 
 
 @pytest.mark.parametrize("says", REFUSED)
@@ -154,7 +155,8 @@ def test_refuses_matrices_that_are_not_positive(says, method):
     with pytest.raises(PatchfemError) as caught:
         found = made(K, M, None, 3, method)
         reduced.basis(found, 3, pushed=1)
-    wanted = says if "negative energy" not in says or "energy" in str(caught.value) else "the stiffness is not positive"
+    wanted = says if "negative energy" not in says or "energy" in str(caught.value) else \
+        "the stiffness matrix is not positive"
     assert wanted in str(caught.value) and caught.value.key.startswith("structure.reduced."), caught.value
 
 

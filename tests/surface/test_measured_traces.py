@@ -54,8 +54,8 @@ def test_exact_the_step_of_the_stylus_is_length_over_points(data):
     profile = dektak(data)
     assert np.diff(profile.x) == pytest.approx(np.full(9599, 1500e-6 / 9600), rel=1e-9)
     assert profile.x[0] == 0 and profile.x[-1] == pytest.approx(9599 * 0.15625e-6, rel=1e-14)
-    assert profile.notes[0].endswith("x is printed only to 100 nm; the step 1.5 mm/9600 = 156.2 nm of the header is "
-                                     "used")
+    assert profile.notes[0].endswith("x is rounded to 100 nm in the file; the step 1.5 mm/9600 = 156.2 nm of the "
+                                     "header is used")
     assert profile.tip_radius == pytest.approx(2.5e-6)
 
 

@@ -49,9 +49,9 @@ class Asked:
         scene, drive = self.scene, self.scene.drive
         where = f"{scene.path}: fit --to {measured.name}: "
         if scene.kind not in ("rig", "linear"):
-            raise PatchfemError(f"{where}to fit rows of frequency and input, the scene must be a rig, but this is a "
-                                f"{scene.kind} scene; to fit a loop with a column of displacement, use a scene with "
-                                "[slide]")
+            raise PatchfemError(f"{where}to fit a file whose rows give frequency and input, the scene must be a rig, "
+                                f"but this is a {scene.kind} scene; to fit a loop with a column of displacement, use a "
+                                "scene with [slide]")
         if drive.kind != "base" or drive.waveform != "sine":
             raise PatchfemError(f"{where}each row was measured under a sine of the base; set drive.kind = 'base' and "
                                 "drive.waveform = 'sine'")

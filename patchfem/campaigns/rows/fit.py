@@ -114,7 +114,7 @@ def fit_rows(question: Question, options: RowsOptions, say: Callable | None = No
     parts = cells.parts(options.leave_out, ~held) if options.leave_out else []
     if len(parts) == 1:
         raise PatchfemError(f"--leave-out {options.leave_out}: all rows that are not held out have the same value in "
-                            "this column, so without that value no rows remain for the fit; choose another column")
+                            "this column, so leaving this value out leaves no rows for the fit; choose another column")
     for _, part in parts:
         _enough(cells, ~held & ~part, count, how)
     placebos = [(text, question.asked(cells.conditions, text)) for one in options.placebos

@@ -74,8 +74,8 @@ def cases_of(asked: Asked, request: Request) -> Cases:
         if not axes and not mistakes:
             wrong.append(f"{asked.path}: no key to sweep is given; add --over table.key=v1,v2,... or a table [sweep]")
     twice = {axis.key for part in parts for axis in part.axes} & {axis.key for axis in axes}
-    wrong += [f"--over {key}: {request.file} sets this key already; remove the key from one of the "
-              "two" for key in sorted(twice)]
+    wrong += [f"--over {key}: {request.file} sets this key already; remove the key from the file or leave out this "
+              "--over" for key in sorted(twice)]
     if not wrong:
         wrong += _same(asked, [axis.key for axis in (*axes, *(one for part in parts for one in part.axes))])
     if wrong:

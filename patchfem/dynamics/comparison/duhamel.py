@@ -81,7 +81,7 @@ def _warnings(modes, laws, found: Grid, failures, steps: int) -> list:
         out.append(f"the friction force differs from the friction law by up to {left.max():.3g} of the friction limit, "
                    f"and on average over the steps by {left[1:].mean():.3g} of this limit")
     if failures:
-        out.append(f"{failures} of {iterations.size - 1} steps did not converge within the largest number of "
+        out.append(f"{failures} of {iterations.size - 1} time steps did not converge within the permitted number of "
                    "iterations")
     turn = found.h * max(elastic_rates(modes, laws), default=0.0)
     if turn > TURN:

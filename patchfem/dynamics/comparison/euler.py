@@ -49,8 +49,8 @@ def _warnings(modes, laws, h, steps: int) -> list:
     for one, face in zip(laws, modes.interfaces):
         pace = np.sum(face**2) / modes.mass * one.steepness
         if h * pace > 2:
-            out.append(f"a step of {h:.3g} s is above 2 v_0 m/limit = {2 / pace:.3g} s: the computed friction force "
-                       "changes its sign from step to step while the interface hardly moves")
-    return out + ["explicit Euler lowers the damping ratio of the vibration on the elastic contact from 0 to a "
-                  "negative value, by "
-                  f"{h * rate / 2:.3g}" for rate in elastic_rates(modes, laws)]
+            out.append(f"a time step of {h:.3g} s is longer than 2 v_0 m/F = {2 / pace:.3g} s (v_0: speed of the law, "
+                       "m: mass, F: friction limit), so the computed friction force changes its sign from step to step "
+                       "while the interface hardly moves")
+    return out + ["explicit Euler lowers the damping ratio of the vibration on the elastic contact from 0 to "
+                  f"-{h * rate / 2:.3g}" for rate in elastic_rates(modes, laws)]

@@ -164,7 +164,8 @@ class PeriodMap:
                                                self.books, self.room, self.spare, seen)
         pieces = self.follow.held_call(self.held[size], place(period / 2 if half else period, period))
         if pieces < 0:
-            raise NotConverged("dynamics: within a period the contact changes between stick and slip too often")
+            raise NotConverged("dynamics: within one period the contact changes between stick and slip more often than "
+                               "can be computed")
         rows, columns = turned = turned_of(memory)
         end = Point(self.motion.ravel().copy(), copied(memory), turned)
         kept = 2 * n + (columns < seen[1, rows]).nonzero()[0]

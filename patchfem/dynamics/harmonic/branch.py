@@ -43,14 +43,14 @@ def response(modes, drive: BaseSine, group, frequencies, stability: bool = False
     the one before. stability: multipliers at every point. how: `How`.
     """
     drives = [replace(drive, omega=2 * np.pi * f)
-              for f in _values(frequencies, "drive.frequency: a response", "frequencies")]
+              for f in _values(frequencies, "drive.frequency: a frequency response", "frequencies")]
     return _along("frequency", modes, drives, group, How(**how), stability)
 
 
 def levels(modes, drive: BaseSine, group, accelerations, stability: bool = False, **how) -> Branch:
     """Steady motions over the drive's amplitude [m s-2] at its frequency; arguments as in `response`."""
     drives = [replace(drive, acceleration=float(a))
-              for a in _values(accelerations, "drive.acceleration: a level sweep", "amplitudes")]
+              for a in _values(accelerations, "drive.acceleration: a sweep of the drive level", "amplitudes")]
     return _along("level", modes, drives, group, How(**how), stability)
 
 
@@ -92,8 +92,8 @@ def _curve(modes, drives, group, parameter, how: How) -> Branch:
         if harmonics or above <= tolerance / 4:
             return Branch(points, parameter, tuple(f / scale for f in path.folds),
                           tuple(f / scale for f in path.crossings), path.ended)
-    raise NotConverged(f"harmonic balance with {LADDER[-1]} harmonics misses a part of {above:.1e} of the motion, more "
-                       f"than the limit of {tolerance / 4:g}; raise the tolerance")
+    raise NotConverged(f"harmonic balance with {LADDER[-1]} harmonics misses {above:.1e} of the motion, more than the "
+                       f"limit of {tolerance / 4:g}; raise the tolerance")
 
 
 def _followed(modes, drives, group, parameter, h, first, longest) -> tuple:

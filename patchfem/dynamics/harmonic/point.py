@@ -227,8 +227,8 @@ def _along_levels(balance, omega, level, h: int) -> np.ndarray:
                   (0.0, level), True, 0.05, 0.5, 1000, 1e-6)
     if path.ended != "end":
         bare = any(k for k, *_ in balance.linear(omega, h).free)
-        why = ("; an undamped mode that is driven at its natural frequency stays bounded only if friction can hold the "
-               "contact; give the mode damping") if bare else \
+        why = ("; an undamped mode that is driven at its natural frequency stays bounded only if friction is strong "
+               "enough to stop the slip; give the mode damping") if bare else \
             "; the search began at the sticking contact and also followed the motion while the drive rose from zero"
         raise (_Unbounded if bare else NotConverged)(
             f"accuracy.harmonics: harmonic balance with {h} harmonics found no steady motion at "

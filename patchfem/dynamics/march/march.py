@@ -577,7 +577,7 @@ class Run:
         if self.ledger[7]:
             self.outcome = Outcome.NOT_CONVERGED
             self.message = (f"{int(self.ledger[7])} of {self.done} time steps have an error of the friction force "
-                            f"above the required {GOAL:.0e} of the friction limit; raise accuracy.steps_per_cycle")
+                            f"above the permitted {GOAL:.0e} of the friction limit; raise accuracy.steps_per_cycle")
 
     def watched(self, rows) -> tuple:
         """Slide rates (k, i) [m/s] and slips (k, i) [m] of the interfaces in booked rows."""

@@ -176,9 +176,10 @@ def _lateral(draft: Draft, key: str, interface: Any, count: int | None) -> None:
     if first is not None and (both := sorted({*pair} & {*first} - {0})):
         what = "mass" if draft.tables.structure.reduced is None else "boundary coordinate"
         draft.say(key, f"{what} {both[0]} is already in `between`; the second direction needs coordinates of its own, "
-                       "which move across those of `between`")
+                       "which must move at right angles to the coordinates of `between`")
     if draft.given("structure.file"):
-        draft.say(key, unbuilt("with structure.file", "use structure.masses or [structure.reduced], or leave it out"))
+        draft.say(key, unbuilt("with structure.file", "use structure.masses or [structure.reduced], or leave this key "
+                                                      "out"))
     if draft.given("structure.bonded"):
         draft.say(key, unbuilt("with [structure.bonded]", "write a [[structure.spring]] between the same places"
                                if draft.given("structure.masses") else "either"))
@@ -266,18 +267,21 @@ def _bolted(draft: Draft, structure: Any) -> None:
     if tables.friction is None and not structure.interface:
         draft.say(key, "'stuck' subtracts the stiffness of the joint from the modes, but this scene has no joint; add "
                        "[friction] and its load, or leave `measured` out")
-    for reason, holds in (("structure.masses, which are not measured", structure.masses is not None),
-                          ("structure.reduced, which is not measured", structure.reduced is not None),
-                          ("a spring of structure.bonded.wavelength", structure.bonded is not None
+    for reason, holds in (("structure.masses", structure.masses is not None),
+                          ("structure.reduced", structure.reduced is not None)):
+        if holds:
+            draft.say(key, f"'stuck' cannot be used with {reason}, because only modes can be measured with the joint; "
+                           "leave `measured` out")
+    for reason, holds in (("a spring of structure.bonded.wavelength", structure.bonded is not None
                            and structure.bonded.wavelength is not None),
                           ("grooves", under is not None and under.grooves is not None),
-                          ("a load that changes", bool(getattr(tables.normal, "amplitude", None)) or any(
+                          ("a normal load that changes", bool(getattr(tables.normal, "amplitude", None)) or any(
                               mode.normal or mode.pitch for mode in structure.mode or ())),
                           ("strips that yaw", any(mode.yaw for mode in structure.mode or ())),
                           ("[structure.interface.contact]", any(one.contact for one in structure.interface or ()))):
         if holds:
-            draft.say(key, f"'stuck' cannot be used with {reason}: there is no single joint stiffness to subtract; "
-                           "give the modes without the joint")
+            draft.say(key, f"'stuck' cannot be used with {reason}, because the joint then has no single stiffness to "
+                           "subtract from the modes; give the modes without the joint")
 
 
 def _start(draft: Draft, structure: Any) -> None:

@@ -14,8 +14,8 @@ PART, SAMPLES, FILLED = 0.05, 40, 0.7  # of the length, samples, and share of un
 WORN, BROAD, LEAST = 2 * REACH, 16, 0.005  # deviations of a rubbed place, its samples at half of them, share of x
 CURVED, BOWED = 30.0, 0.75  # chi-squared of a bow in an unworn part, and its size in noises, from which it is none
 TURNS, HIGHER, VALLEYS = 8, 0.65, 0.1  # worn tops, share of unworn heights that lie lower than they, share of valleys
-HIDDEN = ("mean worn depth if all of the tilt between the traces, taken at the upper end of its interval, is "
-          "wedge-shaped wear; for uniform wear no such limit can be given")
+HIDDEN = ("largest mean depth of wedge-shaped wear that can hide in the tilt between the traces (for the upper end of "
+          "the interval of the tilt); uniform wear of any depth can hide")
 NO_LIMIT = "no limit"
 
 
@@ -110,13 +110,13 @@ def told(by: Carried) -> str:
     """What the worn depths count from, as a sentence."""
     if by.by == "valleys":
         return (f"Depths are measured from the valleys between the worn tops. These valleys ({100 * by.share:.0f} % of "
-                "the heights) agree in both traces and are taken as unworn; if they wore uniformly too, all depths are "
-                "larger by that wear.")
+                "the heights) agree in both traces and are taken as unworn; if the valleys also wore uniformly, the "
+                "true depths are larger by the wear of the valleys.")
     spans = ", ".join(f"{say(a, 4)} to {say(b, 4)}" for a, b in by.parts[:4])
     more = f" and {len(by.parts) - 4} more" if len(by.parts) > 4 else ""
     return (f"Depths are measured from the parts in which the traces agree: x = {spans}{more} of the second trace "
-            "(after wear). These parts are taken as unworn; if they wore uniformly or as a wedge too, all depths are "
-            "larger by that wear.")
+            "(after wear). These parts are taken as unworn; if these parts also wore, uniformly or as a wedge, the "
+            "true depths are larger by the wear of these parts.")
 
 
 def may_hide(found: Registration, hidden: Quantity) -> str:
@@ -124,11 +124,11 @@ def may_hide(found: Registration, hidden: Quantity) -> str:
     bow = (f" A curvature (bow) of {say(abs(found.bend), 3)} was subtracted; this bow may come from a bent datum of "
            "the instrument or from wear.") if found.bend else ""
     tilt, most = (plain(1e6 * one, 3) for one in (abs(found.slope), 2 * hidden.value / float(found.x[-1] - found.x[0])))
-    return ("Uniform wear of any depth would give the same two traces. Wedge-shaped wear would do so too, if the worn "
-            f"part was then mounted level. The tilt of {tilt} urad between the traces, up to {most} urad within its "
-            f"confidence interval, may hide up to {say(hidden.value, 3)} of mean wear: half the tilt times the "
-            f"length.{bow} To find out, measure an unworn flank beside the rubbed part, or a reference mark, in both "
-            "traces.")
+    return ("Uniform wear of any depth would give the same two traces. Wedge-shaped wear would also give the same two "
+            f"traces if the worn part was mounted level for the second trace. The tilt of {tilt} urad between the "
+            f"traces, up to {most} urad within its confidence interval, may hide a mean worn depth of up to "
+            f"{say(hidden.value, 3)}: half the tilt times the length.{bow} To tell wear from no wear, measure an "
+            "unworn flank beside the rubbed part, or a reference mark, in both traces.")
 
 
 def median_of_five(rest) -> np.ndarray:

@@ -10,7 +10,8 @@ from ..quantity import Quantity, mean_of
 
 HEADER = "before,after"
 KINDS = {"scans": "areal scans", "run": "results folders", "place": "registered traces",
-         "flanks": "traces with a track below its flanks", "nothing": "traces without a common place"}
+         "flanks": "traces compared by the unworn flanks of a "
+                   "track", "nothing": "traces that cannot be registered to each other"}
 AVERAGED = ("worn_volume", "grown_volume", "worn_share", "worn_depth_mean", "worn_depth_within", "worn_depth_max",
             "worn_area", "track_width", "track_depth", "track_depth_floor", "track_step", "track_area_gross",
             "track_area_net", "track_pile_up", "track_pile_up_left", "track_pile_up_right", "track_length",

@@ -90,8 +90,8 @@ def _named(path, places: list, z, factors: tuple) -> Profile | Areal:
         return areal(path, flat[0] * factors[0], flat[1] * factors[0], z * factors[1], GIVEN)
     else:
         shapes = ", ".join(str(one.shape) for one in (*places, z))
-        raise PatchfemError(f"{path}: x, y and z of shapes {shapes} do not fit; z needs a row for each y and a column "
-                            "for each x")
+        raise PatchfemError(f"{path}: x, y and z of shapes {shapes} do not fit together; z needs a row for each y and "
+                            "a column for each x")
     if not z.size > 1:
         raise PatchfemError(f"{path}: {z.size} heights; a trace needs at least two")
     return _table(path, np.column_stack(columns), factors)

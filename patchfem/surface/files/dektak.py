@@ -98,7 +98,7 @@ def _stepped(path, x, length: float | None, factor: float) -> tuple:
         step = length / factor / count
         if np.abs(x - (x[0] + step * steps)).max() <= 0.6 * digit:  # half a digit, and the round-off of the printing
             return x[0] + step * steps, (
-                f"{path}: x is printed only to {say(digit * factor)}; the step {say(length)}/{count} = "
+                f"{path}: x is rounded to {say(digit * factor)} in the file; the step {say(length)}/{count} = "
                 f"{say(step * factor)} of the header is used",)
     return x, (f"{path}: the length of {say(length)} in the header does not fit {x.size} samples that end at "
-               f"{say(x[-1] * factor)}: the printed x are used",)
+               f"{say(x[-1] * factor)}: the x values of the samples are used",)

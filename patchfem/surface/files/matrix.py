@@ -32,7 +32,7 @@ def matrix(path, head: Head, facts: dict, given: tuple | None, body: str) -> Pro
     table = _table(path, head, body)
     if table.shape[1] == 1 and {"height", "step_y"}.isdisjoint(facts):
         table = table.T  # one height a line
-    for name, axis, count in (("rows", "rows", table.shape[0]), ("columns", "numbers a row", table.shape[1])):
+    for name, axis, count in (("rows", "rows", table.shape[0]), ("columns", "numbers per row", table.shape[1])):
         stated = facts.get(name, (None,))[0]
         if stated is not None and stated != count:
             raise PatchfemError(f"{path}: {count} {axis}, but the header says {stated:g}; the file is cut off or "

@@ -144,7 +144,7 @@ def lacking(surface: Surface, name: str) -> str:
         return f"along some direction the autocorrelation stays above 0.2 over {say(half)}, so Str is below " \
                f"{near / half:.2g}"
     return ("no direction stands out, because Str is "
-            f"{aspect(surface):.2g}") if name == "Std" else "the heights determine none"
+            f"{aspect(surface):.2g}") if name == "Std" else "the heights do not determine this parameter"
 
 
 def cosine_taper(m: int, n: int) -> np.ndarray:

@@ -24,6 +24,7 @@ FEWEST = 16  # samples of a trace with a report
 UNTOLD = "a single trace gives no interval for this parameter"
 UNEVEN = ("an interval from a single trace assumes Gaussian heights, but these heights are not Gaussian; use the "
           "scatter of several traces")
+UNDETERMINED = "the heights of the trace do not determine this parameter"
 CUTOFFS = (25e-6, 80e-6, 250e-6, 800e-6, 2.5e-3, 8e-3, 25e-3)  # [m] of ISO 21920-3, and one more at each end
 SECTIONS = 6  # cut-offs in a trace: five that count and one that the filter takes
 ROUND = 1e-14  # of the largest height: what levelling leaves of a straight line
@@ -232,7 +233,7 @@ def _value(row, value, found: Intervals) -> Quantity:
     if value is None:
         flat = found.heights.power == 0
         reason = "the trace is flat" if flat else "the trace is shorter than one cut-off" \
-            if found.heights.section is not None and not len(found.heights.sections) else "the trace has none"
+            if found.heights.section is not None and not len(found.heights.sections) else UNDETERMINED
     elif row.kind == "wave" and low is not None and not (
             found.heights.step <= low <= value <= high <= found.heights.length):
         low, high, reason = None, None, UNTOLD

@@ -23,7 +23,7 @@ SEEN = 0.1  # of the worn part without heights, from which on this is told
 DIGITS = 4
 WORN, NONE = "worn", "no wear shown"
 GREW = "material grew, or the files are in the wrong order"
-ELSEWHERE = "not comparable place by place"
+ELSEWHERE = "not comparable point by point"
 HIDDEN = "mean depth of uniform or wedge-shaped wear that may have remained hidden"
 OPEN = "changed: either one part is worn, or another part has grown"
 EITHER = "in each of two parts the scans agree up to a plane, and either part may be the unworn one"
@@ -91,7 +91,7 @@ def _laid(before: Areal, after: Areal, keep_spikes: bool) -> tuple:
     if found.like <= least:
         raise PatchfemError("the two scans show no common area: the heights that agree up to a plane have a "
                             f"correlation of {found.like:.3f}, but only values above {least:g} are significant; scan "
-                            "the same area both times, including unworn parts beside the rubbed part")
+                            "the same area before and after wear, including unworn parts beside the rubbed part")
     found, specks = (found, 0) if keep_spikes else without_specks(found)
     return found, measured(found, before.x, before.y), specks
 
@@ -173,19 +173,19 @@ def sentences(one: Change) -> list:
     elif one.volumes.open:
         out.append(f"It is not known which part is unworn: {EITHER}. If the first part is unworn, up to {_most(worn)} "
                    f"wore off the second part; if the second part is unworn, up to {_most(grown)} grew on the first "
-                   "part. To find out, scan farther beyond the rubbed part.")
+                   "part. To tell the two cases apart, scan farther beyond the rubbed part.")
     else:
-        out.append("Worn volume: none shown. Uniform wear of any depth would give the same two scans; so would "
-                   "wedge-shaped wear, if the worn part was then mounted level. To find out, scan an unworn part "
-                   "beside the rubbed part both times.")
+        out.append("Worn volume: none shown. Uniform wear of any depth would give the same two scans. Wedge-shaped "
+                   "wear would also give the same two scans if the worn part was mounted level for the second scan. To "
+                   "tell wear from no wear, scan an unworn part beside the rubbed part before and after wear.")
     out += [] if one.track is None or one.track.why else [_track(one.track)]
     if grown.low > 0:
         out.append(f"{_volume(grown)} of material lie above the first scan (before wear): pile-up or deposits"
                    + (", or the two files are in the wrong order." if headline(one) == GREW else "."))
     share = 100 * float(one.found.used.sum()) / max(float(np.isfinite(one.found.depth).sum()), 1.0)
     out.append(f"Depths are measured from the {share:.0f} % of the heights that agree up to a plane within "
-               f"{say(REACH * one.found.noise, 3)}; if these heights wore uniformly or as a wedge too, all depths are "
-               "larger by that wear.")
+               f"{say(REACH * one.found.noise, 3)}; if these heights also wore, uniformly or as a wedge, the true "
+               "depths are larger by the wear of these heights.")
     if one.found.other is not None and not one.volumes.open:
         out.append("Another part of the scans may be unworn instead, for example where two planes meet in an edge; the "
                    "intervals cover both cases.")

@@ -26,7 +26,7 @@ TEXTS = {  # name: (unit, definition)
                          "depth"),
     "from": ("m", "position of the track's first edge, measured across the track from the middle of the first scan, "
                   "positive towards larger x or y"),
-    "to": ("m", "position of the track's second edge, measured in the same way"),
+    "to": ("m", "position of the track's second edge, measured like the position of the first edge"),
     "width": ("m", "width of the track"),
     "depth_mean": ("m", "area lost in a section divided by the width"),
     "depth_floor": ("m", "floor: bottom of the parabola through the deepest fifth of a section"),

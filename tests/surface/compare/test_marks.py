@@ -169,7 +169,7 @@ def test_always_walls_between_unworn_flanks_are_no_roughness(count):
     for seed in range(HELD_OUT + 230, HELD_OUT + 230 + count):
         found = compared(milled(seed, waves=0.0)[0], milled(seed + 1000, waves=0.0)[1])
         assert found.reference == "flanks"
-        assert verdicts([found])[0] == "not comparable place by place; worn, " \
+        assert verdicts([found])[0] == "not comparable point by point; worn, " \
             "no change of the amplitude of the waves shown"
         assert verdicts([found])[1][0].startswith("Worn: a track from about x = ")
 

@@ -106,7 +106,7 @@ def test_exact_rounded_x_is_evened(tmp_path, step):
     if step < 7:
         assert np.ptp(np.diff(profile.x)) < 1e-9 * step * UM
         assert profile.length == pytest.approx(x[-1] * UM, abs=0.1 * UM)
-        assert "x is printed only to 100 nm; the samples are taken as evenly spaced by" in profile.notes[0]
+        assert "x is rounded to 100 nm in the file; the samples are taken as evenly spaced by" in profile.notes[0]
     else:
         assert profile.notes == ()
 
