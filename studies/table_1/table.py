@@ -220,36 +220,42 @@ def head(rows: dict) -> list:
     none = {name: (three(held), three(out)) for name, _, _, held, out, _ in nulls()}
     draws = [100 * one[name]["bootstrap"]["better"]["constant"]["acceleration"] for name in ("path", "root")]
     said = [
-        "Three scores separated by slashes are those of all readings / accelerations / displacements. Smaller scores "
-        "are better. Repeated readings of an acceleration differ by a score of .086.",
-        "**Models that the data exclude.** Friction alone does not explain the data. A rigid block scores "
-        f"{three(one['rigid']['fitted'])} at 143 Hz. A patch with yaw scores {three(one['patch']['fitted'])} at 143 Hz "
-        f"and {three(one['patch']['others'])} at the other frequencies. A weight on a cable acts as a second spring, "
-        f"but the fit sets its stiffness to 0; this model scores {three(one['weight']['fitted'])} at 143 Hz.",
-        "**Models fitted to 143 Hz alone.** The scores at 135, 150 and 155 Hz are: a constant times the input, "
-        f"{none['constant'][0]}; a power of input and frequency, {none['power_input_frequency'][0]}; \"spring and "
-        f"yaw\" with √2 x fundamental (three fitted numbers), {three(one['spring']['others'])}; \"path of Fig. 27\" "
-        f"with peak x stuck (three fitted numbers, none of them of the path itself), {three(one['path']['others'])}; "
-        f"\"path of Fig. 27\" with √2 x fundamental, {three(one['root']['others'])}.",
-        "Compared with the constant, \"spring and yaw\" predicts the displacements better and the accelerations "
-        "worse. \"Path of Fig. 27\" predicts both better than the constant. Its advantage in the accelerations is "
-        f"small: it appears in {draws[0]:.0f} % (peak x stuck) and {draws[1]:.0f} % (√2 x fundamental) of the samples "
-        "if the rows are resampled. \"Path of Fig. 27\" predicts the displacements worse than \"spring and yaw\". At "
-        f"143 Hz all its scores are worse: {three(one['path']['fitted'])} instead of "
-        f"{three(one['spring']['fitted'])}."]
+        "A score is the root mean square of ln(computed/measured); smaller scores are better. Three scores separated "
+        "by slashes are those of all readings / accelerations / displacements. For comparison: the logarithms of "
+        "repeated readings of the same acceleration scatter with a standard deviation of .086.",
+        "**Models that the data exclude.** Friction alone does not explain the data. The scores of a rigid "
+        f"block are {three(one['rigid']['fitted'])} at 143 Hz. The scores of a patch with yaw are "
+        f"{three(one['patch']['fitted'])} at 143 Hz and {three(one['patch']['others'])} at the other frequencies. A "
+        "weight on a cable acts as a second spring, but the fit sets the stiffness of this spring to 0; the scores of "
+        f"this model are {three(one['weight']['fitted'])} at 143 Hz.",
+        "**Models fitted to 143 Hz alone.** The scores at 135, 150 and 155 Hz are "
+        f"{none['constant'][0]} for a constant times the input; {none['power_input_frequency'][0]} for a power of "
+        f"input and frequency; {three(one['spring']['others'])} for \"spring and yaw\" with √2 x fundamental (three fitted "
+        f"numbers); {three(one['path']['others'])} for \"path of Fig. 27\" with peak x stuck (three fitted numbers; "
+        f"the path itself is not fitted); and {three(one['root']['others'])} for \"path of Fig. 27\" with √2 x "
+        "fundamental.",
+        "Compared with a constant times the input, \"spring and yaw\" predicts the displacements better and the "
+        "accelerations worse. \"Path of Fig. 27\" predicts both better than the constant. Its advantage in the accelerations is "
+        "small: if the rows of Table 1 are resampled (bootstrap), it predicts the accelerations better than the "
+        f"constant in {draws[0]:.0f} % (peak x stuck) and {draws[1]:.0f} % (√2 x fundamental) of the samples. \"Path "
+        "of Fig. 27\" predicts the displacements worse than \"spring and yaw\" does. At 143 Hz all scores of \"path "
+        f"of Fig. 27\" are worse: {three(one['path']['fitted'])}, compared with {three(one['spring']['fitted'])} for "
+        "\"spring and yaw\"."]
     if "-" not in left.values():
         said.append(
-            f"**Each frequency left out in turn.** The scores are: a constant times the input, {none['constant'][1]}; "
-            f"a power of input and frequency, {none['power_input_frequency'][1]}; \"spring and yaw\" with √2 x "
-            f"fundamental, {left['spring']}; \"path of Fig. 27\" with peak x stuck, {left['path']}. Both models "
-            "predict the displacements better than the constant and the power do. \"Second path\" (a spring and a "
-            f"damper) with peak x stuck scores {left['damped']}, no better than the constant, because the fit without "
-            f"143 Hz has no yaw. If the accelerometer also measures the yaw mode, this model scores {left['seen']}. "
-            "For the accelerations no model is better than the power of input and frequency, although this power "
-            "explains nothing.")
+            "**Each frequency left out in turn.** The scores are "
+            f"{none['constant'][1]} for a constant times the input; {none['power_input_frequency'][1]} for a power of "
+            f"input and frequency; {left['spring']} for \"spring and yaw\" with √2 x fundamental; and {left['path']} "
+            "for \"path of Fig. 27\" with peak x stuck. The last two "
+            "models predict the displacements better than the constant and the power do. The scores of \"second path\" "
+            f"(a spring and a damper) with peak x stuck are {left['damped']}. They are no better than the scores of "
+            "the constant, because the fit without 143 Hz sets \"yaw\" to 0. If the accelerometer also measures the "
+            f"yaw mode, the scores of this model are {left['seen']}. For the accelerations no model is better than the "
+            "power of input and frequency, although this power law explains nothing.")
     said.append(
-        "**What the data leave open.** The second path may be a spring or the flank of a groove "
-        f"({three(one['lift']['others'])} at the other frequencies), with or without a damper. The accelerometer may "
+        "**What the data leave open.** The second path may be a spring or the flank of a groove, with or without a "
+        "damper: at the other frequencies the scores of the model with grooves, lift and yaw are "
+        f"{three(one['lift']['others'])}, nearly those of \"spring and yaw\". The accelerometer may "
         "have shown the peaks, 1.24 times the peaks, or √2 times the fundamental.")
     return "\n\n".join(fill(text, 120, break_long_words=False, break_on_hyphens=False) for text in said).split("\n")
 
