@@ -89,7 +89,7 @@ def load(scene: str | Path | Scene | Mapping[str, Any], /, **sets: Any) -> Scene
 
 
 def base_of(scene: Scene) -> Base:
-    """What scenes that differ from this one in a few keys share; kept for the scene that was asked for last."""
+    """Return what this scene shares with scenes that differ from it in a few keys; kept for the last scene."""
     found = next((one for one in _bases if one.scene is scene), None) or Base(scene)
     _bases[:] = [found]
     return found
@@ -110,8 +110,8 @@ def build(scene: str | Path | Scene | Model, /, **sets: Any) -> Model:
 
 
 def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
-    """Plan a scene: what it would run, its size, its cost, its stiffnesses and dimensionless groups. Nothing is
-    computed.
+    """Plan a scene: what a run would compute, its size, its cost, its stiffnesses and dimensionless groups. No result
+    is computed.
     """
     return plan_model(build(scene, **sets))
 
@@ -202,7 +202,7 @@ def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *
     such as "1e-6 rad..1e-2 rad:9"; default: the table [sweep] of the scene. draw: number of cases to draw between the
     ends of ranges such as "1e-6 rad..1e-2 rad", instead of all combinations. The draw is random, with the seed `seed`,
     or follows Sobol's sequence if `sobol` is true. Drawn cases are rows of one dimension `case`. out: folder to write,
-    as `patchfem sweep -o` does; `resume` continues it. of: the measure that the answer is about, such as
+    as `patchfem sweep -o` does; `resume` continues it. of: the measure that the printed answer states, such as
     "equivalent_damping". jobs: number of processes. executor: "dask" or "dask:ADDRESS".
 
     The attribute `answer` states the main result in one sentence. A case that is refused or fails has the outcome
@@ -245,7 +245,7 @@ class SweepPlots:
     def backbone(dataset: Dataset, ax: Axes | None = None) -> Axes:
         """Plot the frequency of a mode against its amplitude for each method, with errors, and its damping ratio.
 
-        The damping ratio is left out with `ax`. dataset: the result of `pf.backbone`. Raises PatchfemError for any
+        With `ax`, the damping ratio is left out. dataset: the result of `pf.backbone`. Raises PatchfemError for any
         other Dataset, and for one without a curve.
         """
         ways = [way for way in backbones.WAYS if f"{way.replace('-', '_')}_amplitude" in getattr(dataset, "coords", ())]
@@ -283,10 +283,10 @@ def fit(scene: str | Path | Scene, /, *, to: str | Path = "", free: Mapping[str,
     scene and sets are those of `load`. to: file of the measurements, which are a friction loop for a bench; rows of
     responses, or frequency and damping against amplitude, for a rig; or a worn depth for a scene with [wear]. free:
     dict of key -> (low, high) or a text such as "0.1..0.6". hold: rows to predict without fitting them, such as
-    "frequency=135 Hz,150 Hz". leave_out: a column each of whose values is left out in turn. unstable: "bound", "out" or
-    "read", the treatment of rows with the flag U. placebo: values such as "structure.mode.yaw.frequency=110 Hz,138 Hz",
-    for each of which the whole fit is repeated. starts, seed: number of starting points and their seed. offset,
-    warm_up: options of a loop. out: folder to write, as `patchfem fit -o` does; `resume` continues it. say: function
+    "frequency=135 Hz,150 Hz". leave_out: a column; each of its values is left out in turn. unstable: "bound", "out" or
+    "read", the treatment of rows with the flag U (unstable). placebo: values such as
+    "structure.mode.yaw.frequency=110 Hz,138 Hz", for each of which the whole fit is repeated. starts, seed: number
+    of starting points and their seed. offset, warm_up: options for a loop. out: folder to write, as `patchfem fit -o` does; `resume` continues it. say: function
     that takes a line of text before steps that take long.
 
     from_patch: instead of `to` and `free`, replace the patch of the scene by laws of a single point, fitted to the
@@ -329,7 +329,7 @@ def profile(*files: str | Path, cutoff: float | str | None = None, window: Itera
             tip: float | str | None = None, units: tuple[str, str] | None = None) -> dict[str, Any]:
     """Compute the roughness of measured traces or areal scans: the dict of `patchfem profile --json`, in SI.
 
-    cutoff: wavelength that separates roughness from waviness. window: first and last position, for a scan those of x
+    cutoff: wavelength that separates roughness from waviness. window: first and last position; for a scan those in x
     first. tip: tip radius of the stylus. Each is in m or a text such as "0.25 mm". units: units of x and z for files
     that give none. The dict has `profiles` with an entry per file and `means` over all files. Raises PatchfemError for
     a file that cannot be read and for invalid lengths.
@@ -546,7 +546,7 @@ class Measures(Mapping):
 class Plots:
     """The pictures of a run, each as matplotlib Axes: ``result.plot.loop().figure.savefig("loop.png")``.
 
-    ax: Axes to draw on. Without it each method makes a new figure, which may have more Axes than the one it returns.
+    ax: Axes to draw on. Without it each method makes a new figure, which may have more Axes than the method returns.
     Raises PatchfemError if the run does not have what the picture needs.
     """
 
@@ -555,7 +555,7 @@ class Plots:
 
     def pressure(self, ax: Axes | None = None) -> Axes:
         """Normal stress along the interface, and the shear stress if there is any; if interfaces have patches of their
-        own, the normal stress on each. `ax` shows only the first of these charts.
+        own, the normal stress on each. With `ax`, only the first of these charts is drawn.
         """
         bare = self._result.patch is None and not self._result.extra.get("faces")
         return self._drawn(ax, ("pressure", "faces"), "the scene has no [contact]" if bare else
@@ -566,8 +566,8 @@ class Plots:
         return self._drawn(ax, ("loop",), self._still() or "no friction acted, or nothing slid")
 
     def history(self, ax: Axes | None = None) -> Axes:
-        """Displacement over the whole run, and the last cycles or the friction force. `ax` shows the displacement
-        only.
+        """Displacement over the whole run, and the last cycles or the friction force. With `ax`, only the
+        displacement is drawn.
         """
         return self._drawn(ax, ("history",), self._still())
 
@@ -577,8 +577,8 @@ class Plots:
                            '"levels", or a sweep with accuracy.method = "harmonic"')
 
     def stress(self, ax: Axes | None = None) -> Axes:
-        """Von Mises stress in both pieces under load, and an enlarged view of the contact. `ax` shows the pieces
-        only.
+        """Von Mises stress in both pieces under load, and an enlarged view of the contact. With `ax`, only the
+        pieces are drawn.
         """
         if self._result.patch is None:
             raise PatchfemError("plot.stress: nothing to draw: the scene has no [contact]")

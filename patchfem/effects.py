@@ -156,7 +156,7 @@ EFFECTS = {
     "accuracy.method=euler": Effect("patchfem.dynamics.comparison.euler", "explicit Euler"),
     "accuracy.method=harmonic": Effect("patchfem.dynamics.harmonic.harmonic",
                                        "x = Re sum X_k exp(i k w t); with law `coulomb`: the "
-                                       "map of the motion from event to event over one period"),
+                                       "exact motion from event to event, found so that it repeats after one period"),
     "wear": Effect("patchfem.wear.depth", "g += h, dh = coefficient p ds at each point; with form 'energy' dh = "
                                           "coefficient tau ds",
                    ("pressure", "traction")),

@@ -54,8 +54,9 @@ def compare(before: Path | None = None, after: Path | None = None, /, *other: Pa
     """Compare the surfaces measured in the files BEFORE and AFTER. The results are the shift between the surfaces, the
     worn depth, ratios of roughness parameters, a verdict and a page. Areal scans also give the worn volume, maps, and
     the levelled difference as X3P and text. To compare the perpendicular direction too, append its two traces. With
-    --pairs, all pairs of a table are compared, with mean, scatter and interval over the pairs. BEFORE and AFTER may
-    also be two results folders, AFTER that of a run with [wear]; the page then shows what wore off.
+    --pairs, all pairs of a table are compared; the results are then mean, scatter and interval over the pairs. BEFORE
+    and AFTER may also be two results folders. AFTER must then belong to a run with [wear], and the page shows the wear
+    between the two runs.
 
     Example: patchfem compare before.csv after.csv --direction x -o out/worn
     """

@@ -177,7 +177,7 @@ def _moving(limits: Limits) -> str:
     between = f"between cases at {_between(limits, least)}"
     later = "" if last is least or last.beyond is None else f"; {label(last.name)} {_where(limits, last)}"
     return (f"{name} may reach {_at(limits, least)}{_brackets(_gap(limits, least), between)} {held} "
-            f"({label(least.name)} first{later})")
+            f"(first to change: {label(least.name)}{later})")
 
 
 def _brackets(*parts: str) -> str:

@@ -230,7 +230,7 @@
     const off = cases.filter(bad).length, open = cases.filter((i) => m.over[i]).length;
     const value = (i) => `${within(m.values[i], m.errors[i], m.least)} ${m.unit}`.trim();
     const some = `${cases.length} ${data.whole ? "" : "drawn "}cases`;
-    return `Against ${x.label}: lowest ${value(lowest)} at ${where(lowest)}; highest ` +
+    return `Against ${x.label}: lowest value ${value(lowest)} at ${where(lowest)}; highest value ` +
       `${value(highest)} at ${where(highest)}.` + (off ? ` ${off} of ${some} did not ` +
       "settle (shaded or hatched)." : "") + (open ? ` ${open} of ${some} miss the tolerance ` +
       "(hollow or dotted)." : "");

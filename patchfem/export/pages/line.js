@@ -106,7 +106,7 @@
       pen.stroke();
     };
     on.inside(() => { line(found.before, ink("--soft"), 1.4); line(found.after, ink("--accent"), 1.4); });
-    on.axes("heights along the line: grey before, blue after", "from the dot along the line [mm]", `height [${told.unit}]`);
+    on.axes("heights along the line (grey: before wear; blue: after wear)", "from the dot along the line [mm]", `height [${told.unit}]`);
     return found;
   }
 

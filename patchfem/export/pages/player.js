@@ -128,7 +128,7 @@
     const moment = count > 1 ? `Frame ${f + 1} of ${count}, ${Number(film.times[f].toPrecision(7))} s` : "The pressed state";
     const aside = count > 1 && film.slide.some((v) => v) ? `, the slide of ${short(film.slide[f] * 1e3)} um ${slide} times` : "";
     const foot = status ? " Colours below the curve: blue where the interface sticks, orange where the interface slips." : "";
-    at("stage-told").textContent = `${moment}: ${curve.label} from ${ends[0]} to ${ends[1]} ${curve.unit}. Motion and gap drawn ${gap} times as large${aside}.${foot}`;
+    at("stage-told").textContent = `${moment}: ${curve.label} from ${ends[0]} to ${ends[1]} ${curve.unit}. Motion and gap magnified ${gap} times${aside}.${foot}`;
     at("play-frame").setAttribute("aria-valuetext", moment);
     at("play-gap-told").textContent = `× ${gap}`;
     at("play-slide-told").textContent = `× ${slide}`;

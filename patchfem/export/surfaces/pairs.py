@@ -14,9 +14,9 @@ from . import compare, pictures, worn
 
 TRACES, SCANS = ("worn_depth_mean", "amplitude_ratio"), ("worn_volume", "worn_depth_mean")  # the main numbers
 ABOUT = ("The mean is taken over the pairs that have a value, each with equal weight. The interval is the 95 % "
-         "interval of the mean, by Student's t from the scatter of the pairs, or from the intervals of the pairs where "
-         "that is wider. It does not include an error that all pairs share, such as calibration. The scatter is the "
-         "standard deviation of one pair.")
+         "interval of the mean, by Student's t from the scatter of the pairs, or from the intervals of the pairs if "
+         "these give a wider interval. The interval does not include an error that all pairs share, such as "
+         "calibration. The scatter is the standard deviation of one pair.")
 
 
 def answers(asked: list, direction: str = "", done=None, **how) -> list[dict]:
@@ -52,7 +52,7 @@ def notes(rows: list) -> list:
     firsts = [(pairs.group_of(row), row["before"]) for row in done]
     if len(set(firsts)) < len(firsts):
         out.append("some pairs share the surface measured before wear; the errors of this surface are then common to "
-                   "these pairs, which the intervals of the means do not include")
+                   "these pairs, and the intervals of the means do not include such common errors")
     for group, count, found in pairs.means_of(rows):
         less = [f"{words(name)} ({one.count})" for name, one in found.items() if one.count < count]
         if less:

@@ -37,7 +37,7 @@ def test_exact_a_straight_line_leaves_where_it_is_a_twentieth_off():
     assert one.changed == pytest.approx(0.25 * 0.95) and one.change == 0.05
     assert sentence(limits({"loop_area": 1 + 0.25 * (TILT - 0.05)})) == (
         "Tilt may reach 0.25 mrad (3.2 um over the patch, between cases at 0.2 and 0.5 mrad) before loop area "
-        "changes by 5 % (loop area first).")
+        "changes by 5 % (first to change: loop area).")
 
 
 @pytest.mark.parametrize("unit, size", [("rad", 1e3), ("mrad", 1.0), ("urad", 1e-3)])
@@ -116,7 +116,7 @@ def test_exact_a_measure_that_cannot_be_told_is_not_among_what_moves():
     said = sentence(limits({"loop_area": line, "slip_amplitude": [0, 1, 1, 1, 1]}))
     assert "before loop area changes by 5 %" in said
     line = {"loop_area": line, "slip_amplitude": 1 + 0 * TILT, "stick_fraction": [0.06, 0.07, 0.08, 0.09, 0.1]}
-    assert "before slip amplitude or loop area changes by 5 % (loop area first)" in sentence(limits(line))
+    assert "before slip amplitude or loop area changes by 5 % (first to change: loop area)" in sentence(limits(line))
 
 
 def test_exact_what_is_round_off_in_every_case_does_not_move():
@@ -124,7 +124,8 @@ def test_exact_what_is_round_off_in_every_case_does_not_move():
     line = 1 + 0.25 * (TILT - 0.05)
     said = sentence(limits({"loop_area": [1e-12, -3e-12, 2e-12, -1e-12, 1e-12], "slip_amplitude": 0 * TILT,
                             "relative_displacement_amplitude": line}))
-    assert "before relative displacement amplitude changes by 5 % (relative displacement amplitude first)" in said
+    assert "before relative displacement amplitude changes by 5 % (first to change: relative " \
+        "displacement amplitude)" in said
 
 
 def test_exact_of_several_lines_the_one_that_allows_least():
@@ -155,9 +156,9 @@ def test_exact_the_page_and_sweep_json_answer_in_one_sentence():
     """(1 + s)^0.5 is 1.05 at s = 0.1025, a tilt of 0.46 mrad; 2 MPa are doubled at 0.15 mrad; 1 - 0.1 t at 0.5475."""
     text, found = own_part(page(swept())), answer_of(lead_of(swept()), swept()["outcome"])
     want = ("Tilt may reach 0.25 mrad (3.2 um over the patch, between cases at 0.2 and 0.5 mrad) before relative "
-            "displacement amplitude or loop area changes by 5 % (loop area first; relative displacement amplitude at "
-            "0.46 mrad); the pressure peak doubles at 0.15 mrad; the stiffness of the patch changes by 5 % at 0.55 "
-            "mrad (normal).")
+            "displacement amplitude or loop area changes by 5 % (first to change: loop area; relative displacement "
+            "amplitude at 0.46 mrad); the pressure peak doubles at 0.15 mrad; the stiffness of the patch changes by "
+            "5 % at 0.55 mrad (normal).")
     assert f"<p>{want}</p>" in text and "Change relative to the first case" in text
     assert "between 0.2 and 0.5 mrad, at about 0.25 mrad" in text and "in no case" in text and "+23.8 %" in text
     assert found["cases"] == {"count": 5, "failed": 0, "unfinished": 0, "outcomes": {"steady": 5},
