@@ -13,13 +13,14 @@ FILE = FOLDER / "LIMITS.md"
 HEAD = """\
 # Limits
 
-`python tests/support/reference` generates this page. For each cell of the first four tables, one scene is checked.
-"yes" means that the scene can run. "no" means that the scene is refused before the run, with a message that names the
-line, the key and an alternative. The numbers after "no" are the numbers of these messages in the list below the tables.
+`python tests/support/reference` generates this page. Each cell of the first four tables is the result of checking one
+scene. "yes" means that the scene can run. "no" means that the scene is refused before the run, with a message that
+names the line, the key and an alternative. The numbers after "no" refer to the list of messages after the four tables.
 The last section says what the models neglect.
 """
 SIZES = {  # constant -> what it bounds and how it is written
-    "scene.scene.LARGEST": "bytes of a scene file", "scene.lines.DEEPEST": "number of parts of a dotted key",
+    "scene.scene.LARGEST": "bytes of a scene file",
+    "scene.lines.DEEPEST": "number of parts, separated by dots, of a key",
     "scene.rules.contact.MOST_ELEMENTS": "number of elements along an interface that has element_size",
     "scene.keys.tables.MOST_MASSES": "number of masses in structure.masses",
     "effects.MOST_COORDINATES": "number of masses or modes of a rig",
@@ -40,16 +41,18 @@ SIZES = {  # constant -> what it bounds and how it is written
     "dynamics.resume.MOST_KEPT": "number of samples stored before the last cycles; longer records are thinned out"}
 LEFT_OUT = f"""\
 **Two dimensions.** The pieces are sections in plane strain, or in plane stress with `contact.plane`. A note of every
-patch gives the difference between plane strain and plane stress. Effects at the edges of the width are neglected. The
-strips of `[contact.strips]` are such sections side by side, without elastic coupling between the strips.
+patch gives the difference between plane strain and plane stress. Effects at the two ends of the width are neglected.
+Each strip of `[contact.strips]` is such a section; the strips lie side by side, without elastic coupling between them.
 
 **Small strains, linear elasticity.** The pieces are isotropic; plasticity, creep and heat are neglected. The coating is
-bonded, and the far faces are fixed to rigid holders. A note appears if strains exceed {SMALL:g}. The load is assumed
-not to move sideways when a tall piece bends; a note appears if this motion matters.
+bonded, and the far faces are fixed to rigid holders. A note appears if strains exceed {SMALL:g}. The line of action of
+the load is assumed not to shift along x when a tall piece bends; a note appears if this shift would change the result
+noticeably.
 
-**No friction in the static patch.** The pressure is computed without shear. If both pieces have the same elastic
-constants, shear does not change the pressure. For pieces of different materials, the coupling of shear and pressure is
-neglected in runs with motion; a note appears if this coupling exceeds {100 * COUPLED:g} % of the compliance.
+**No friction in the static patch.** The pressure is computed without shear stress at the interface. If both pieces have
+the same elastic constants, shear stress does not change the pressure. For pieces of different materials, the effect of
+shear stress on the pressure is neglected in runs with motion; a note appears if this coupling exceeds {100 * COUPLED:g}
+% of the compliance.
 
 **Quasi-static pieces.** The pieces have no mass, so waves in the pieces are neglected. Only the modes of the rig have
 inertia.
@@ -59,40 +62,43 @@ inertia.
 the slide leaves the patch, the run ends with the outcome `leaves_contact`.
 
 **Grooves.** The surfaces are assumed to stay in contact on the flanks. If the inertia force of the lifted mass cancels
-the whole load, the run ends with the outcome `leaves_grooves`. The upper piece rides up matched grooves as a whole, not
-ridge by ridge.
+the whole load, the run ends with the outcome `leaves_grooves`. The upper piece is assumed to ride up all ridges at the
+same time.
 
-**Friction is local.** The friction of a point depends on the pressure and the slip of that point. Only law
-`convolution` averages the pressure over neighbouring points (Oden-Pires). Bonds depend on the path of their point, that
-is, on the length that this point has slid so far. Temperature acts only through eq. 2.13, with a surface temperature
-given in the scene. Heat from friction does not change the surface temperature.
+**Friction is local.** The friction of a point depends on the pressure and the slip of that point. The only exception is
+law `convolution`, which averages the pressure over neighbouring points (Oden-Pires). The bonds of a point depend on the
+path of this point, that is, on the total length that it has slid. Temperature acts only through eq. 2.13, with a
+surface temperature given in the scene. Heat from friction does not change the surface temperature.
 
 **Partial slip.** At constant load and tilt, partial slip is computed with elements that stick or slip. These elements
 are exact if both pieces have the same elastic constants. Under a changing load the shear compliance is represented by
 modes, whose number follows from the tolerance. If the cross-sections of the pieces differ, the effect of shear on the
-pressure is neglected. The load and the pressure of a patch of `[[structure.interface]]` are constant, and this patch
-does not wear. If the friction of a point falls while the point slides (bonds that weaken, equation 2.17 as printed),
-several states can be in equilibrium. The run then considers only the equilibrium states in the direction of its last
-time steps, and takes the state with the lower energy. The energy difference counts as dissipated.
+pressure is neglected. If an interface of `[[structure.interface]]` has its own patch, the load and pressure of this
+patch are constant, and the patch does not wear. If the friction of a point falls while the point slides (bonds that
+weaken, equation 2.17 as printed), several states can be in equilibrium. The run then considers only the equilibrium
+states that lie in the direction of its last time steps, and continues from the state with the lower energy. The energy
+difference between the states counts as dissipated.
 
 **Directions.** An interface that slides in a plane (`structure.interface.lateral`) has the same stiffness and the same
-coefficient of friction in every direction. The interface does not turn about its normal, and its load is constant.
+coefficient of friction in every direction. The interface is assumed not to rotate about its normal, and its load is
+constant.
 
 **Modes.** The rig is linear except for its joints, `[structure.stiffening]` and an interlocking spring of
-`[structure.bonded]`. Damping is viscous; hysteretic damping in a file is treated as viscous. A complex mode is replaced
-by its real part.
+`[structure.bonded]`. Damping is viscous; hysteretic damping that a file contains is treated as viscous damping. A
+complex mode shape is replaced by its real part.
 
-**Wear.** Every point wears by Archard's law with its own pressure and slip. Debris and heat are neglected. Friction
-changes only through the table `[wear.friction]`, for the patch as a whole. Within each jump of the wear, a rig is
-assumed to repeat its last cycle. If strips yaw, their slide and their wear are computed along x only; a note says how
-far the ends of the patch move across x.
+**Wear.** Every point wears by Archard's law with its own pressure and slip. Debris and heat are neglected. Wear changes
+the friction only through the table `[wear.friction]`, by the same factors at all points of the patch. Within each jump
+of wear, a rig is assumed to repeat its last computed cycle. If strips yaw, their slide and their wear are computed
+along x only; a note gives the motion of the ends of the patch across x.
 
 **Errors.** Stated errors are estimates from coarser runs. The true numerical error is smaller than the stated error in
 about 19 of 20 scenes. Stated errors do not include what the model neglects. A step in the gap makes the pressure peak
 infinite; any computed value of this peak would depend on the mesh.
 
-**Harmonic balance, Duhamel, Newmark, Euler.** These methods serve for comparison. Harmonic balance finds only periodic
-motions. Methods `duhamel`, `newmark` and `euler` support one friction force per interface and linear modes.
+**Harmonic balance, Duhamel, Newmark, Euler.** Harmonic balance finds only periodic motions. Methods `duhamel`,
+`newmark` and `euler` serve for comparison with the report. These three methods support only linear modes and one
+friction force per interface.
 """
 
 
@@ -102,20 +108,21 @@ def text() -> str:
     body = []
     for title, columns in (("Laws in a rig", RIGS), ("Laws in a rig, continued", MORE), ("Laws on a bench", BENCHES)):
         body += [f"## {title}", _against(columns, notes)]
-    body += ["A prescribed slide can be two-dimensional under these laws: "
+    body += ["On a bench, the prescribed slide can be two-dimensional under these laws: "
              + _listed(name for name, one in laws().items() if not across(one))
-             + ". It cannot be two-dimensional under these laws: "
+             + ". The slide cannot be two-dimensional under these laws: "
              + _listed(name for name, one in laws().items() if across(one)) + ".",
              "## Methods", "In this table each scene is a rig with a single contact point under a sine drive. The "
              "heading of a column is the value of `accuracy.method`; `auto` chooses a method that supports the law.",
              _methods(notes), "### Messages", _said(notes),
              "## Numbers",
-             f"The magnitude of a quantity must be at most {LARGEST:g} in SI. The program divides by some kinds of "
-             "quantity (" + ", ".join(sorted(DIVIDED_BY)) + "); the magnitude of these must also be at least "
+             f"The magnitude of a quantity must be at most {LARGEST:g} in SI units. If the quantity is of a kind by "
+             "which the program divides (" + ", ".join(sorted(DIVIDED_BY)) + "), its magnitude must also be at least "
              f"{1 / LARGEST:g}, or exactly 0 if the key accepts 0. The following keys have narrower bounds:",
              _bounds(), "## Sizes", _sizes(),
              "A run is refused if the memory that `patchfem plan` estimates for this run exceeds the memory limit of "
-             "the process. The message names the key that causes the need for memory.", "## What the models leave out",
+             "the process. The message names the key whose value requires so much memory.",
+             "## What the models leave out",
              LEFT_OUT.strip()]
     return "\n\n".join([HEAD.strip(), *body]) + "\n"
 

@@ -57,9 +57,9 @@ class Materials:
 {MADE}
 
 The value of `contact.substrate`, or of `material` in a coating, is one of these names or a table of your own values:
-`{{young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"}}`. The elastic constants of an alloy
-differ by a few per cent between handbooks; the elastic constants of a sprayed coating differ by far more. If your
-result depends on a constant, measure this constant.
+`{{young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"}}`. For one alloy, the elastic constants differ by a few
+per cent between handbooks; for a sprayed coating they differ by far more. If your result depends on one of these
+constants, measure it on your material.
 """
 
     @classmethod
@@ -73,9 +73,10 @@ result depends on a constant, measure this constant.
                  ("name", "conductivity [W/(m K)]", "heat capacity [J/(kg K)]", "source"),
                  ("name", "yield strength [MPa]", "source"))
         return "\n\n".join([cls.HEAD.strip(), grid(heads[0], rows), "## Heat",
-                            "With `[friction.temperature]` a note estimates from these values how much friction heats "
-                            "the faces.", grid(heads[1], warm), "## Strength",
-                            "The pieces are computed as elastic. A note appears if the stress in a piece exceeds the "
-                            "yield strength; the fifth of the piece next to its fixed far face is excluded from this "
-                            "check.",
+                            "If a scene has `[friction.temperature]`, a note of the run gives the temperature rise of "
+                            "the faces due to friction, estimated from these values.",
+                            grid(heads[1], warm), "## Strength",
+                            "The pieces are assumed to be elastic. A note appears if the stress in a piece exceeds the "
+                            "yield strength; the fifth of the height of the piece next to its fixed far face is not "
+                            "checked.",
                             grid(heads[2], firm)]) + "\n"
