@@ -230,17 +230,17 @@ def head(rows: dict) -> list:
         f"this model are {three(one['weight']['fitted'])} at 143 Hz.",
         "**Models fitted to 143 Hz alone.** The scores at 135, 150 and 155 Hz are "
         f"{none['constant'][0]} for a constant times the input; {none['power_input_frequency'][0]} for a power of "
-        f"input and frequency; {three(one['spring']['others'])} for \"spring and yaw\" with √2 x fundamental (three fitted "
-        f"numbers); {three(one['path']['others'])} for \"path of Fig. 27\" with peak x stuck (three fitted numbers; "
-        f"the path itself is not fitted); and {three(one['root']['others'])} for \"path of Fig. 27\" with √2 x "
-        "fundamental.",
+        f"input and frequency; {three(one['spring']['others'])} for \"spring and yaw\" with √2 x fundamental (three "
+        f"fitted numbers); {three(one['path']['others'])} for \"path of Fig. 27\" with peak x stuck (three fitted "
+        f"numbers; the path itself is not fitted); and {three(one['root']['others'])} for \"path of Fig. 27\" with "
+        "√2 x fundamental.",
         "Compared with a constant times the input, \"spring and yaw\" predicts the displacements better and the "
-        "accelerations worse. \"Path of Fig. 27\" predicts both better than the constant. Its advantage in the accelerations is "
-        "small: if the rows of Table 1 are resampled (bootstrap), it predicts the accelerations better than the "
-        f"constant in {draws[0]:.0f} % (peak x stuck) and {draws[1]:.0f} % (√2 x fundamental) of the samples. \"Path "
-        "of Fig. 27\" predicts the displacements worse than \"spring and yaw\" does. At 143 Hz all scores of \"path "
-        f"of Fig. 27\" are worse: {three(one['path']['fitted'])}, compared with {three(one['spring']['fitted'])} for "
-        "\"spring and yaw\"."]
+        "accelerations worse. \"Path of Fig. 27\" predicts displacements and accelerations better than the constant "
+        "does. Its advantage in the accelerations is small: if the rows of Table 1 are resampled (bootstrap), \"path "
+        f"of Fig. 27\" predicts the accelerations better than the constant in {draws[0]:.0f} % (peak x stuck) and "
+        f"{draws[1]:.0f} % (√2 x fundamental) of the samples. \"Path of Fig. 27\" predicts the displacements worse "
+        "than \"spring and yaw\" does. At 143 Hz all scores of \"path of Fig. 27\" are worse: "
+        f"{three(one['path']['fitted'])}, compared with {three(one['spring']['fitted'])} for \"spring and yaw\"."]
     if "-" not in left.values():
         said.append(
             "**Each frequency left out in turn.** The scores are "
