@@ -286,8 +286,8 @@ def fit(scene: str | Path | Scene, /, *, to: str | Path = "", free: Mapping[str,
     "frequency=135 Hz,150 Hz". leave_out: a column; each of its values is left out in turn. unstable: "bound", "out" or
     "read", the treatment of rows with the flag U (unstable). placebo: values such as
     "structure.mode.yaw.frequency=110 Hz,138 Hz", for each of which the whole fit is repeated. starts, seed: number
-    of starting points and their seed. offset, warm_up: options for a loop. out: folder to write, as `patchfem fit -o` does; `resume` continues it. say: function
-    that takes a line of text before steps that take long.
+    of starting points and their seed. offset, warm_up: options for a loop. out: folder to write, as `patchfem fit -o`
+    does; `resume` continues it. say: function that takes a line of text before steps that take long.
 
     from_patch: instead of `to` and `free`, replace the patch of the scene by laws of a single point, fitted to the
     patch's own loops. amplitudes: amplitudes of the slide for from_patch, in m or as a text such as "0.1 um..10 um:25".
