@@ -1,6 +1,6 @@
 """What do all studies ask and answer, how long do they take, and which figures of the report do they reproduce?
 
-The answers are in README.md of this folder. This script writes that page from the docstrings of the studies.
+The answers are in studies/report/README.md. This script writes that page from the docstrings of the studies.
 
 A study that has QUESTION, ANSWER and REPRODUCED is asked for them, without running it; of the others question and
 answer stand in the gallery of studies/README.md. Seconds are CPU seconds of `python STUDY`, start and compiled code
