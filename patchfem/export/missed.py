@@ -64,8 +64,8 @@ def sentence(measures: dict, tolerance, where) -> str:
     called = LONGER.get(name) or label(name)
     more = (f"; {others} other measure{'s' * (others > 1)} miss{'es' * (others == 1)} the tolerance in some cases"
             if others else "")
-    return (f"{count} of {number} cases miss{'es' * (count == 1)} {asked} in {called}; the largest error is at "
-            f"{where(case)}: {known}{more}.")
+    return (f"{count} of {number} cases miss{'es' * (count == 1)} {asked} in {called}; the largest error, at "
+            f"{where(case)}, is {known}{more}.")
 
 
 def _beyond(one: dict, tolerance) -> np.ndarray:

@@ -163,7 +163,7 @@ def test_exact_the_page_and_sweep_json_answer_in_one_sentence():
     assert "between 0.2 and 0.5 mrad, at about 0.25 mrad" in text and "in no case" in text and "+23.8 %" in text
     assert found["cases"] == {"count": 5, "failed": 0, "unfinished": 0, "outcomes": {"steady": 5},
                               "over_tolerance": {"moment": {"count": 2, "worst": pytest.approx(0.4)}}}
-    miss = ("2 of 5 cases miss the tolerance of 1 % in moment; the largest error is at contact.tilt.angle 1 mrad: 40 "
+    miss = ("2 of 5 cases miss the tolerance of 1 % in moment; the largest error, at contact.tilt.angle 1 mrad, is 40 "
             "% of its value")
     assert found["answer"] == f"{miss}; {want.replace('Tilt', 'tilt', 1)}" and f"<p>{miss}.</p>" in text
     known = {one["measure"]: one for one in found["limits"]}
@@ -177,7 +177,7 @@ def test_exact_the_page_and_sweep_json_answer_in_one_sentence():
 def test_always_the_sentence_of_a_sweep_without_numbers_is_empty():
     table = swept() | {"keys": [key(words=True) | {"unit": "1", "log": False, "texts": list("abcde")}]}
     found = answer_of(lead_of(table), table["outcome"])
-    assert found["limits"] == [] and "moment; the largest error is at contact.tilt.angle e" in found["answer"]
+    assert found["limits"] == [] and "moment; the largest error, at contact.tilt.angle e" in found["answer"]
 
 
 def test_exact_the_last_digits_of_a_value_are_no_change():

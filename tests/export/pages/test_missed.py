@@ -27,14 +27,14 @@ def test_exact_the_worst_is_relative_and_named_with_its_case():
     loop = one([2e-7, 5e-6, 0.19], [4.4e-7, 5e-7, 2e-5])
     where = ["slide.amplitude 0.05 um", "", ""].__getitem__
     assert sentence({"loop_area": loop}, 0.01, where) == (
-        "2 of 3 cases miss the tolerance of 1 % in loop area; the largest error is at slide.amplitude 0.05 um: 220 "
+        "2 of 3 cases miss the tolerance of 1 % in loop area; the largest error, at slide.amplitude 0.05 um, is 220 "
         "% of its value.")
     others = {"loop_area": loop, "moment": one([1, 1, 1], [9, 9, 9]), "rotation": one([1] * 3, [0, 0, 1])}
     assert sentence(others, 0.01, where).endswith(
         "220 % of its value; 2 other measures miss the tolerance in some cases.")
     zero = {"energy": one([1e-15, 1, 1], [1e-11, 0, 0], 1e-12), "moment": one([1, 1, 1], [0.5, 0, 0])}
-    assert "in moment; the largest error is at slide.amplitude 0.05 um: 50" in sentence(zero, 0.01, where)  # not 10
-    assert sentence({"energy": zero["energy"]}, 0.01, where).endswith("0.05 um: larger than the value.")
+    assert "in moment; the largest error, at slide.amplitude 0.05 um, is 50" in sentence(zero, 0.01, where)  # not 10
+    assert sentence({"energy": zero["energy"]}, 0.01, where).endswith("0.05 um, is larger than the value.")
     assert sentence({"loop_area": one([1, 1], [1e-3, 0])}, 0.01, where) == "All 2 cases meet the tolerance of 1 %."
     assert sentence({"loop_area": one([1, NAN, 1], [1e-3, NAN, 0])}, 0.01, where) == \
         "2 of 3 cases have an answer; all of these meet the tolerance of 1 %."
