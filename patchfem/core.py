@@ -45,9 +45,9 @@ class Outcome(StrEnum):
 
 
 _SENTENCES = {
-    Outcome.DONE: "Finished as asked.",
+    Outcome.DONE: "The run finished as requested.",
     Outcome.STEADY: "The motion is steady: it repeats within the tolerance.",
-    Outcome.STUCK: "The whole interface sticks in the last cycles.",
+    Outcome.STUCK: "During the last cycles of the run the whole interface sticks all the time.",
     Outcome.TRANSIENT: "The run ended before the motion became steady; if the drive is periodic, more cycles may help.",
     Outcome.GROWS: "The amplitude still grows at the end of the run, and no bounded steady motion was found: friction "
                    "does not limit the motion.",

@@ -15,7 +15,7 @@ SHOWN = {  # measure: (in words, what a scene needs for it)
     "contact_fraction": ("part of the patch length that is in contact", "[contact]"),
     "normal_stiffness": ("normal stiffness K_n", "[contact]"),
     "tangential_stiffness": ("tangential stiffness K_t", "[contact.shear] or [contact.asperities]"),
-    "onset_level": ("onset of slip", '[structure] and [drive] with waveform = "levels"'),
+    "onset_level": ("drive level at which slip begins", '[structure] and [drive] with waveform = "levels"'),
     "loop_area": ("energy dissipated by friction per cycle", "[friction] with [slide], or with [structure] and "
                                                              "[drive]"),
 }

@@ -138,7 +138,7 @@ def _timed(setting: Setting, coarse: bool, say, before=()) -> Cost | None:
             break
     again = "".join(f", the same run as {other.label}" for other in before if one.same_as(other))
     if say is not None:
-        say(f"{one.label}: {one.seconds:.2f} CPU s" + f" in {one.wall_seconds:.2f} s" * one.waited() +
+        say(f"{one.label}: {one.seconds:.2f} CPU s" + f" ({one.wall_seconds:.2f} s elapsed)" * one.waited() +
             (again or ", timed once" * (one.timings == 1)))
     return one
 

@@ -49,7 +49,7 @@ def settings(model: Model, knob: str) -> list:
     where the others are numbers."""
     if knob == "element_size":
         if model.patch.mesh is not None:
-            return [Setting(f"file split {2**level} x", float(2**-level), _split_words(level), model, level)
+            return [Setting(f"file, edges / {2**level}", float(2**-level), _split_words(level), model, level)
                     for level in range(3)]
         return _by_tolerance(model) if model.patch.chosen else _even(model)
     return _counted(model, knob)

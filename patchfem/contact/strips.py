@@ -213,8 +213,8 @@ def _refuse_loose(skin, force, checks, free_rotation: bool, free_roll: bool) -> 
                            "contact.strips.count or prescribe contact.strips.roll")
     if not all(value <= LIMIT for value in checks.values()):  # NaN must not pass
         worst = max(checks, key=lambda name: (checks[name] != checks[name], checks[name]))
-        at, cure = ("asperities", "make the rough layer softer "
-                                  "(decay length, height deviation), or leave the layer out") \
+        at, cure = ("asperities", "make the rough layer softer (raise the decay length or the height deviation), or "
+                                  "leave the layer out") \
             if smooth(skin) else ("strips", "lower contact.strips.roll or raise the load")
         raise NotConverged(f"contact.{at}: the residual {worst} = {checks[worst]:.2e} exceeds {LIMIT:.0e}; {cure}")
 

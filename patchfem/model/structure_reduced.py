@@ -129,8 +129,8 @@ def _placed(every: list, boundary: tuple, moved: tuple | None, driven: bool) -> 
     moving, notes = np.zeros(n), []
     if moved is None and one.places is None:
         moving[:] = 1.0
-        notes = [f"all {n} coordinates of structure.reduced move with the base, because the files name no directions; "
-                 "give the coordinates along x in structure.reduced.moved"] if n > rows.size else []
+        notes = [f"all {n} coordinates of structure.reduced are taken to move with the base, because the files name no "
+                 "directions; give the coordinates along x in structure.reduced.moved"] if n > rows.size else []
     for each in ("x",) if moved is None and one.places is not None else moved or ():
         moving[_rows(each, one, n, "moved")] = 1.0
     return rows, moving, notes

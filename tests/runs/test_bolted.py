@@ -119,6 +119,6 @@ def test_refuses_what_has_no_joint_of_one_stiffness():
     assert "add [friction]" in mistakes(MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE)[0]
     told = mistakes(PAIR.replace("[structure]", "[structure]\n" + STUCK) + FORCED)
     assert any("structure.masses, because only modes can be measured" in one for one in told)
-    assert any("a load that changes" in one for one in mistakes(
+    assert any("a normal load that changes" in one for one in mistakes(
         POINT + 'amplitude = "10 N"\nfrequency = "50 Hz"\n' + friction_of("iwan") + MODES % (STUCK, 143.0, 1.0, 1.0)
         + DRIVE))

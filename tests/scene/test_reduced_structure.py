@@ -129,7 +129,8 @@ REFUSED = {
     ("stiffness", "k.mtx", "whole.mtx"): "there is no file",
     ("mass", "both.npz", "small.npz"): "the matrices differ in size: 40 x 40 and 9 x 9",
     ("mass", "both.npz", "skew.npz"): "the mass is not symmetric: entries differ from the transpose by 1",
-    ("mass", "both.npz", "minus.npz"): "the mass is not positive: the diagonal entry of coordinate 1 is -0.02",
+    ("mass", "both.npz", "minus.npz"): "the mass matrix is not positive semidefinite: the diagonal entry of "
+                                       "coordinate 1 is -0.02",
     ("mass", "both.npz", "named.mtx"): "name nodes and directions and others do not",
     ("damping", '"both.npz"\nboundary', "1.5\nboundary"): "must be < 1, not 1.5",
     ("modes", "modes = 4", "modes = -1"): "must be >= 0, not -1",

@@ -61,8 +61,8 @@ class Products:
             moved = np.where(active, self.product(along), 0.0)
             step = size / float(along @ moved)
             force, rest = force + step * along, rest - step * moved
-        raise NotConverged(f"contact: the iteration did not converge; after {limit} steps a residual of "
-                           f"{np.abs(rest).max():.1e} m is left, for a motion of {wanted / SOLVED:.1e} m")
+        raise NotConverged(f"contact: the iteration did not converge; after {limit} steps the residual is "
+                           f"{np.abs(rest).max():.1e} m, more than the permitted {wanted:.1e} m")
 
 
 def smooth_modes(places, change, x) -> tuple:

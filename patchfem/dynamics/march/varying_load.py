@@ -64,7 +64,8 @@ def plastic(static: float, length: float) -> Rubbing:
 def bonds(law) -> Rubbing:
     """The stretch reading with p = 1 of friction.bonds.parameters.Bonds at every point. PatchfemError for others."""
     if law.reading != "stretch" or law.order != 1 or law.breakaway:
-        raise PatchfemError(unbuilt("friction: a load that changes with such bonds", "recursion"))
+        raise PatchfemError(unbuilt("friction: a changing normal load together with reading = 'report', an order other "
+                                    "than 1 or a breakaway above 0", "recursion"))
 
     return Rubbing(POINTS, law.static, (law.static, law.static, law.length, law.initial), tuple(growth_numbers(law)),
                    law.length)
@@ -74,7 +75,8 @@ def lists(law, reach: float, merge: float) -> Rubbing:
     """The printed reading of friction.bonds.parameters.Bonds, a list of bonds at every point: bonds keep the pressure
     that they formed under. PatchfemError for the other, of which bonds are let go as the load falls."""
     if law.reading != "report":
-        raise PatchfemError(unbuilt("friction: a load that changes with such bonds", "recursion"))
+        raise PatchfemError(unbuilt("friction: a changing normal load together with reading = 'stretch' and an order "
+                                    "other than 1", "recursion"))
     return Rubbing(LISTS, law.static, (law.static, law.static, law.length, law.initial), tuple(growth_numbers(law)),
                    law.length, (law, reach, merge))
 

@@ -59,6 +59,6 @@ def _beside_laws(knob: str, accuracy, found: Motion) -> str:
         if not found.soft:
             return "for pieces that are rigid in shear"
         changes = found.varies or found.spring.endswith("grooves]") or any(has(one.law, "bonds") for one in found.laws)
-        return "" if changes else (f"for law '{found.laws[0].law}' under a constant load, because this case is solved "
-                                   "exactly without the key")
+        return "" if changes else (f"for law '{found.laws[0].law}' under a constant load (this case is solved exactly "
+                                   "without the key)")
     return ""

@@ -99,8 +99,8 @@ def _kind(draft: Draft) -> str:
 
 def _with_friction(draft: Draft, has: set[str], pressed: set[str], moves: set[str]) -> str:
     if not has:
-        draft.lacks_table("contact", "a scene needs [contact], or [structure] with [drive], or all of these with "
-                                     "[friction]")
+        draft.lacks_table("contact", "a scene needs [contact] (pressed pieces), or [structure] with [drive] (a "
+                                     "vibrating structure); with [friction] a scene needs a load and a motion")
         return ""
     if moves and "drive" not in has:
         draft.lacks_table("drive", "[structure] needs this table")

@@ -65,7 +65,7 @@ def _contact(draft: Draft) -> None:
                                     "spring of the structure")
     flat = flat_of(contact)
     if contact.element_size and flat and contact.element_size > flat:
-        name = "contact.length =" if flat == contact.length else "the interface of"
+        name = "contact.length =" if flat == contact.length else "the interface length of"
         draft.say("contact.element_size", f"{contact.element_size} m is longer than {name} {flat} m")
     if contact.element_size and contact.length and contact.length > MOST_ELEMENTS * contact.element_size:
         draft.say("contact.element_size", f"{contact.element_size:g} m gives more than {MOST_ELEMENTS} elements over "

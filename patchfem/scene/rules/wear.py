@@ -21,7 +21,7 @@ def check_wear(draft: Draft, kind: str) -> None:
     for key, words in _beside(draft, tables, kind):
         draft.say("wear", unbuilt(f"with {key}", words))
     if draft.given("wear.scheme") and tables.wear.scheme == "explicit" and not draft.given("wear.jumps"):
-        draft.lacks("wear.jumps", "scheme 'explicit' needs a number of steps")
+        draft.lacks("wear.jumps", "scheme 'explicit' needs this key")
     if tables.wear.friction is not None:
         _friction(draft, tables.wear.friction)
     if tables.normal is not None:

@@ -162,7 +162,7 @@ def pieces_of(found: Registration, tracks: Tracks, longest: float, flat: bool = 
     out = []
     for one in cuts:
         form = mean_line(found.rest[one], FORM * longest / step, tilted=True) if flat and tracks.spans else 0.0
-        out.append(tuple(Profile(frozen_array(x[one]), frozen_array(z), "the common part")
+        out.append(tuple(Profile(frozen_array(x[one]), frozen_array(z), "the common part of both traces")
                          for z in (found.first[one], second[one] + form)))
     return out
 

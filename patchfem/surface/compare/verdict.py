@@ -92,7 +92,7 @@ def confidence(ratio: Quantity) -> float:
 def sure(ratio: Quantity) -> str:
     """The confidence as words."""
     found = 100 * confidence(ratio)
-    return "above 99.9 % confidence" if found > 99.9 else f"{np.floor(found * 10) / 10:.3g} % confidence"
+    return "with more than 99.9 % confidence" if found > 99.9 else f"with {np.floor(found * 10) / 10:.3g} % confidence"
 
 
 def _range(ratio: Quantity) -> str:
@@ -105,7 +105,7 @@ def _amplitude(ratio: Quantity, word: str, name: str) -> str:
     start = f"The waves of the band{name} have {_range(ratio)} times their amplitude before wear: "
     if word == "no change shown":
         return start + "the interval contains 1, so no change is shown."
-    return start + f"{word}, at {sure(ratio)}."
+    return start + f"{word}, {sure(ratio)}."
 
 
 def _slope(ratio: Quantity, name: str) -> str:
@@ -113,7 +113,7 @@ def _slope(ratio: Quantity, name: str) -> str:
         return f"Slope{name}: {ratio.reason}."
     word = changed(ratio)
     tail = "no change is shown" if word == "no change shown" else \
-        f"{'flatter' if word == 'reduced' else 'steeper'}, at {sure(ratio)}"
+        f"{'flatter' if word == 'reduced' else 'steeper'}, {sure(ratio)}"
     return f"The slope{name} is {_range(ratio)} times the slope before wear: {tail}."
 
 
@@ -234,7 +234,7 @@ def _direction(when: str, amplitude: Quantity, slope: Quantity) -> str:
             continue
         word = changed(one)
         shown = "no difference is shown" if word == "no change shown" else \
-            f"{'smaller' if word == 'reduced' else 'larger'} along x, at {sure(one)}"
+            f"{'smaller' if word == 'reduced' else 'larger'} along x, {sure(one)}"
         parts.append(f"{name} along x divided by that along y = {_range(one)}: {shown}")
     whole = "anisotropic" if changed(amplitude) in ("reduced", "increased") else "no anisotropy shown"
     return f"{when[0].upper() + when[1:]}: {whole}; " + "; ".join(parts) + "."

@@ -73,8 +73,8 @@ _BASE = (  # name without its letter
     ("ku", "1", "kurtosis: mean fourth power of the heights over the fourth power of their root mean square, 3 for a "
                 "Gaussian surface", lambda heights: moment(heights, 4), "ratio"),
     ("Sm", "m", "mean length of a hill together with the neighbouring dale; hills and dales lower than 10 % of the "
-                "height from the deepest valley to the highest peak do not count; with a cut-off, neither do those "
-                "narrower than 1 % of the cut-off", mean_spacing, "ratio"),
+                "height from the deepest valley to the highest peak do not count; if a cut-off is given, hills and "
+                "dales narrower than 1 % of the cut-off do not count either", mean_spacing, "ratio"),
     ("dq", "1", "root mean square of the slope between neighbouring samples (two points)", _slope, "slope"),
     ("k", "m", "core height: drop, from 0 to 100 %, of the straight line through the flattest 40 % of the Abbott curve",
      _core("core"), "ratio"),

@@ -74,7 +74,7 @@ def laid(before: Areal, after: Areal) -> Laid:
     for _ in range(AGAIN):
         planes = unworn_planes(fit.map(state, np.zeros(3)), fit.x, fit.y, fit.least)
         if not planes:
-            raise PatchfemError("no part of both scans agrees up to a plane")
+            raise PatchfemError("no part of the two scans agrees up to a plane")
         settled = [fit.settled(state, np.array(plane[:3]), plane.noise) for plane in planes]
         state = settled[0][0]
         if settled[0][2] < NOISY * planes[0].noise:
@@ -97,7 +97,7 @@ def _record(fit, guess: Guess, state, plane, noise: float, covariance) -> Laid:
     """The registration on a plane as a record."""
     depth = fit.map(state, plane)
     if np.isfinite(depth).sum() < FEWEST:
-        raise PatchfemError("hardly any heights of both scans lie on each other")
+        raise PatchfemError("hardly any heights of the two scans coincide")
     return Laid(guess, float(state[0]), state[1:], depth, covariance, noise, _unworn(depth, noise), fit.region(state),
                 fit.like(state, plane, noise))
 
@@ -269,7 +269,7 @@ class _Fit:
         for _ in range(ROUNDS):
             rest, slopes, wanted, at = self.rest(state, POINTS)
             if rest.size < FEWEST:
-                raise PatchfemError("hardly any heights of both scans lie on each other")
+                raise PatchfemError("hardly any heights of the two scans coincide")
             base = _cosines(at, 2 * ORDER)
             off = rest - base @ smooth if np.ndim(smooth) else rest - np.median(rest)
             weight = np.clip(1 - (off / max(BIWEIGHT * 1.4826 * np.median(np.abs(off)), 1e-300))**2, 0.0, None)**2
@@ -325,7 +325,7 @@ class _Fit:
             noise = max(min(_noise(rest, noise if turn == 0 else 0.0), most), self.least)
             on = np.abs(rest) <= REACH * noise
             if on.sum() < FEWEST:
-                raise PatchfemError("hardly any heights of both scans agree up to a plane")
+                raise PatchfemError("hardly any heights of the two scans agree up to a plane")
             slow = _cosines(at[on], ORDER)
             both = [np.hstack([one[on], slow]) for one in (slopes, wanted)]
             move = _moved(*both, -rest[on])
