@@ -397,7 +397,8 @@ cycles = 2
 
 OUTLINES = [
     ('[contact.upper]\nchamfer = "1 mm"\nend_radius = "1 mm"\n', (), "contact.upper.end_radius", "exclude each other"),
-    ('[contact.upper]\nlength = "8 mm"\n', ("contact.element_size=9 mm",), "contact.element_size", "the interface length of"),
+    ('[contact.upper]\nlength = "8 mm"\n', ("contact.element_size=9 mm",), "contact.element_size",
+     "the interface length of"),
     ('[contact.upper]\nlength = "8 mm"\n', ("contact.load_line.offset=4 mm",), "contact.load_line.offset", "outside"),
     ('[contact.lower]\nchamfer = "3 mm"\n', ('contact.step={height="1 um",at="4 mm"}',), "contact.step.at", "outside"),
     *((f'mesh = "a.msh"\n[contact.lower]\n{key} = "1 mm"\n', (), f"contact.lower.{key}", "cannot be used with "

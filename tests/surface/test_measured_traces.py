@@ -92,7 +92,7 @@ def test_exact_areal_parameters_of_three_codes(data, truth, name):
     off = scan.z - flat.z
     slopes = [(off[0, -1] - off[0, 0]) / 5e-4, (off[-1, 0] - off[0, 0]) / 5e-4]
     assert slopes == pytest.approx(known["plane_slope_per_um"], rel=1e-6)
-    with pytest.raises(PatchfemError, match=r":1: no header, and units are never guessed; write the header as"):
+    with pytest.raises(PatchfemError, match=r":1: there is no header, and units are never guessed; write the"):
         read_surface(data / name)
 
 
@@ -135,8 +135,8 @@ def test_exact_spectrum_of_a_rough_trace_by_its_filtered_height(data, truth):
                             (800e-6, "own_gauss_lc800", 0.05)):
         rough = np.sqrt((power * (1 - 2.0 ** -((cut / waves) ** 2)) ** 2).sum())
         assert rough == pytest.approx(known[name]["Rq"] * 1e-6, rel=near)
-    assert ('% of its height in waves shorter than 2 elements (200 um): add [contact.asperities], or set '
-            'element_size = "20 um"') in str(too_fine(profile, 100e-6))
+    assert ('% of its rms height in waves shorter than 2 elements (200 um), which the mesh cannot resolve: add '
+            '[contact.asperities], or set element_size = "20 um"') in str(too_fine(profile, 100e-6))
 
 
 def test_exact_a_measured_trace_on_the_nodes_of_a_patch(data):

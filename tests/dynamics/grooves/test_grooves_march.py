@@ -181,7 +181,7 @@ def test_always_the_flanks_shrink_to_the_law_itself():
 
 
 def test_refuses_a_lifted_mass_that_takes_the_whole_inertia():
-    with pytest.raises(PatchfemError, match=r"less than [\d.]+ kg is needed"):
+    with pytest.raises(PatchfemError, match=r"must be below [\d.]+ kg"):
         model_of(Grooves(80e-6, 8e-6, 0.0, 100.0), 100.0, 0.6, 0.6, None, modes(900.0))
 
 
