@@ -84,7 +84,7 @@ def test_exact_a_mesh_that_no_tolerance_refines_is_told_with_the_seconds_of_the_
     said = [text for text in found.warnings if "interface nodes) causes this" in text]
     seconds = ladder.next_seconds(found.patch)
     assert len(said) == 1 and 0.001 < seconds < 5
-    told = re.search(r"would take about (\S+) CPU s: for a patch that moves at most 0.001 CPU s are spent", said[0])
+    told = re.search(r"would take about (\S+) CPU s, and a run with motion spends at most 0.001 CPU s", said[0])
     assert float(told[1]) == pytest.approx(seconds, rel=0.05) and "too long" not in said[0]
 
 

@@ -258,7 +258,7 @@ def test_always_a_browser_draws_it(table, browser, shown):
     words = re.search(r'<p id="?means"?[^>]*>(.*?)</p>', seen, re.S)[1]
     # grid: the loads are lines of their own, so the highest is that of 40 N at 1 mrad: 1e-5 * 5 * 4 = 200 um
     where = "" if shown == "cloud" else ", normal.load 40 N"
-    assert f"highest 200.0 ± 2.0 um at contact.tilt.angle 1 mrad{where}" in words
+    assert f"highest value 200.0 ± 2.0 um at contact.tilt.angle 1 mrad{where}" in words
     assert "2 of 12 cases did not settle" in words
     assert re.search(r'<div id="?chart"?[^>]*>\s*<div', seen), "no picture in its place"
 
