@@ -223,16 +223,16 @@ class Reduced(Table):
     stiffness: key(Text, "file of the stiffness matrix: Matrix Market or Abaqus text (.mtx), MATLAB (.mat), NumPy or "
                    "SciPy (.npz), Nastran (.op4, .pch)")
     mass: key(Text, "file of the mass matrix; may be the same file as for the stiffness matrix")
-    damping: key(number(ge=0, lt=1) | Text | None, "damping ratio of every mode, or a file of the damping matrix; "
-                 "default: no damping") = None
+    damping: key(number(ge=0, lt=1) | Text | None, "damping ratio of every mode of the structure with free "
+                 "interfaces, or a file of the damping matrix; default: no damping") = None
     boundary: key(Annotated[tuple[Coordinate, ...], Field(min_length=1)], "coordinates that are kept as boundary "
                   "coordinates: row numbers of the matrices, or node:direction, such as 1201:x, if the files name "
                   "nodes; interfaces, `drive.mass` and `structure.output_mass` refer to the boundary coordinates by "
                   "number, counted from 1")
     modes: key(whole(0, 1000), "number of modes kept in addition to the boundary coordinates") = 12
     method: key(Literal["craig-bampton", "free-interface"], "'craig-bampton': modes of the structure with the "
-                "boundary held; 'free-interface': modes of the free structure, with residual "
-                "attachment modes") = "craig-bampton"
+                "boundary held; 'free-interface': modes of the free structure, with residual attachment modes, which "
+                "need fewer modes if the interfaces slide") = "craig-bampton"
     moved: key(Annotated[tuple[Coordinate, ...], Field(min_length=1)] | None, "coordinates that a base drive moves "
                "along x: row numbers, ranges of rows (a..b:n means n evenly spaced rows from a to b), nodes or "
                "directions; default: all coordinates in direction x, or all coordinates if the files name no "
