@@ -360,7 +360,8 @@ def map_of(i, room, history, case, k, size):
 
     Two numbers move on by a linear map near a motion that repeats. So a sequence of any number of theirs follows the
     equation of its eigenvalues, which the slide and the speed give; what place and extremes miss of it tells what is
-    not linear, and falls as the square of what is left.
+    not linear, and falls as the square of what is left, unless an event moves across the end of the cycle. A law whose
+    memory would keep that (`settles`) does not leap.
     """
     (x, x1, x2), (v, v1, v2), (p, p1, p2) = changes(X, 0, room, i), changes(V, 1, room, i), changes(PLACE, 2, room, i)
     way = room[WAY * LANES + i]

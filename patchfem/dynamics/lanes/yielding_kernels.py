@@ -50,13 +50,19 @@ from .rigid_kernels import (
     held,
     path,
     resume,
-    settles,
     slid,
     sticking,
 )
 
 __all__ = ["KEPT", "RESTS", "TURNS_HELD", "advance", "ahead", "at_turn", "begin", "felt", "folds", "foretell",
            "furthest", "held", "path", "resume", "rise", "settles", "slid", "sticking"]
+
+
+@njit(error_model="numpy", forceinline=True, **LEAN)
+def settles(room, i):
+    """Never: while a motion settles, a yield or a reversal may move across the end of a cycle, where the stretch is no
+    longer what the map of the cycle before gives, and the stretch is kept for good."""
+    return False
 
 RESTS = False  # a stick moves its spring
 TURNS_HELD = False

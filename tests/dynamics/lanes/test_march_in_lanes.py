@@ -222,7 +222,7 @@ LEAPS = "rigid", "yielding", "masing", "table", FLOWS[1]  # each march of a law 
 @pytest.mark.parametrize("law", LEAPS)
 def test_exact_a_case_leaps_to_where_it_would_march(law):
     """Motion, extremes and phasors of a march that leaps are those of a march by three cycles at a time, which never
-    leaps."""
+    leaps. Elastic-plastic elements never leap: they keep the stretch that a yield across the end of a cycle leaves."""
     some, cycles = cases(law, 60, 11), 150
     begun = run.begun_at(law, some)
     history, motion = run.march_on(law, some, begun, cycles, 96)
@@ -231,7 +231,8 @@ def test_exact_a_case_leaps_to_where_it_would_march(law):
         part, step = run.march_on(law, some, step, 3, 96)
         parts.append(part)
     sizes, apart = np.ptp(history[:, -1, :2], axis=1), np.abs(history - np.concatenate(parts, axis=1)).max(axis=(1, 2))
-    assert np.all(apart < 2e-6 * sizes) and np.mean(apart > 0) > 0.5
+    near, leaps = (1e-8, 0.0) if law == "yielding" else (2e-6, 0.5)  # the first: a march ends once it repeats
+    assert np.all(apart < near * sizes) and np.mean(apart > 0) > leaps
     for place in (at.X, at.V, at.PLACE):
         assert np.all(np.abs(motion - step)[:, place] < 2e-6 * sizes)
 

@@ -8,9 +8,10 @@ import pytest
 from lane_bars import LAWS, SCENE, drawn, rows
 from lane_bars import held as within
 
-from patchfem.api import base_of, build, load
+from patchfem.api import base_of, build, load, run_many
 from patchfem.runs.many import many, one_by_one
 from patchfem.runs.many.lumped import lanes, lumped
+from patchfem.scene.sets import assignments
 
 EXACT = "coulomb", "weakening", "elastic-plastic", "iwan"  # beside others, without an exact batch, stand single runs
 
@@ -196,3 +197,15 @@ def test_always_a_march_that_runs_away_by_half_the_steps_has_an_endless_bar_and_
     for law in ("friction.laws.tanh_kernels", "rigid"):
         found = lanes.bars(values, lanes.changed(values, [coarse]), law)
         assert np.isinf(found[lanes.MAIN[0]][1]) and found[lanes.MAIN[0]][0] > 1e-3
+
+
+def test_exact_a_yield_that_settles_across_the_end_of_a_cycle_is_found():
+    """While this motion settles, a yield moves from before the end of a cycle to behind it. What slips is that of a run
+    from event to event, and of an integration of its own with 16 000 steps a cycle: 7.02523e-7 m."""
+    base = base_of(load(SCENE.format(law='law = "elastic-plastic"\nstatic = 0.3\nstiffness = "338512.6754077899 N/m"')))
+    sets = {"normal.load": 100.0, "structure.moving_mass": 1.0, "structure.mode.axial.frequency": 37.354702012424916,
+            "structure.mode.axial.damping": 0.01749691725399936, "drive.frequency": 100.0, "drive.cycles": 1000,
+            "accuracy.tolerance": 0.01}
+    levels = [0.7745493775532992, *np.geomspace(5, 60, 71).tolist()]
+    found = run_many([build(base.changed(assignments(sets | {"drive.acceleration": one}))) for one in levels])
+    assert found.values["slip_amplitude"][0] == pytest.approx(7.025228e-7, rel=1e-5)
