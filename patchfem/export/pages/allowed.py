@@ -91,7 +91,7 @@ def allowed(keys: list, measures: dict, trusted: dict, grid: bool = True, over: 
         values = np.where(trusted[name], values, np.nan)
         each = [_along(name, change, line, size, values, errors, bool(key["log"])) for line in lines]
         if None not in each:
-            found.append(min(each, key=lambda one: (one.beyond is None and one.whole, one.value)))
+            found.append(min(each, key=_order))
         elif name in MOVES:
             lost.append(name)
     return Limits(key, found, lost, float(size.max()), over)
@@ -130,6 +130,11 @@ def _along(name: str, change: float, line: np.ndarray, size: np.ndarray, values:
     return ends._replace(about=part, value=place) if abs(other - place) <= ALIKE * abs(place) else ends
 
 
+def _order(one: Allowed) -> tuple:
+    """What allows least comes first; of two that reach equally far, that whose limit lies among the cases."""
+    return one.beyond is None and one.whole, one.value, one.beyond is None
+
+
 def as_json(limits: Limits) -> list:
     """The limits as sweep.json has them, SI: `value` of the key, between the cases `low` and `high`, from which a
     measure differs by `change`, relative to the first case."""
@@ -164,7 +169,7 @@ def _moving(limits: Limits) -> str:
     name = OPENS.get(limits.key["name"], (limits.key["name"],))[0]
     *others, final = (label(one.name) for one in moving)
     within, others = f"{100 * WITHIN:g} %", ", ".join(others)
-    ends = sorted((one for one in moving if one.beyond is not None or not one.whole), key=lambda one: one.value)
+    ends = sorted((one for one in moving if one.beyond is not None or not one.whole), key=_order)
     if not ends:
         far = _at(limits, moving[0], limits.most) + _brackets(_gap(limits, moving[0], limits.most))
         told = f"{others} and {final} change" if others else f"{final} changes"
@@ -173,7 +178,11 @@ def _moving(limits: Limits) -> str:
     held = f"before {f'{others} or ' if others else ''}{final} changes by {within}"
     if least.beyond is None:
         far = _at(limits, least) + _brackets(_gap(limits, least))
-        return f"{name} may reach at least {far} {held}; the limit lies beyond the cases that were computed"
+        size = np.asarray(limits.key["values"], float)
+        sure = min((one for one in ends if one.beyond is not None), key=lambda one: size[one.beyond], default=None)
+        rest = "no case with a larger value shows the limit" if sure is None else \
+            f"{label(sure.name)} has changed by more at {_at(limits, sure, float(size[sure.beyond]))}"
+        return f"{name} may reach at least {far} {held}; {rest}"
     between = f"between cases at {_between(limits, least)}"
     later = "" if last is least or last.beyond is None else f"; {label(last.name)} {_where(limits, last)}"
     return (f"{name} may reach {_at(limits, least)}{_brackets(_gap(limits, least), between)} {held} "

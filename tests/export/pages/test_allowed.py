@@ -107,8 +107,21 @@ def test_exact_nothing_that_moves_changes():
     assert sentence(limits({"loop_area": [1, 1.01, 1.02, 1.03, 0.96]})) == \
         "Tilt may reach 1 mrad (13 um over the patch): loop area changes by less than 5 %."
     assert sentence(limits({"loop_area": [1, 1.01, 1.02, 1.03, 0.96]}, trusted=[1, 1, 1, 1, 0])) == (
-        "Tilt may reach at least 0.5 mrad (6.4 um over the patch) before loop area changes by 5 %; the limit lies "
-        "beyond the cases that were computed.")
+        "Tilt may reach at least 0.5 mrad (6.4 um over the patch) before loop area changes by 5 %; no case with a "
+        "larger value shows the limit.")
+
+
+def test_exact_a_limit_among_the_cases_comes_before_one_that_errors_leave_open():
+    """The rig at 1, 150, 170 and 190 urad: the loop falls by 4.5, 5.007 and 5.23 %, known to 0.05 %, so that 5 % lie
+    between 150 and 190 urad; the slip, 5.03 % off in the last case, is left open there. Once this limit was said to
+    lie beyond the cases."""
+    tilt, loop, slip = np.array([1e-3, 0.15, 0.17, 0.19]), [1, 0.955, 0.94993, 0.9477], [1, 0.96, 0.9495, 0.9497]
+    said = sentence(limits({"slip_amplitude": slip, "loop_area": loop}, 5e-4, tilt))
+    assert said == ("Tilt may reach 0.15 mrad (1.9 um over the patch, between cases at 0.15 and 0.19 mrad) before slip "
+                    "amplitude or loop area changes by 5 % (loop area first).")
+    said = sentence(limits({"slip_amplitude": [1, 1.01, 1.05, 1.05], "loop_area": [1, 1.01, 1.01, 1.2]}, 5e-4, tilt))
+    assert said == ("Tilt may reach at least 0.15 mrad (1.9 um over the patch) before slip amplitude or loop area "
+                    "changes by 5 %; loop area has changed by more at 0.19 mrad.")
 
 
 def test_exact_a_measure_that_cannot_be_told_is_not_among_what_moves():
