@@ -193,16 +193,18 @@ def _answered(found, told: Told) -> None:
 
 
 def _answer(number: int, messages: dict, written: dict, told: Told) -> None:
-    """What came out of so many cases, the worst first, as sweep.json has it; messages: of those that failed."""
+    """What came out of so many cases, the answer first, as sweep.json has it; messages: of those that failed."""
     target, failed, counts = told.target, sorted(messages), written["cases"]["outcomes"]
     if told.tells == "json":
         print(json.dumps({"cases": number, "outcomes": counts, "failed": len(failed), "answer": written["answer"],
                           "over_tolerance": written["cases"]["over_tolerance"], "folder": str(target),
                           "seconds": round(perf_counter() - told.begin, 3)}, ensure_ascii=False))
     elif told.tells == "words":
-        print(f"{number} cases: " + ", ".join(f"{count} {name}" for name, count in counts.items()))
-        for said in written["sentences"]:
-            print(said)
+        ended = ", ".join(f"{count} {name}" for name, count in counts.items())
+        first, *others = written["sentences"] or [""]
+        for said in (first, f"{number} case{'s' * (number != 1)}: {ended}", *others):
+            if said:
+                print(said)
         if told.page:
             print(f"page: {target / 'report.html'}")
         tables = [target / name for name in ("sweep.csv", "sweep.nc")]

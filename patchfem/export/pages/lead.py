@@ -1,4 +1,4 @@
-"""What a sweep says first: how many cases miss the tolerance, how far its key may go, where its main measure runs."""
+"""What a sweep says first: how far its key may go, where its main measure runs, how many cases miss the tolerance."""
 
 from collections.abc import Sequence
 from types import MappingProxyType
@@ -44,22 +44,38 @@ class Lead(NamedTuple):
     asked: str = ""
 
     def sentences(self) -> list:
-        """What people read, the worst first."""
+        """What people read, the answer first, then whether all cases meet the tolerance, then what else is known."""
         rank = self.rank if self.scatter or not (self.limit or self.peak) else ""  # of a grid they say more
         said = (self.limit, self.peak, self.least, rank, self.scatter, self.span, self.turns) if not self.asked else \
             (self.rank, self.scatter, self.span, self.limit, self.peak, self.least, self.turns)
-        return [one for one in (self.left, self.misses, *said) if one]
+        used = self._first()
+        return [one for one in (self.answer(), "" if self.missed or not used else self.misses,
+                                *(one for one in said if one not in used)) if one]
 
     def answer(self) -> str:
-        """One sentence, two of drawn cases: how far the key may go, where the peak is, what matters most and how far
-        the answers scatter, or where the main measure runs; before it how many cases miss the tolerance."""
-        drawn = " ".join(one for one in (self.rank, self.scatter) if one)
-        text = (self.asked and (drawn or self.span)) or self.limit or self.peak or self.least or drawn or self.span or \
-            self.turns
-        if self.left:
-            return f"{self.left} {self._replace(left='').answer()}".strip()
-        return f"{self.misses.rstrip('.')}; {text[0].lower() if text[1:2].islower() else text[0]}{text[1:]}" \
-            if self.missed and text else text or self.misses
+        """One sentence: how far the key may go, where the peak is, what matters most and how far the answers scatter,
+        or where the main measure runs; in brackets behind it what qualifies it: cases that have no answer, have not
+        settled or miss the tolerance."""
+        text = joined(self._first())
+        notes = joined([one for one in (self.left, self.misses if self.missed else "") if one])
+        if not text or not notes:
+            return text or notes or self.misses
+        return f"{text.rstrip('.')} ({notes[0].lower() if notes[1].islower() else notes[0]}{notes[1:].rstrip('.')})."
+
+    def _first(self) -> list:
+        """The sentences that the answer is made of."""
+        drawn = [one for one in (self.rank, self.scatter) if one]
+        first = (drawn or [self.span]) if self.asked and (drawn or self.span) else \
+            [self.limit or self.peak or self.least] if self.limit or self.peak or self.least else \
+            drawn or [self.span or self.turns]
+        return [one for one in first if one]
+
+
+def joined(sentences: Sequence) -> str:
+    """Sentences as one, with semicolons between them; "" without any."""
+    first, *others = sentences or [""]
+    said = [first, *(f"{one[0].lower() if one[1:2].islower() else one[0]}{one[1:]}" for one in others)]
+    return "; ".join(one.rstrip(".") for one in said) + "." * bool(first)
 
 
 def lead_of(table: dict) -> Lead:
@@ -83,22 +99,23 @@ def lead_of(table: dict) -> Lead:
                 allowed.sentence(limits),
                 span(columns(table), trusted, settled, ranked.asked_first(FIRST, table)),
                 changes(keys, columns(table), outcome, table["grid"]), *ranked.told(table, trusted, settled.any()),
-                tops, f"{peaks.sentence(tops)} {edge}".strip(), _left(table, outcome),
+                tops, joined([one for one in (peaks.sentence(tops), edge) if one]), _left(table, outcome),
                 least(keys, columns(table), trusted, shown), table.get("first", ""))
 
 
 def _left(table: dict, outcome: np.ndarray) -> str:
-    """What holds of all that follows: how many cases of an interrupted sweep have no answer, and that of those that run
+    """What holds of all that is said: how many cases of an interrupted sweep have no answer, and that of those that run
     none has settled; "" where neither is so."""
-    count, ran = int(np.sum(outcome == "")), outcome[(outcome != "") & (outcome != FAILED)]
-    said = (f"{count} of {outcome.size} cases have no result yet; the sentences below describe the other cases."
-            if count else "")
+    count, ran, said = int(np.sum(outcome == "")), outcome[(outcome != "") & (outcome != FAILED)], []
+    if count:
+        said.append(f"{count} of {outcome.size} cases {'has' if count == 1 else 'have'} no result yet and "
+                    f"{'is' if count == 1 else 'are'} left out.")
     if ran.size and not np.isin(ran, SETTLED).any():
-        said += " No case has settled; the sentences below describe the end of each run."
+        said.append("No case has settled, so this describes the end of each run.")
     first = table.get("first", "")
     if first and not np.isfinite(table["measures"].get(first, {"values": ()})["values"]).any():
-        said += f" No case has a value of {label(first)}; the sentences below describe other measures."
-    return said.strip()
+        said.append(f"No case has a value of {label(first)}, so this describes other measures.")
+    return joined(said)
 
 
 def span(measures: dict, trusted: dict, settled: np.ndarray, names: Sequence = FIRST) -> str:

@@ -129,7 +129,7 @@ def _crossing(square: np.ndarray, g: np.ndarray, top: float, least: float) -> tu
 def sentence(peaks: list) -> str:
     """Where the peak is, or from where to where it moves; "" without one."""
     known, lost = ([one for one in peaks if np.isfinite(one.height[0]) == there] for there in (True, False))
-    return " ".join(said for said in (_known(known), _lost(lost, bool(known))) if said)
+    return "; ".join(said for said in (_known(known).rstrip("." if lost else ""), _lost(lost, bool(known))) if said)
 
 
 def edge(keys: list, measures: dict, trusted: dict, grid: bool) -> str:
@@ -157,8 +157,8 @@ def _lost(peaks: list, others: bool) -> str:
         return ""
     more = f" and {len(peaks) - 1} other{'s' * (len(peaks) > 2)}" if len(peaks) > 1 else ""
     held = f" with {peaks[0].held}{more}" if peaks[0].held else ""
-    what = "it" if others else label(peaks[0].name)
-    return (f"Where {what} peaks{held} is not known: cases next to the largest value have not settled or miss the "
+    where = "where it" if others else f"Where {label(peaks[0].name)}"
+    return (f"{where} peaks{held} is not known: cases next to the largest value have not settled or miss the "
             "tolerance; raise drive.cycles so that these cases settle.")
 
 

@@ -114,10 +114,12 @@ def _change(table: dict, limits: allowed.Limits) -> list:
 
 
 def _lead(table: dict, said: Lead) -> str:
-    """The verdict: how many cases, over what, how they ended, and what the sweep says."""
+    """The verdict: the answer, how many cases, over what, how they ended, and what else the sweep says."""
     number, over = len(table["outcome"]), " × ".join(one["name"] for one in table["keys"])
     ended = ", ".join(f"{count} {label(name)}" for name, count in Counter(table["outcome"]).most_common())
-    lines = [f"<b>{number} cases</b> over {escape(over)}: {escape(ended)}.", *map(escape, said.sentences())]
+    first, others = said.sentences()[:1], said.sentences()[1:]
+    lines = [*map(escape, first), f"<b>{number} case{'s' * (number != 1)}</b> over {escape(over)}: {escape(ended)}.",
+             *map(escape, others)]
     lines += [f"<i>{escape(label(one))}</i>: {escape(one.sentence)}" for one in Outcome
               if one.value in table["outcome"] and one.value not in SETTLED]
     text = "".join(f"<p>{line}</p>" for line in lines)

@@ -46,7 +46,7 @@ def test_exact_the_peak_and_width_of_a_resonance(damping):
     found = peaks.found(keys, {name: (some, 0 * both, "m")}, {name: np.ones(322, bool)}, True)
     assert np.isnan(found[0].height[0])
     assert found[1].frequency[0] == pytest.approx(95 * np.sqrt(1 - 2 * damping**2), abs=1e-3)
-    assert "Where it peaks with drive.acceleration 1 g is not known" in peaks.sentence(found)
+    assert "; where it peaks with drive.acceleration 1 g is not known" in peaks.sentence(found)
     assert "not known" in peaks.table(found) and peaks.sentence(found[:1]).startswith("Where relative displacement am")
 
 
@@ -106,7 +106,8 @@ def test_always_drawn_cases_are_ranked_and_their_scatter_told(drawn):
     from patchfem.export.sweeps.page import read_table
 
     again = lead_of(read_table(out))  # what `patchfem report` draws from the files
-    assert again.rank in answer.out and again.scatter in answer.out
+    head, count, *_ = answer.out.splitlines()
+    assert head == f"{again.rank.rstrip('.')}; {again.scatter}" == told["answer"] and count == "128 cases: 128 steady"
     loops = read_table(out)["measures"]["loop_area"]["values"]
     low, _, high = again.spread["loop_area"][1]
     assert np.mean((loops >= low) & (loops <= high)) == pytest.approx(0.9, abs=0.02)
@@ -140,12 +141,12 @@ def test_always_a_sweep_of_which_no_case_has_settled_says_so_first(drawn):
     """Their numbers then count as they ended; 256 such cases were told as if they had settled."""
     table = read_table(drawn[0])
     count = len(table["outcome"])
-    said = "No case has settled; the sentences below describe the end of each run."
+    said = "o case has settled, so this describes the end of each run"
     assert said not in "".join(lead_of(table).sentences())
     lead = lead_of(table | {"outcome": ["transient"] * (count - 2) + ["failed", ""]})
-    assert lead.sentences()[0] == \
-        f"1 of {count} cases have no result yet; the sentences below describe the other cases. {said}"
-    assert lead.answer().startswith(lead.left) and "settled" not in lead.scatter
+    assert lead.sentences()[0] == lead.answer() and lead.answer().endswith(
+        f" (1 of {count} cases has no result yet and is left out; n{said}).")
+    assert "settled" not in lead.scatter and not any(said in one for one in lead.sentences()[1:])
     assert lead_of(table | {"outcome": ["failed"] * count}).left == ""
 
 
