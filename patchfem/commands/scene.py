@@ -87,7 +87,10 @@ def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Js
 
 def _plan_sweep(scene: Path, sets, what: Over, json_: bool, verbose: bool) -> None:
     """The plan of a sweep."""
-    answer = estimate.estimate(*_swept(scene, sets, what))
+    asked, cases = _swept(scene, sets, what)
+    answer = estimate.estimate(asked, cases)
+    if wrong := ask.contradictions(asked, cases):
+        note(wrong)
     if json_:
         print(json.dumps(answer))
         return

@@ -15,7 +15,7 @@ from .. import core
 from ..campaigns.sweeps import ask, executors
 from ..campaigns.sweeps import sweep as sweeping
 from ..export.sweeps import receipt, run
-from .shared import Ended, Json, NoPage, NotReached, Out, Quiet, Refused, Sets, flag, placed, say, texts, word
+from .shared import Ended, Json, NoPage, NotReached, Out, Quiet, Refused, Sets, flag, note, placed, say, texts, word
 
 FIRST = 5  # messages of failed cases that are printed
 TABLE = 1000  # bytes of a lumped case in sweep.csv and sweep.nc
@@ -118,6 +118,8 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
     if by.collect:
         _answered(run.collect(asked, cases, target, not no_page), told)
         return
+    if not quiet and (wrong := ask.contradictions(asked, cases)):
+        note(wrong)
     line = Progress(quiet)
     try:
         place = run.Place(target, resume, keep or "", part, not no_page)

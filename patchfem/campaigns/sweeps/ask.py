@@ -119,8 +119,8 @@ def _same(asked: Asked, keys: Sequence[str]) -> list[str]:
 
 def _refuse_all(asked: Asked, cases: Cases) -> None:
     """SceneError with the mistakes of cases spread over the sweep where none of these is a valid scene."""
-    found, step = {}, max(1, len(cases) // LOOKED)
-    for number in range(0, len(cases), step):
+    found = {}
+    for number in cases.looked(LOOKED):
         mistakes = asked.mistakes(cases.sets(number))
         if not mistakes:
             return
@@ -128,3 +128,19 @@ def _refuse_all(asked: Asked, cases: Cases) -> None:
             found.setdefault(re.sub(NUMBER, "", one) if cases.drawn else one, one)
     lines = list(found.values())
     raise SceneError(lines[:SHOWN] + ([f"and {len(lines) - SHOWN} more"] if len(lines) > SHOWN else []))
+
+
+def contradictions(asked: Asked, cases: Cases) -> str:
+    """That cases of a sweep will fail since a swept key contradicts another key of the scene, and what helps; of LOOKED
+    cases spread over the sweep, "" where each of these is a valid scene."""
+    numbers = cases.looked(LOOKED)
+    found = [one for one in map(asked.mistakes, map(cases.sets, numbers)) if one]
+    if not found:
+        return ""
+    first, swept = found[0][0], {asked.place(axis.key) for axis in cases.axes}
+    key = re.search(r"(?:^|: )([a-z_]+(?:\.[\w-]+)+): ", first)
+    helps = f"sweep {key[1]} too, remove it from the scene, or give other values in --over" \
+        if key and asked.place(key[1]) not in swept else "give other values in --over"
+    of = f"{len(found)} of {len(cases)} cases" if len(numbers) == len(cases) else \
+        f"{len(found)} of {len(numbers)} cases that were looked at"
+    return f"{of} will fail: {first}; {helps}"

@@ -87,6 +87,11 @@ class Cases:
             numbers = [number * size + place for number in numbers for place in some]
         return numbers
 
+    def looked(self, most: int) -> list[int]:
+        """Numbers of `most` cases or somewhat fewer that stand for all: of drawn ones the first, for every 8th point of
+        Sobol's sequence may lie in the same half of a range, else those of `spread`."""
+        return list(range(min(most, len(self)))) if self.drawn else self.spread(most)
+
     def neighbours(self, numbers: Sequence[int]) -> list[int]:
         """The cases in an order in which those with the same pieces follow each other, for they share most work, and
         among these the ones with the same patch."""

@@ -28,7 +28,7 @@ def estimate(asked: Asked, cases: Cases) -> dict:
     PatchfemError where none of the planned cases can run.
     """
     plans, numbers, wrong = [], [], None
-    for number in range(0, len(cases), -(-len(cases) // LOOKED)):
+    for number in cases.looked(LOOKED):
         try:
             plans.append(plan(asked.model(cases.sets(number))))
             numbers.append(number)

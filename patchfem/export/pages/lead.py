@@ -12,7 +12,7 @@ from .. import missed
 from ..written import NUMBER, label
 from . import allowed, peaks, ranked
 from .changes import changes, shown_of, varies
-from .words import zero_below
+from .words import joined, zero_below
 
 EXACT = 1e-6  # of a value, up to which no error is told: the values are shown to four digits
 SETTLED = ranked.SETTLES
@@ -71,13 +71,6 @@ class Lead(NamedTuple):
         return [one for one in first if one]
 
 
-def joined(sentences: Sequence) -> str:
-    """Sentences as one, with semicolons between them; "" without any."""
-    first, *others = sentences or [""]
-    said = [first, *(f"{one[0].lower() if one[1:2].islower() else one[0]}{one[1:]}" for one in others)]
-    return "; ".join(one.rstrip(".") for one in said) + "." * bool(first)
-
-
 def lead_of(table: dict) -> Lead:
     """The Lead of a sweep; table: as `sweep.page` takes it."""
     measures, tolerance = table["measures"], table.get("tolerance", np.nan)
@@ -87,7 +80,8 @@ def lead_of(table: dict) -> Lead:
     trusted = {name: ~missed.over(one, tolerance) & (settled | name.endswith("_steady")
                                                      | ~np.isfinite(one["values"])[settled].any())
                for name, one in measures.items()}
-    limits = allowed.allowed(keys, columns(table), trusted, table["grid"], table.get("patch"))
+    limits = allowed.Limits() if table.get("drawn") else \
+        allowed.allowed(keys, columns(table), trusted, table["grid"], table.get("patch"))
     shown = {one["name"]: shown_of(one) for one in keys if not one["words"]}
 
     def where(case: int) -> str:
@@ -95,22 +89,24 @@ def lead_of(table: dict) -> Lead:
                          for one in keys if varies(one) or len(keys) == 1)
 
     tops, edge = (find(keys, columns(table), trusted, table["grid"]) for find in (peaks.found, peaks.edge))
+    ranks = ranked.told(table, trusted, settled)
+    left = _left(table, outcome, ranks[1] == ranked.too_few(table, settled))
     return Lead(missed.counted(measures, tolerance), missed.sentence(measures, tolerance, where), limits,
                 allowed.sentence(limits),
                 span(columns(table), trusted, settled, ranked.asked_first(FIRST, table)),
-                changes(keys, columns(table), outcome, table["grid"]), *ranked.told(table, trusted, settled.any()),
-                tops, joined([one for one in (peaks.sentence(tops), edge) if one]), _left(table, outcome),
+                changes(keys, columns(table), outcome, table["grid"]), *ranks,
+                tops, joined([one for one in (peaks.sentence(tops), edge) if one]), left,
                 least(keys, columns(table), trusted, shown), table.get("first", ""))
 
 
-def _left(table: dict, outcome: np.ndarray) -> str:
+def _left(table: dict, outcome: np.ndarray, known: bool) -> str:
     """What holds of all that is said: how many cases of an interrupted sweep have no answer, and that of those that run
-    none has settled; "" where neither is so."""
+    none has settled, unless that is known; "" where neither is so."""
     count, ran, said = int(np.sum(outcome == "")), outcome[(outcome != "") & (outcome != FAILED)], []
     if count:
         said.append(f"{count} of {outcome.size} cases {'has' if count == 1 else 'have'} no result yet and "
                     f"{'is' if count == 1 else 'are'} left out.")
-    if ran.size and not np.isin(ran, SETTLED).any():
+    if ran.size and not np.isin(ran, SETTLED).any() and not known:
         said.append("No case has settled, so this describes the end of each run.")
     first = table.get("first", "")
     if first and not np.isfinite(table["measures"].get(first, {"values": ()})["values"]).any():
@@ -142,7 +138,7 @@ def span(measures: dict, trusted: dict, settled: np.ndarray, names: Sequence = F
         counts, ended = there.sum(), (every & settled).sum()
         whose = "" if counts == every.sum() else " of the settled cases" if counts == ended else \
             " in the cases that meet the tolerance"
-        return f"{label(name).capitalize()}{whose} {ran}{band}."
+        return f"{ranked.called(name).capitalize()}{whose} {ran}{band}."
     return ""
 
 

@@ -7,9 +7,10 @@ import numpy as np
 from ...campaigns.sweeps.ranking import ranking
 from ...core import Outcome
 from ...scales import fitting, plain, short
-from ..written import label
+from ..written import NUMBER, label
 from . import document
-from .words import linked, zero_below
+from .changes import shown_of, varies
+from .words import joined, linked, zero_below
 
 RANKED = ("relative_displacement_amplitude", "loop_area", "equivalent_damping", "absolute_acceleration_peak",
           "friction_ratio_peak", "onset_level", "pressure_peak", "contact_fraction", "normal_stiffness",
@@ -20,18 +21,91 @@ FEW = 20  # drawn cases, below which nine in ten of them are no share
 SETTLED = 0.95  # of the drawn cases, below which those left out may be one of its ends
 SETTLES = "steady", "stuck", "done", "no_contact"  # outcomes
 NAMED = 3  # keys in the sentence
+CALLED = {"equivalent_damping": "equivalent damping ratio"}  # a measure whose label does not say that it is a ratio
+PARTS = 5  # of the drawn cases by the size of a key, in which a measure rises or falls
+SURE = 2.5  # standard errors of a median (1.25 of those of a mean) by which two parts differ
 
 
-def told(table: dict, trusted: dict, settled: bool = True) -> tuple:
-    """(ranks, rank, quantiles, scatter) of the Lead of a sweep; trusted: as `lead` makes it; settled: whether any case
-    has."""
+def told(table: dict, trusted: dict, settled: np.ndarray) -> tuple:
+    """(ranks, rank, quantiles, scatter) of the Lead of a sweep; trusted: as `lead` makes it; settled: (n,) whether a
+    case has."""
     ranks, found, of = ranks_of(table), quantiles(table, trusted), len(table["outcome"])
     left = of - int(np.sum(trusted[next(iter(ranks))])) if ranks else 0
-    moves = not settled or Outcome.TRANSIENT.value in list(table["outcome"])
+    moves = not settled.any() or Outcome.TRANSIENT.value in list(table["outcome"])
     names, first = asked_first(SPREAD, table), table.get("first", "")
     rank = sentence(ranks, left, moves) if not first or first in ranks or first not in table["measures"] else \
         f"What {label(first)} depends on cannot be told from these {of} cases; more cases may show it." if ranks else ""
-    return ranks, rank, found, scatter(found, of, settled and moves, names)
+    rank = joined([one for one in (rank, trend(table, ranks, settled)) if one])
+    few = "" if rank else too_few(table, settled)
+    return ranks, rank or few, found, "" if few else scatter(found, of, settled.any() and moves, names)
+
+
+def too_few(table: dict, settled: np.ndarray) -> str:
+    """That too few of the drawn cases have settled for a ranking, and what helps; "" where enough have."""
+    outcome, count = [str(one) for one in table["outcome"]], int(settled.sum())
+    if not table.get("drawn") or len(outcome) < FEW or count >= min(FEW, 0.9 * len(outcome)):
+        return ""
+    ended = {name: outcome.count(name) for name in sorted(set(outcome) - {*SETTLES, ""})}
+    helps = [f"raise drive.cycles so that the {Outcome.TRANSIENT.value} cases settle"] * ("transient" in ended) + \
+        ["correct what the messages of the failed cases name"] * ("failed" in ended)
+    end = "settled" if Outcome.TRANSIENT.value in ended else "has a result" if count == 1 else "have a result"
+    said = f"{f'Only {count}' if count else 'None'} of {len(outcome)} cases {end}"
+    others = f" ({', '.join(f'{number} {label(name)}' for name, number in ended.items())})" if ended else ""
+    lost = "no ranking is possible" if sum(map(varies, table["keys"])) > 1 else "the scatter is not known"
+    return f"{said}{others}, so {lost}{'; ' * bool(helps)}{' and '.join(helps)}."
+
+
+def called(name: str) -> str:
+    """A measure as people read it in a sentence."""
+    return CALLED.get(name, label(name))
+
+
+def trend(table: dict, ranks: dict, settled: np.ndarray) -> str:
+    """In which direction the strongest key moves the first measure of drawn cases, or where along that key its largest
+    or least value lies; "" where the cases do not tell it. ranks: as `ranks_of`; settled: (n,) whether a case has."""
+    moving, first = [one for one in table["keys"] if varies(one)], table.get("first", "")
+    name = first if first in table["measures"] else next(iter(ranks), SPREAD[0])
+    strongest = ranks[name][0].key if name in ranks else ""
+    key = next((one for one in moving if len(moving) == 1 or one["name"] == strongest), None)
+    if not table.get("drawn") or key is None or name not in table["measures"] or one_word(key):
+        return ""
+    values, size = (np.asarray(one, float) for one in (table["measures"][name]["values"], key["values"]))
+    cases = np.flatnonzero(np.isfinite(values) & (settled | ~settled.any()))
+    cases = cases[np.argsort(size[cases], kind="stable")]
+    parts = np.array_split(cases, PARTS)
+    if cases.size < FEW:
+        return ""
+    middle = np.array([np.median(values[part]) for part in parts])
+    off = np.array([0.0 if len(moving) == 1 else SURE * 1.25 * np.std(values[part]) / np.sqrt(part.size)
+                    for part in parts])
+    return _trend(name, key, middle, off, parts if len(moving) > 1 else None, cases, values,
+                  table["measures"][name]["unit"])
+
+
+def one_word(key: dict) -> bool:
+    """Whether the values of a key are words."""
+    return not any(NUMBER.match(str(text)) for text in key["texts"])
+
+
+def _trend(name: str, key: dict, middle: np.ndarray, off: np.ndarray, parts: list | None, cases: np.ndarray,
+           values: np.ndarray, unit: str) -> str:
+    """The sentence of `trend`; middle, off: medians of the measure in PARTS of the cases by the size of the key, and by
+    how much each is uncertain; parts: the cases of each, None where nothing but the key varies; cases: by its size."""
+    shown, what = shown_of(key), called(name).capitalize()
+    for word, sign in (("largest", 1), ("least", -1)):
+        top = int(np.argmax(sign * middle))
+        ends = [sign * (middle[top] - middle[end]) > off[top] + off[end] for end in (0, -1)]
+        if 0 < top < PARTS - 1 and all(ends):
+            if parts is not None:
+                part = parts[top]
+                return f"{what} is {word} between {key['name']} {shown(int(part[0]))} and {shown(int(part[-1]))}."
+            best = int(cases[np.argmax(sign * values[cases])])
+            value = short(values[best], unit, 3, zero_below(name))
+            return f"{what} is {word}, {value}, at {key['name']} {shown(best)}."
+    rise = middle[-1] - middle[0]
+    if abs(rise) <= off[0] + off[-1] or rise == 0:
+        return ""
+    return f"{what} {'grows with' if rise > 0 else 'falls with growing'} {key['name']}."
 
 
 def asked_first(names: tuple, table: dict) -> tuple:
@@ -65,7 +139,7 @@ def sentence(ranks: dict, left: int = 0, moves: bool = True) -> str:
         said.append(f"least on {others[-1].key} ({percent(others[-1])})")
     why = "have not settled are included with their last values" if moves else "miss the tolerance are included"
     ended = f"; {left} cases that {why}" if left else ""
-    return f"{label(name).capitalize()} {', '.join(said)}{ended}."
+    return f"{called(name).capitalize()} {', '.join(said)}{ended}."
 
 
 def percent(one) -> str:
@@ -108,7 +182,7 @@ def scatter(found: dict, of: int, settled: bool = True, names: tuple = SPREAD) -
         low, high = (short(one, unit, 3, zero_below(name)) for one in (low, high))
         some = [f"in the {count} that have one"] * (count < most) + \
             [f"{misses} of {count} miss the tolerance and are included with their values"] * (misses > 0)
-        said.append(f"{'an' if name[0] in 'aeio' else 'a'} {label(name)} from {low} to {high}"
+        said.append(f"{'an' if name[0] in 'aeio' else 'a'} {called(name)} from {low} to {high}"
                     + (f" ({'; '.join(some)})" if some else ""))
     count = "settled" if settled else "have a value"
     whose = f"{of} random cases" if most == of else f"{most} of {of} random cases that {count}"

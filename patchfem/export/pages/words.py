@@ -1,7 +1,7 @@
 """The answer of a run in words and in the units that people read: its headline, its measures in groups."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from html import escape
 from math import ceil, inf, isfinite, log10, pi
 from types import MappingProxyType
@@ -308,3 +308,10 @@ def _value(name: str, one: dict, over: str) -> str:
     of_what = over if of_what == WHOLE_RUN else of_what
     unknown = UNKNOWN if one["error"] is None and one["value"] is not None else ""
     return f"{pair(name, one)}{unknown}{f', {of_what}' if of_what else ''}"
+
+
+def joined(sentences: Sequence) -> str:
+    """Sentences as one, with semicolons between them; "" without any."""
+    first, *others = sentences or [""]
+    said = [first, *(f"{one[0].lower() if one[1:2].islower() else one[0]}{one[1:]}" for one in others)]
+    return "; ".join(one.rstrip(".") for one in said) + "." * bool(first)

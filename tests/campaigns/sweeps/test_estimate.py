@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from scene_texts import BENCH, COULOMB, POINT, SHORT, SMALL_PATCH
 
-from patchfem.campaigns.sweeps.ask import Request, cases_of
+from patchfem.campaigns.sweeps.ask import Request, cases_of, contradictions
 from patchfem.campaigns.sweeps.asked import Asked
 from patchfem.campaigns.sweeps.estimate import ONCE, estimate
 from patchfem.campaigns.sweeps.executors import Here
@@ -31,3 +31,17 @@ def test_always_a_sweep_leaves_on_disk_about_what_it_says(tmp_path):
     sweep_into(asked, cases, Place(tmp_path / "a"), Here())
     files = [one.stat().st_size for one in (tmp_path / "a").rglob("*") if one.is_file() and one.suffix != ".html"]
     assert 0.5 < estimate(asked, cases)["disk_bytes"] / sum(files) < 2
+
+
+@pytest.mark.parametrize("more, count, of, helps", [
+    ("kinetic = 0.3\n", 64, "16 of 32 cases that were looked at", "sweep friction.kinetic too, remove it from the "),
+    ("kinetic = 0.3\n", 8, "4 of 8 cases", "sweep friction.kinetic too, remove it from the scene, or give"),
+    ("", 64, "", "")])
+def test_exact_a_contradiction_in_half_of_a_range_is_told_before_and_leaves_a_plan(more, count, of, helps):
+    """static is drawn from 0.2 to 0.4 beside kinetic = 0.3. Every 8th point of Sobol's sequence is in one half: the
+    plan once refused the whole sweep."""
+    asked = Asked(Path("a.toml"), POINT + COULOMB + more + SHORT)
+    cases = cases_of(asked, Request(["friction.static=0.2..0.4", "drive.acceleration=8 g..9 g"], None, count, True))
+    said = contradictions(asked, cases)
+    assert said.startswith(f"{of} will fail: a.toml:" if of else "") and bool(said) == bool(of) and helps in said
+    assert estimate(asked, cases)["cases"] == count

@@ -8,7 +8,7 @@ from command_line import cli
 from scene_texts import COULOMB, POINT, SHORT
 
 from patchfem.campaigns.sweeps.ranking import Share
-from patchfem.export.pages import peaks, ranked
+from patchfem.export.pages import allowed, peaks, ranked
 from patchfem.export.pages.lead import lead_of
 from patchfem.export.sweeps.page import read_table
 
@@ -120,8 +120,8 @@ def test_always_a_scatter_that_unsettled_cases_hide_is_not_told():
     assert ranked.scatter({}, 100) == ""
     some = found | {"equivalent_damping": ("1", np.array([0.1, 0.2, 0.3]), 40, 3)}  # those that stick have none
     assert ranked.scatter(some, 100).startswith("40 of 100 random cases have not settled")
-    assert ranked.scatter(some, 60).endswith("an equivalent damping from 0.1 to 0.3 (in the 40 that have one; 3 of 40 "
-                                             "miss the tolerance and are included with their values).")
+    assert ranked.scatter(some, 60).endswith("an equivalent damping ratio from 0.1 to 0.3 (in the 40 that have one; 3 "
+                                             "of 40 miss the tolerance and are included with their values).")
 
 
 def test_exact_quantiles_are_those_of_all_cases_that_have_a_value():
@@ -155,3 +155,68 @@ def test_static_cases_are_not_said_to_move():
     ranks = {"pressure_peak": [Share("contact.load", 0.8, 0.9, 0.8, 1.0)]}
     assert ranked.sentence(ranks, 3, False).endswith("; 3 cases that miss the tolerance are included.")
     assert ranked.sentence(ranks, 3).endswith("; 3 cases that have not settled are included with their last values.")
+
+
+def one(values, errors=0.0, unit="1"):
+    values = np.asarray(values, float)
+    return {"values": values, "errors": 0 * values + errors, "unit": unit}
+
+
+def drawn_table(keys, measures, **more):
+    return {"keys": keys, "measures": measures, "grid": False, "drawn": True, "tolerance": 0.01,
+            "outcome": ["steady"] * len(keys[0]["values"])} | more
+
+
+def test_exact_of_drawn_cases_the_answer_is_the_measure_that_is_asked_for_and_where_it_is_largest():
+    """A damping of 30 - 400 (mu - 0.475)^2 is largest in the case next to mu = 0.475. No case of a draw is a reference
+    for a limit: the sweep once began with how far friction.static may go from its least value."""
+    mu = np.random.default_rng(1).permutation(np.append(np.linspace(0.1, 0.6, 60), 0.475))
+    damping = 30 - 400 * (mu - 0.475)**2
+    columns = {"equivalent_damping": one(damping), "relative_displacement_amplitude": one(1 - mu / 4, unit="m")}
+    table = drawn_table([key("friction.static", mu, [f"{value:.6g}" for value in mu])], columns,
+                        first="equivalent_damping")
+    lead = lead_of(table)
+    low, high = np.quantile(damping, [0.05, 0.95])
+    assert lead.limits == allowed.Limits() and not any("may reach" in said for said in lead.sentences())
+    assert lead.answer().startswith(
+        f"Equivalent damping ratio is largest, 30, at friction.static 0.475; 90 % of the 61 random cases have an "
+        f"equivalent damping ratio from {low:.3g} to {high:.3g}, ")
+    for slope, says in ((1, "grows with"), (-1, "falls with growing")):
+        columns["equivalent_damping"] = one(2 + slope * mu)
+        assert lead_of(table).answer().startswith(f"Equivalent damping ratio {says} friction.static; 90 % of")
+    columns["equivalent_damping"] = one(np.abs(mu - 0.3) + 1)
+    assert "is least, 1" in lead_of(table).answer()
+
+
+def test_exact_of_several_keys_the_strongest_has_a_direction_that_chance_does_not_make():
+    """y = 4 a + b grows with a; noise alone has no direction."""
+    rng = np.random.default_rng(2)
+    a, b, noise = rng.random((3, 200))
+    keys = [key(name, values, [f"{value:.6g}" for value in values]) for name, values in (("a.a", a), ("b.b", b))]
+    settled = np.ones(200, bool)
+    shares = {"loop_area": [Share("a.a", 0.9, 0.9, 0.9, 0.9), Share("b.b", 0.1, 0.1, 0.1, 0.1)]}
+    for values, says in ((4 * a + b, "Loop area grows with a.a."), (b - 4 * a, "Loop area falls with growing a.a."),
+                         (noise, "")):
+        table = drawn_table(keys, {"loop_area": one(values, unit="J")})
+        assert ranked.trend(table, shares, settled) == says
+    table = drawn_table(keys, {"loop_area": one(b - 9 * (a - 0.5)**2, unit="J")})
+    low, high = map(float, ranked.trend(table, shares, settled).removeprefix("Loop area is largest between a.a ").
+                    removesuffix(".").split(" and "))
+    assert low < 0.5 < high and np.mean((a >= low) & (a <= high)) == pytest.approx(0.2, abs=0.02)
+
+
+def test_exact_too_few_settled_cases_are_no_ranking():
+    """Of 64 cases 32 failed and 31 had not settled: the answer was the amplitude of the one that had."""
+    rng = np.random.default_rng(3)
+    keys = [key(name, rng.random(64)) for name in ("a.a", "b.b")]
+    values = np.append(np.full(32, np.nan), rng.random(32))
+    table = drawn_table(keys, {"relative_displacement_amplitude": one(values, unit="m")},
+                        outcome=["failed"] * 32 + ["transient"] * 31 + ["steady"], messages={})
+    lead = lead_of(table)
+    assert lead.answer() == (
+        "Only 1 of 64 cases settled (32 failed, 31 transient), so no ranking is possible; raise drive.cycles so that "
+        "the transient cases settle and correct what the messages of the failed cases name.")
+    table = table | {"outcome": ["failed"] * 32 + ["transient"] * 32}
+    assert lead_of(table).answer().startswith("None of 64 cases settled (32 failed, 32 transient), so no ranking")
+    table = table | {"outcome": ["failed"] * 40 + ["done"] * 24}
+    assert "so no ranking is possible" not in "".join(lead_of(table).sentences())
