@@ -142,7 +142,7 @@ def recipes(tmp_path, monkeypatch):
 @pytest.mark.slow
 def test_always_the_recipe_of_tilts_runs_and_every_page_allows_what_it_says(recipes):
     tilt = recipes("how much tilt may I allow")
-    angle, gap = re.search(r"\nTilt may reach (\S+ mrad) \((\S+ um over the patch), between cases at 0.1 and 0.32 "
+    angle, gap = re.search(r"^Tilt may reach (\S+ mrad) \((\S+ um over the patch), between cases at 0.1 and 0.32 "
                            r"mrad\) before relative displacement amplitude, absolute acceleration peak, slip "
                            r"amplitude, loop area or friction force peak changes by 5 % \(loop area first",
                            tilt).groups()

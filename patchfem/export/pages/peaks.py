@@ -1,5 +1,6 @@
 """Where a swept frequency has its peak: its place, height and half-power width for each value of the other keys."""
 
+from collections.abc import Callable
 from html import escape
 from typing import NamedTuple
 
@@ -16,6 +17,7 @@ HEIGHTS = ("relative_displacement_amplitude", "absolute_acceleration_peak")
 LEAST = 5  # frequencies that show a peak
 SURE = 3.0  # times what polynomials differ by
 NEWTON = 30  # steps from a vertex, or a straight line's crossing
+NAMED = 4  # values of another key in the sentence
 KNOWN = 0.01  # of a steady estimate, up to which it tells the height of a peak
 
 
@@ -133,22 +135,52 @@ def sentence(peaks: list) -> str:
 
 
 def edge(keys: list, measures: dict, trusted: dict, grid: bool) -> str:
-    """That the largest value of all cases stands at an end of the swept frequencies, so that it may be larger beyond;
-    "" where it does not. Arguments as of `allowed.allowed`."""
+    """That the largest value of all cases, or of those with some values of the other keys, stands at an end of the
+    swept frequencies, so that it may be larger beyond; "" where none does. Arguments as of `allowed.allowed`."""
     key = next((one for one in keys if one["name"] in KEYS and not one["words"]), None)
     name = next((one for one in HEIGHTS if one in measures), None)
     if key is None or name is None or (len(keys) > 1 and not grid):
         return ""
-    height, frequency = _heights(name, measures, trusted)[0], np.asarray(key["values"], float)
-    if np.unique(frequency[np.isfinite(height)]).size < LEAST or not np.nanmax(height) > zero_below(name):
+    height, others = _heights(name, measures, trusted)[0], [one for one in keys if one is not key and varies(one)]
+    tops = [top for line in lines_of(key, others)
+            if (top := _end(line, height, np.asarray(key["values"], float), zero_below(name))) is not None]
+    if not tops:
         return ""
-    top = int(np.nanargmax(height))
-    if np.nanmin(height) > (1 - KNOWN) * height[top] or frequency[top] not in (frequency.min(), frequency.max()):
-        return ""
-    place = ", ".join(f"{one['name']} {one['texts'][top] if one['words'] else shown_of(one)(top)}" for one in keys
-                      if varies(one))
-    return (f"The largest {label(name)}, {short(height[top], measures[name][2], 4)}, lies at {place}, at the edge of "
-            "the swept frequencies; it may be larger outside this range.")
+    best = max(tops, key=lambda top: height[top])
+    if height[best] < np.nanmax(height):
+        return (f"With {_levels(others, tops)} the largest {label(name)} lies at the edge of the swept frequencies; it "
+                "may be larger outside this range.")
+    place, rest = ", ".join(f"{one['name']} {_level(one)(best)}" for one in keys if varies(one)), \
+        [top for top in tops if top != best]
+    more = f"; with {_levels(others, rest)} the largest value lies at the edge too" if rest else ""
+    return (f"The largest {label(name)}, {short(height[best], measures[name][2], 4)}, lies at {place}, at the edge of "
+            f"the swept frequencies; it may be larger outside this range{more}.")
+
+
+def _end(line: np.ndarray, height: np.ndarray, frequency: np.ndarray, zero: float) -> int | None:
+    """The case of a line that has its largest value where that is at an end of its frequencies, else None."""
+    line = line[np.isfinite(height[line])]
+    if line.size < LEAST or not height[line].max() > zero:
+        return None
+    top = int(line[np.argmax(height[line])])
+    flat = height[line].min() > (1 - KNOWN) * height[top]
+    return None if flat or frequency[top] not in (frequency.min(), frequency.max()) else top
+
+
+def _level(key: dict) -> Callable:
+    """A function from a case to the value of a key in it, as people read it."""
+    return key["texts"].__getitem__ if key["words"] else shown_of(key)
+
+
+def _levels(others: list, cases: list) -> str:
+    """What the other keys are in some cases: of one key its values, of more keys the first combination."""
+    if len(others) == 1:
+        shown = [_level(others[0])(case) for case in cases]
+        told = shown if len(shown) <= NAMED else [*shown[:NAMED - 1], f"{len(shown) - NAMED + 1} other values"]
+        *first, last = told
+        return f"{others[0]['name']} {', '.join(first)}{' and ' * bool(first)}{last}"
+    more = f" and {len(cases) - 1} other combination{'s' * (len(cases) > 2)}" if len(cases) > 1 else ""
+    return ", ".join(f"{one['name']} {_level(one)(cases[0])}" for one in others) + more
 
 
 def _lost(peaks: list, others: bool) -> str:

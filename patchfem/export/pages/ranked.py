@@ -137,8 +137,10 @@ def sentence(ranks: dict, left: int = 0, moves: bool = True) -> str:
     said += [f"then on {one.key} ({percent(one)})" for one in others[:NAMED - 1]]
     if len(others) >= NAMED:
         said.append(f"least on {others[-1].key} ({percent(others[-1])})")
-    why = "have not settled are included with their last values" if moves else "miss the tolerance are included"
-    ended = f"; {left} cases that {why}" if left else ""
+    one = left == 1
+    why = f"ha{'s' if one else 've'} not settled {'is' if one else 'are'} included with {'its' if one else 'their'} " \
+        f"last value{'s' * (not one)}" if moves else f"miss{'es' * one} the tolerance {'is' if one else 'are'} included"
+    ended = f"; {left} case{'s' * (not one)} that {why}" if left else ""
     return f"{called(name).capitalize()} {', '.join(said)}{ended}."
 
 
@@ -174,14 +176,16 @@ def scatter(found: dict, of: int, settled: bool = True, names: tuple = SPREAD) -
     there are none."""
     said, most = [], max((found[name][2] for name in names if name in found), default=0)
     if most and most < SETTLED * of:
-        missed = "have not settled within the tolerance" if settled else "have no value"
+        why = "not settled within the tolerance" if settled else "no value"
+        missed = f"{'has' if of - most == 1 else 'have'} {why}"
         return (f"{of - most} of {of} random cases {missed}, perhaps those with the largest motion, so the scatter of "
                 "the results is not known.")
     for name in [name for name in names if name in found]:
         unit, (low, _, high), count, misses = found[name]
         low, high = (short(one, unit, 3, zero_below(name)) for one in (low, high))
         some = [f"in the {count} that have one"] * (count < most) + \
-            [f"{misses} of {count} miss the tolerance and are included with their values"] * (misses > 0)
+            [f"{misses} of {count} miss the tolerance and are included with their values" if misses > 1 else
+             f"1 of {count} misses the tolerance and is included with its value"] * (misses > 0)
         said.append(f"{'an' if name[0] in 'aeio' else 'a'} {called(name)} from {low} to {high}"
                     + (f" ({'; '.join(some)})" if some else ""))
     count = "settled" if settled else "have a value"

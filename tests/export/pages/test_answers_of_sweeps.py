@@ -61,8 +61,22 @@ def test_exact_a_largest_value_on_the_edge_of_the_swept_frequencies_is_told():
 
     assert edge(130, 121) == (
         f"The largest relative displacement amplitude, {1e6 * curve(120, 121, 0.02):.4g} um, lies at drive.frequency "
-        "120 Hz, drive.acceleration 2 g, at the edge of the swept frequencies; it may be larger outside this range.")
+        "120 Hz, drive.acceleration 2 g, at the edge of the swept frequencies; it may be larger outside this range; "
+        "with drive.acceleration 1 g the largest value lies at the edge too.")
     assert edge(100, 95) == ""
+    assert edge(100, 150) == (
+        "With drive.acceleration 2 g the largest relative displacement amplitude lies at the edge of the swept "
+        "frequencies; it may be larger outside this range.")
+
+
+def test_exact_every_level_that_peaks_at_the_edge_is_named():
+    """Of four levels the first peaks inside, highest; the others rise up to the end."""
+    x, name, levels = np.linspace(80, 120, 41), "relative_displacement_amplitude", ("1 g", "3 g", "5 g", "7 g")
+    keys = [key("drive.frequency", np.tile(x, 4)),
+            key("drive.acceleration", np.repeat([1.0, 3, 5, 7], 41), [one for one in levels for _ in x])]
+    values = np.concatenate([curve(x, 100, 0.02), *(curve(x, 150 + k, 0.02) for k in range(3))])
+    said = peaks.edge(keys, {name: (values, 0 * values, "m")}, {name: np.ones(164, bool)}, True)
+    assert said.startswith("With drive.acceleration 3 g, 5 g and 7 g the largest relative displacement amplitude lies")
 
 
 def test_always_a_peak_at_an_end_is_none_and_a_side_that_stays_up_has_no_width():
@@ -154,6 +168,8 @@ def test_static_cases_are_not_said_to_move():
     """Of patches that only miss the tolerance nothing has to settle."""
     ranks = {"pressure_peak": [Share("contact.load", 0.8, 0.9, 0.8, 1.0)]}
     assert ranked.sentence(ranks, 3, False).endswith("; 3 cases that miss the tolerance are included.")
+    assert ranked.sentence(ranks, 1, False).endswith("; 1 case that misses the tolerance is included.")
+    assert ranked.sentence(ranks, 1).endswith("; 1 case that has not settled is included with its last value.")
     assert ranked.sentence(ranks, 3).endswith("; 3 cases that have not settled are included with their last values.")
 
 
