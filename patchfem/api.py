@@ -237,7 +237,7 @@ class SweepPlots:
         does not contain.
         """
         if not hasattr(dataset, "coords") or not any(str(name).endswith("_error") for name in dataset):
-            raise PatchfemError("plot.sweep: give the Dataset that pf.sweep returns, with measures and their errors")
+            raise PatchfemError("plot.sweep: a Dataset returned by pf.sweep is needed, with measures and their errors")
         figure = swept.draw.figure(dataset, measure, onto=ax)
         return figure.axes[0] if ax is None else ax
 
@@ -250,7 +250,7 @@ class SweepPlots:
         """
         ways = [way for way in backbones.WAYS if f"{way.replace('-', '_')}_amplitude" in getattr(dataset, "coords", ())]
         if not ways:
-            raise PatchfemError("plot.backbone: give a Dataset of pf.backbone that contains at least one curve"
+            raise PatchfemError("plot.backbone: a Dataset returned by pf.backbone is needed, with at least one curve"
                                 + "".join(f"; {why}" for why in [getattr(dataset, "attrs", {}).get("missing")] if why))
         curves = {way: SimpleNamespace(**{name: dataset[f"{way.replace('-', '_')}_{name}"].values
                                           for name in backbone_files.COLUMNS}) for way in ways}
