@@ -108,7 +108,7 @@ def test_exact_modal_mass_and_shares_of_a_force_at_its_own_place():
     found = of_drive({"time": TIME, "force": force, "acceleration": response}, None, None, (0, np.inf))
     assert found.mass == pytest.approx(1 / 1.2, rel=1e-6)
     np.testing.assert_allclose(found.rows["output"], [1, np.sqrt(0.5)], rtol=1e-6)
-    assert "widen the peak at 143 Hz" in found.notes[0] and "0.004, and this value is written" in found.notes[0]
+    assert "widen the peak at 143 Hz" in found.notes[0] and "0.004, and the value from the whole" in found.notes[0]
 
 
 def test_exact_the_base_tells_shares_and_no_mass():

@@ -115,7 +115,7 @@ def test_exact_check_says_of_a_profile_what_the_run_warns_of(tmp_path):
     x = np.linspace(0, 13e-3, 131)
     rows = "".join(f"{1e3 * a},{1e6 * (1e-4 * a + 2e-7 * np.cos(900 * a))}\n" for a in x)
     code, lines = checked(tmp_path, PROFILE, "p.csv", f"x [mm],z [um]\n{rows}")
-    assert code == 0 and "adds -6.5 mm to x" in lines[0] and "was subtracted; to include a tilt" in lines[1], lines
+    assert code == 0 and "adds -6.5 mm to x" in lines[0] and "from the heights; to include a tilt" in lines[1], lines
     answer = json.loads(cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out", "--no-page", "--json").out)
     told = [text for text in (*answer["warnings"], *answer["notes"]) if "p.csv" in text]
     assert lines == [f"note: {text}" for text in told]

@@ -353,7 +353,7 @@ def test_placebos_are_whole_fits_of_their_own(tmp_path):
     (["--placebo", "structure.mode.axial.damping=0.01,0.2"], "already fits this key"),
     (["--placebo", "drive.frequency=140 Hz"], "the rows of the file give the drive"),
     (["--placebo", "structure.mode.axial.slide=1,x"], "a plain number is needed"),
-    (["--leave-out", "input"], "no rows remain"), (["--unstable", "maybe"], "unstable")])
+    (["--leave-out", "input"], "leaves no rows"), (["--unstable", "maybe"], "unstable")])
 def test_refuses_options_that_rows_do_not_have(tmp_path, words, said):
     given = ["fit", str(scene_of(tmp_path, LINEAR).path), "--to", str(table(tmp_path, linear_rows())), "--free",
              *LINEAR_FREE, "-o", str(tmp_path / "out"), *words]
