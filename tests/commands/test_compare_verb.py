@@ -216,5 +216,7 @@ def test_exact_a_told_shift_is_a_length(files, tmp_path, no_page):
     found = json.loads(cli("compare", *files[:2], "--shift", f"{files[2].shift / UM:.1f} um", "--json", "-o",
                            tmp_path / "out").out)
     assert found["reference"] == "place" and found["shift"]["value"] == pytest.approx(files[2].shift, abs=0.02 * UM)
+    answer = cli("compare", *files[:2], "--shift", f"{files[2].shift / UM + 300:.1f} um", "-o", tmp_path / "out")
+    assert "not available; at the given shift of" in answer.out
     answer = cli("compare", *files[:2], "--shift", "0", "-o", tmp_path / "out")
     assert answer.code == 2 and "compare --shift: '0' is a bare number without a unit" in answer.err

@@ -19,6 +19,7 @@ from .place import Match
 from .ratios import BEYOND, Size, at_step, bridged, likeness, loose, of_noise, ratio, scattered, size_along, size_of
 from .registration import Registration, gain_of, register
 from .same import Place, found_place
+from .shallow import on_flanks, shallow_of
 from .specks import without_specks
 from .tracks import Tracks, beside_flanks, of_flanks, pieces_of, tracks_of
 
@@ -42,6 +43,7 @@ class Comparison:
     other order alone; tracks; carried: what carries the registration, None without one; hidden: what a wedge may hide;
     removed: heights missing or left out in each; mirrored, turned: whether one trace was, for the registration; gain:
     heights after over before where they differ by one factor, None where not. change: of two scans, place by place.
+    visible [m]: depth from which a track would have been found where none is shown, None where that is not known.
     """
 
     before: Profile | Areal
@@ -69,6 +71,7 @@ class Comparison:
     turned: bool = False
     gain: float | None = None
     change: Change | None = None
+    visible: float | None = None
 
     @property
     def values(self) -> dict:
@@ -142,7 +145,11 @@ def _placed(place: Place, direction: str, band: tuple, removed: tuple) -> Compar
     before, after, found = place.before, place.after, place.found
     if identical(before, after):  # but for round-off the fit finds no shift and no tilt
         found = replace(found, shift=0.0, slope=0.0)
-    by = carried(found)
+    by, visible = carried(found), None
+    if not by.by and not raised(found):
+        visible = shallow_of(found)
+        if visible is not None and visible.span is not None:
+            found, by = on_flanks(found, visible.span)
     hidden = hidden_wear(found, by)
     notes, step = _steps(before, after)
     gain = gain_of(found) if not (by.by or raised(found)) else None
@@ -150,6 +157,8 @@ def _placed(place: Place, direction: str, band: tuple, removed: tuple) -> Compar
     worn, tracks = worn_depth.of_registration(found), Tracks(())
     if by.by:
         tracks = tracks_of(found, worn_depth.neighbours(found), band[1])
+        if found.track is not None:  # no single height stands out, only the floor does
+            worn = replace(worn, largest=tracks.sizes["depth_floor"]._replace(text=worn_depth.MAX))
     else:
         worn = worn_depth.nowhere("no part of the traces is known to be unworn, so uniform, wedge-shaped or bow-shaped "
                                   "wear cannot be told from no wear", worn.deposited if raised(found) else 0.0)
@@ -166,7 +175,8 @@ def _placed(place: Place, direction: str, band: tuple, removed: tuple) -> Compar
     grew = worn.deposited > (worn.area.high or 0.0) and not (worn.mean.low or 0.0) > 0
     return Comparison(before, after, direction, "place", place.match, around(found.shift, found.errors[2], "m", SHIFT),
                       stretch, around(found.slope, found.errors[1], "rad", TILT), worn, *ratios, None, sizes[0], found,
-                      None, tuple(notes), grew, tracks, by, hidden, removed, place.mirrored, place.turned, gain)
+                      None, tuple(notes), grew, tracks, by, hidden, removed, place.mirrored, place.turned, gain,
+                      visible=None if visible is None or by.by else visible.least)
 
 
 def _apart(place: Place, direction: str, band: tuple, removed: tuple) -> Comparison:

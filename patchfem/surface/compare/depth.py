@@ -83,7 +83,10 @@ def extent_of(found: Registration, together: float) -> Extent | None:
     together: how many neighbouring heights err alike.
     """
     rest = np.asarray(found.rest)
-    ends = [edge(rest, found.loudest, together), edge(rest[::-1], found.loudest, together)]
+    if found.track is None:
+        ends = [edge(rest, found.loudest, together), edge(rest[::-1], found.loudest, together)]
+    else:
+        ends = [found.track[0], tuple(rest.size - 1 - k for k in (found.track[1][0], *found.track[1][:0:-1]))]
     if None in ends:
         return None
     x, last = found.x, rest.size - 1
@@ -116,7 +119,10 @@ def summed(found: Registration, inside, deposits: bool = True) -> tuple:
     scatter = np.where(off < DEPOSIT * found.noise, np.maximum(off, found.noise), found.noise)  # or the tail of noise
     moved = max(float(weight @ found.gradient @ found.doubt) ** 2 - 4 * float(pull @ found.covariance @ pull), 0.0)
     error = float(np.sqrt(pull @ found.covariance @ pull + moved + ((width[far] * scatter) ** 2).sum()))
-    slight = ((rest > REACH * found.noise) & (rest < 2 * REACH * found.noise)).sum() / found.used.sum()
+    slight = (rest > REACH * found.noise) & (rest < 2 * REACH * found.noise)
+    if found.track is not None:  # its heights are counted as worn
+        slight[found.track[0][0]:found.track[1][0] + 1] = False
+    slight = slight.sum() / found.used.sum()
     error = float(np.hypot(error, SLIGHT * slight * found.noise * length))
     error = max(error, 0.1 * found.noise * float(np.sqrt((width**2).sum())))  # digits, where no height is worn
     area = area if abs(area) > 1e-6 * found.noise * length else 0.0

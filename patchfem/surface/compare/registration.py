@@ -43,7 +43,8 @@ class Registration:
     stretch: length of the second over that of the first, less one, its standard deviation, and whether it was taken out
     of rest; doubt: change of offset, slope and shift where the deeper half of the unworn heights alone makes the fit,
     as slight wear of the higher half would bring it about; bend [m]: sag of the second against the first in the middle
-    of the trace that was taken out, 0 where none was.
+    of the trace that was taken out, 0 where none was; track: first and last sample of a track that is shallower than
+    the noise, each with the lowest and highest likely (`shallow`), None without one.
     """
 
     shift: float
@@ -59,6 +60,7 @@ class Registration:
     stretch: tuple
     doubt: np.ndarray
     bend: float = 0.0
+    track: tuple | None = None
 
     @property
     def errors(self) -> tuple:

@@ -56,13 +56,14 @@ def tracks_of(found: Registration, together: float, longest: float) -> Tracks:
     """Tracks of a registration: runs of worn heights longer than three of the longest waves [m], hardly any unworn.
 
     A height of a run counts as worn where the median of five is deeper than 2.5 deviations. Edges are those of
-    `extent.edge`. Tops that wore off stand between unworn valleys and are no track. together: how many neighbouring
-    heights err alike.
+    `extent.edge`. Tops that wore off stand between unworn valleys and are no track. A shallow track
+    that the registration has (`shallow`) is the one. together: how many neighbouring heights err alike.
     """
     rest, noise = np.asarray(found.rest), found.noise
     runs = runs_of(median_of_five(rest / found.scatter) > REACH)
     spans = tuple((a, b) for a, b in runs if found.x[b] - found.x[a] > LONG * longest
-                  and (rest[a:b + 1] <= REACH * noise).mean() < UNWORN)
+                  and (rest[a:b + 1] <= REACH * noise).mean() < UNWORN) if found.track is None else \
+        (tuple(end[0] for end in found.track),)
     valley = _valley(found, spans, longest)
     if not spans:
         return Tracks((), valley=valley)
@@ -83,7 +84,10 @@ def _ends(found: Registration, span: tuple, around_it: tuple, together: float) -
         part, places = (one[side] if text is FROM else one[side][::-1] for one in (rest, x))
         deep = np.flatnonzero(part[:max(outside - MEDIAN, 0)] > 2 * REACH * found.noise)
         beside = int(deep[-1]) + 1 if deep.size else 0  # other worn places do not count
-        at = edge_near(part[beside:], outside - beside, found.loudest, together)
+        if found.track is not None:
+            beside, at = 0, found.track[0] if text is FROM else [rest.size - 1 - k for k in found.track[1]]
+        else:
+            at = edge_near(part[beside:], outside - beside, found.loudest, together)
         half = (places[0] - places[1]) / 2  # an edge lies between the last unworn sample and the first worn one
         value, *ends = (float(places[beside + k] + half) for k in at)
         out.append(Quantity(value, min(ends), max(ends), "m", text))

@@ -9,6 +9,7 @@ from ..quantity import SIDE, Quantity
 from ..scans import change as scans
 from .carried import may_hide, told
 from .compare import Comparison, compared_files, directions_of, identical
+from .shallow import would_show
 
 EXCHANGED, ELSEWHERE = scans.GREW, scans.ELSEWHERE
 DEPOSITED = 0.05  # of the worn area, what may stand above without a word
@@ -61,7 +62,7 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
         out.insert(0, "The heights of both scans are the same; was the same file given twice?")
     for one, word, name in zip(parts, words, names):
         if not isinstance(one.before, Areal):
-            out += [*_variant(one, name), _worn(one, name), *_reference(one)]
+            out += [*_variant(one, name), *_no_place(one, name), _worn(one, name), *_reference(one)]
         if one.sizes or not isinstance(one.before, Areal):
             out += [_amplitude(one.amplitude_ratio, word, name), _slope(one.slope_ratio, name), *_gain(one, name)]
         else:
@@ -138,6 +139,13 @@ def _elsewhere(one: Comparison) -> bool:
     return isinstance(one.before, Profile) and one.registration is None
 
 
+def _no_place(one: Comparison, name: str) -> list:
+    """Why two traces have no place in common, as a sentence; `_worn` says it where no worn depth is known."""
+    if not _elsewhere(one) or one.worn.mean.value is None:
+        return []
+    return [f"Comparison place by place{name}: not available; {one.shift.reason}."]
+
+
 def _over(parts: list) -> str:
     """What was mirrored or turned over, for the headline."""
     names = [word for word, any_one in (("mirrored", any(one.mirrored for one in parts)),
@@ -168,7 +176,8 @@ def _worn(one: Comparison, name: str) -> str:
                  f" {1e12 * one.worn.deposited:.3g} um^2 of material lie above the first trace (before wear): there "
                  "are deposits or pile-up.")
     if one.reference == "place" and not one.carried.by:
-        return f"Worn depth{name}: none shown.{above} {may_hide(one.registration, one.hidden)}"
+        seen = "" if one.visible is None else f" {would_show(one.visible)}"
+        return f"Worn depth{name}: none shown.{above}{seen} {may_hide(one.registration, one.hidden)}"
     if mean.value is None:
         text = f"Worn depth{name}: not available; {mean.reason}."
         if one.abbott is not None and one.abbott.value is not None:
