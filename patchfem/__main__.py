@@ -56,6 +56,7 @@ if "importlib.metadata" not in sys.modules:
 import _thread
 import atexit
 import threading
+from difflib import get_close_matches
 from errno import ENAMETOOLONG
 from pathlib import Path
 from typing import Annotated, Literal
@@ -107,6 +108,14 @@ def first_screen() -> str:
             shown = f"  patchfem {verb} {example}"
             lines += [f"{shown:<45}  {what}"] if len(shown) <= 45 else [shown, f"{'':47}{what}"]
     return "\n".join([*lines, "", "`patchfem run --help` explains a verb; `--install-completion` adds completion."])
+
+
+def _unexpected(verb: str, left: list) -> str:
+    """What is said of words that a verb does not take, or of a verb that there is not."""
+    if verb in VERBS or verb in app:
+        return f"unexpected '{' '.join(left)}'; see `patchfem {verb} --help`"
+    near, what = get_close_matches(verb, VERBS, 1), "option" if verb.startswith("-") else "verb"
+    return f"unknown {what} '{verb}'; {f'did you mean `{near[0]}`? ' if near else ''}see `patchfem --help`"
 
 
 def known(words: list) -> None:
@@ -188,7 +197,7 @@ def _guarded(words: list, before=lambda: None) -> int:
         return 0
     except (Refused, CycloptsError) as error:
         left = getattr(error, "unused_tokens", None)
-        said = f"unexpected '{' '.join(left)}'; see `patchfem {words[0]} --help`" if left else str(error)
+        said = _unexpected(words[0], left) if left else str(error)
         say(plain(f"patchfem: {' '.join(said.split())}"))
         return 2
     except Ended as end:

@@ -68,7 +68,7 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
         if model.rig is not None and model.rig.stuck is not None:
             model = joint.freed(model, patch)
             what = replace(what, model=model)
-        warnings += [*patch_result.strained(model.patch, patch), *patch.notes]
+        warnings += patch_result.strained(model.patch, patch)
         if estimate and coarse[0] is None:
             fewer = "split the elements of contact.mesh" if model.patch.mesh else "leave out contact.element_size"
             warnings.append(f"the {patch.x.size - 1} elements along the interface are too few for an estimate of the "

@@ -7,12 +7,14 @@ import numpy as np
 from ..core import PatchfemError, frozen_array, say
 from .profile import Profile
 
+FITS = "the trace is as long as the patch"  # what is said of such a trace is a note, no warning
+
 
 def placed(profile: Profile, x: np.ndarray, how: str = "auto") -> Profile:
     """The part of a trace over a patch with nodes x (m,) [m], in the coordinate of the patch.
 
     how: "own": the file's x is the patch coordinate (0 in the middle); "centred": the middle of the trace comes to the
-    middle of the patch; "auto": own where the trace covers the patch so, else centred, which a note says. What is
+    middle of the patch; "auto": own where the trace covers the patch so, else centred, which is said. What is
     missing at its ends is not counted as trace. Up to half an element may be short at either end. PatchfemError with
     both lengths where the trace does not cover the patch.
     """
@@ -25,7 +27,10 @@ def placed(profile: Profile, x: np.ndarray, how: str = "auto") -> Profile:
     shift, notes = 0.0, profile.notes
     if how == "centred" or (how == "auto" and not _covers(there, x)):
         shift = float(x[0] + x[-1] - there[0] - there[-1]) / 2
-        if how == "auto":
+        if how == "auto" and abs(np.ptp(there) - np.ptp(x)) <= sum(_slack(x)):
+            notes += (f"{profile.source}: {FITS}, {say(np.ptp(x))}, and is centred on it, which adds {say(shift)} to "
+                      "x",)
+        elif how == "auto":
             notes += (f"{profile.source}: x from {say(there[0])} to {say(there[-1])} does not cover the patch, "
                       f"{say(x[0])} to {say(x[-1])}: the trace is centred on the patch, which adds {say(shift)} to x",)
     there = there + shift

@@ -191,6 +191,18 @@ def test_exact_a_crown_read_from_a_profile_is_the_crown(tmp_path):
         assert read[name] == pytest.approx(crown[name], rel=1e-5 if name != "approach" else 5e-3), name
 
 
+def test_the_half_width_is_that_of_the_outermost_contacts(tmp_path):
+    """Two round tops 6 mm apart touch: the half width spans them with their gap, the fraction does not. The trace
+    starts at 0, as a stylus file does, and is as long as the patch: that is a note."""
+    x = np.linspace(-LENGTH / 2, LENGTH / 2, 8001)
+    tables = profile(tmp_path, x + LENGTH / 2, (np.abs(x) - 3e-3) ** 2 / 2 / 0.5)
+    found = run(scene(tables, keys='load = "50 N"\nelement_size = "0.127 mm"', path=tmp_path / "scene.toml"))
+    half, share = (found.measures[name].value for name in ("contact_half_width", "contact_fraction"))
+    assert half == pytest.approx(3e-3 + share * LENGTH / 4, rel=1e-3) and 0 < share < 0.1
+    assert any("is as long as the patch" in text for text in found.extra["notes"])
+    assert not any("patch" in text for text in found.warnings)
+
+
 @pytest.mark.parametrize("on", ["upper", "lower"])
 def test_exact_a_stylus_trace_of_a_surface_is_its_gap_turned(tmp_path, on):
     """Peaks are material: the trace z presses as the gap -z does, bit for bit, whichever piece it was measured on."""

@@ -33,6 +33,7 @@ from patchfem.scene.keys.quantities import EXAMPLES, KINDS, format_si, parse
         ("180 deg", "angle", math.pi),
         ("1 µrad", "angle", 1e-6),
         ("1e-5 mm³/(N·m)", "wear coefficient", 1e-14),
+        *((f"1e-5 {unit}", "wear coefficient", 1e-14) for unit in ("mm^3/Nm", "mm3/Nm", "mm^3/N/m", "mm³/Nm")),
         ("1 1/MPa", "wear coefficient", 1e-6),
         ("0.05 N·m", "moment", 0.05),
         ("10 m/s²", "acceleration", 10.0),

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from synthetic import sine
 
 from patchfem.core import PatchfemError
-from patchfem.surface.nodes import on_nodes, placed
+from patchfem.surface.nodes import FITS, on_nodes, placed
 from patchfem.surface.profile import Profile
 
 HALF = 6.35e-3
@@ -116,6 +116,13 @@ def test_exact_centred_where_it_does_not_and_said():
     assert on_nodes(profile, EVEN) == pytest.approx(EVEN + 7.5e-3, abs=2e-15)
     assert profile.notes == ("before.csv: x from 0 um to 15 mm does not cover the patch, -6.35 mm to 6.35 mm: the "
                              "trace is centred on the patch, which adds -7.5 mm to x",)
+
+
+def test_exact_a_trace_as_long_as_the_patch_is_centred_and_said_otherwise():
+    x = np.linspace(0, 2 * HALF, 5000)
+    profile = placed(trace(x, x), EVEN)
+    assert on_nodes(profile, EVEN) == pytest.approx(EVEN + HALF, abs=1e-14)
+    assert profile.notes == (f"before.csv: {FITS}, 12.7 mm, and is centred on it, which adds -6.35 mm to x",)
 
 
 def test_exact_coarse_samples_are_said():

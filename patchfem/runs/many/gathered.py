@@ -160,8 +160,7 @@ def _pressed(model: Model) -> _Pressed | None:
                 return None
             points = [lanes.Points(limit, few.shape, few.stiffness, model.bonds.length, model.rig.drive.acceleration)
                       for few, limit, _ in found]
-            warnings = [*model.source.remarks, *knobs_idle(model, MARCH.name), *of_patch.strained(model.patch, patch),
-                        *patch.notes]
+            warnings = [*model.source.remarks, *knobs_idle(model, MARCH.name), *of_patch.strained(model.patch, patch)]
             return _Pressed(*points, found[0][2], of_patch.measured(model, patch, coarse), warnings,
                             of_patch.left_out(model, patch, coarse), patch, numerics)
     except Exception:  # what is wrong is told by its own run

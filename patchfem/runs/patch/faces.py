@@ -159,7 +159,7 @@ def measured(model) -> dict:
 
 def warnings_of(model) -> list:
     """Warnings of the pressed patches."""
-    return together(model, lambda face: [*result.strained(face.model.patch, face.patch), *face.patch.notes,
+    return together(model, lambda face: [*result.strained(face.model.patch, face.patch),
                                          *([UNKNOWN] if face.patches[1] is None else [])])
 
 

@@ -11,6 +11,7 @@ from ...mesh.nested import plan_of
 from ...mesh.tensor import TensorGrid
 from ...model.pieces import bodies_of
 from ...model.source import placed
+from ...surface import nodes
 from ..results.patch_rows import TABLE
 from ..results.result import Result, at_rest
 from . import kept, skin
@@ -80,10 +81,11 @@ def static(what, patch, coarse, seconds, warnings, *_) -> Result:
 
 
 def strained(asked, patch) -> list:
-    """Warnings where the answer leaves small strains, or where cells of a given size lock."""
+    """Warnings where the answer leaves small strains, or where cells of a given size lock, and those of the gap."""
     beyond = ["on a rounded end the contact reaches the point where the slope is 0.097, and beyond this point no "
               "contact is computed; lower the tilt or the load"] if beyond_gentle(patch) else []
-    return strained_by(asked, patch.pressure.sigma_n.max(initial=0.0), patch.pressure.approach, beyond)
+    return [*strained_by(asked, patch.pressure.sigma_n.max(initial=0.0), patch.pressure.approach, beyond),
+            *(text for text in patch.notes if nodes.FITS not in text)]
 
 
 def strained_by(asked, top: float, approach: float, beyond=()) -> list:
@@ -128,7 +130,8 @@ def left_out(model, patch, coarse) -> list:
     asked = model.patch
     by_forms = [side for side, body in (("lower", patch.pair.grid), ("upper", patch.pair.upper_grid))
                 if not isinstance(body, TensorGrid)]
-    out = [f"scikit-fem assembles the stiffness of the {' and the '.join(by_forms)} piece"] if by_forms else []
+    out = [text for text in patch.notes if nodes.FITS in text]
+    out += [f"scikit-fem assembles the stiffness of the {' and the '.join(by_forms)} piece"] if by_forms else []
     out += [*drawn_otherwise(patch.pair), *slender(asked, patch.pressure.load / patch.pieces.interface.weight.sum())]
     if patch.sharper and patch.averaging is not None:
         out.append("a static measure is computed on points "

@@ -17,7 +17,8 @@ ROWS = (
     Row("approach", "m", 1e-13, "distance by which the holders approach each other at x = 0, counted from the first "
                               "touch of the unloaded flat pieces",
         group="patch"),
-    Row("contact_half_width", "m", 1e-12, "half the length in contact; the edges of contact may lie between nodes",
+    Row("contact_half_width", "m", 1e-12, "half the distance between the outermost edges of contact, including gaps "
+                                          "between them; the edges may lie between nodes",
         group="patch"),
     Row("pressure_centre", "m", 1e-12, "position along x of the resultant of the pressure, relative to the middle "
                                        "of the patch",

@@ -128,7 +128,7 @@ def report_of(surface: Profile | Areal, cutoff: float | None = None, window: tup
         values += [_value(row, _ends(trace) if row.of is None else row.of(heights), found) for row in rows.WINDOW]
     shown, radius = rough or heights, surface.tip_radius if tip is None else tip
     stylus = None if radius is None else tip_check(heights, radius)
-    notes = trace.notes + _spiky(cut)
+    notes = trace.notes + _spiky(cut) + (() if roughness is None else _short(roughness, cutoff))
     return RoughnessReport(
         trace.source, "profile", trace.length, (trace.x.size,), heights.step, tuple(values), notes, form, settings,
         cutoff, window, band, stylus, reread(surface), primary, waviness, roughness, abbott(shown), shown.core,
@@ -274,6 +274,15 @@ def _spiky(surface: Profile | Areal) -> tuple:
     what, counts = (f"is a spike (at {place}),", "which counts") if found.sum() == 1 else \
         (f"are spikes (the first at {place}),", "which count")
     return (f"{surface.source}: {found.sum()} of {found.size} heights {what} {counts} in every parameter",)
+
+
+def _short(roughness: Profile, cutoff: float) -> tuple:
+    """What is to be said of a roughness profile that is shorter than one section, () where it is not."""
+    if roughness.length >= cutoff * (1 - 1e-9):
+        return ()
+    return (f"{roughness.source}: half a cut-off is trimmed at each end, and the {say(roughness.length)} that remain "
+            f"are shorter than one section of {say(cutoff)}, the least that ISO 21920 needs; do not use these "
+            "roughness parameters: evaluate a longer part, or take a shorter cut-off",)
 
 
 def _of_scan(scan: Areal, cutoff: float | None, settings: Settings, window=None) -> RoughnessReport:

@@ -28,6 +28,13 @@ def test_exact_a_window_from_the_samples_at_or_before_its_cursors(first, last, l
     assert part.x == pytest.approx(np.arange(low, high + 1) * UM)
 
 
+def test_less_than_one_section_is_said():
+    """Of 265 um a cut-off of 250 um leaves 15 um; of 500 um it leaves 250 um, one section."""
+    said = report_of(made(), 250 * UM, (468 * UM, 733 * UM)).notes
+    assert len(said) == 1 and "the 15 um that remain are shorter than one section of 250 um" in said[0]
+    assert report_of(made(), 250 * UM, (468 * UM, 968 * UM)).notes == report_of(made(), 250 * UM).notes == ()
+
+
 def test_exact_a_window_of_a_scan_and_its_spikes():
     """Heights 20 to 60 in x and 10 to 70 in y of a scan of 120 x 80; two heights far off are spikes."""
     one = scan()

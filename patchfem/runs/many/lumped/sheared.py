@@ -103,7 +103,7 @@ def _pressed(model: Model) -> Pressed | None:
             patch, *coarse = of_patch.solve_all(model.patch, model.accuracy.tolerance)
             if coarse[0] is None or patch.pressure.outcome is Outcome.NO_CONTACT:
                 return None
-            warnings = [*model.source.remarks, *of_patch.strained(model.patch, patch), *patch.notes]
+            warnings = [*model.source.remarks, *of_patch.strained(model.patch, patch)]
             numerics = choose(model)
             return Pressed(YieldingElements(model, numerics, patch), YieldingElements(model, numerics, coarse[0]),
                             of_patch.measured(model, patch, coarse), warnings,
