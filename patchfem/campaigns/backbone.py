@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from ..compiled import load
 from ..core import NotConverged, PatchfemError, Start, say
 from ..dynamics import limit_cycles
 from ..dynamics.events.elements import JOINED, cells_joined
@@ -22,9 +21,8 @@ from ..dynamics.harmonic import quasi_static
 from ..dynamics.harmonic.backbone import FreeBalance
 from ..dynamics.harmonic.forces import Group
 from ..dynamics.harmonic.harmonic import pack as harmonics_packed
-from ..dynamics.harmonic.laws import Jenkins, synthesis
+from ..dynamics.harmonic.laws import synthesis
 from ..dynamics.harmonic.point import balance_of
-from ..dynamics.march import models
 from ..effects import has, unbuilt
 from ..friction.record import loop_from
 from ..model.model import Model
@@ -35,16 +33,12 @@ from ..response.errors import OF_MODES, with_errors
 from ..runs.bench import bench
 from ..runs.bench.engine import steps_of
 from ..runs.bench.errors import errors_of
-from ..runs.bench.shear import GRAIN, STIFF
 from ..runs.joint import held_patch
-from ..runs.patch import faces
 from ..runs.patch import result as patch_result
 from ..runs.plan import plan
-from ..runs.rig import interface, numerics
+from ..runs.rig import decays, numerics
 from ..runs.rig.engines import ENGINES
 from ..runs.rig.plan import held_by
-from ..runs.rig.steady.balance import BalanceFinder
-from ..slip.grain import spread, stiffer
 from ..structure import drives
 
 WAYS = ("balance", "decay", "quasi-static")
@@ -386,22 +380,12 @@ def _rigid(model: Model) -> bool:
 
 
 def _group(joint: Joint, patch, meshed: tuple = ()) -> Group:
-    """Laws on the rows of a rig on one of its meshes; meshed: interfaces whose own patches are those on a coarser one.
-    PatchfemError where a law has no steady loop of its own."""
-    model, rig = joint.model, joint.model.rig
+    """`decays.laws_on` of the rig; PatchfemError where a law has no steady loop of its own."""
     try:
-        if len(rig.interfaces) < 2:
-            return BalanceFinder(model, replace(numerics.choose(_steady(model)), meshed=meshed), patch).group
-        load("dynamics.harmonic.cycle_kernels", None)
-        return Group(rig.modes, list(enumerate(map(models.element_model, interface.own_elements(model, meshed)))))
+        return decays.laws_on(joint.model, patch, meshed)
     except PatchfemError:
-        benched = not rig.bends and len(rig.interfaces) < 2
+        benched = not joint.model.rig.bends and len(joint.model.rig.interfaces) < 2
         raise PatchfemError(UNKNOWN + "; use --method quasi-static" * benched) from None
-
-
-def _steady(model: Model) -> Model:
-    """The model with the method left to the program."""
-    return replace(model, accuracy=model.accuracy.model_copy(update={"method": "auto"}))
 
 
 def _in_space(joint: Joint, read) -> np.ndarray:
@@ -417,34 +401,14 @@ def _in_space(joint: Joint, read) -> np.ndarray:
     fine = _group(joint, joint.patch)
     best = read(fine)
     if soft:
-        rough = [(0, _group(joint, joint.coarse))] if joint.coarse is not None else []
-        rough += [(one[0], _group(joint, None, one)) for one in faces.meshed(model)]
-        apart = 0.0
-        for k, other in rough:
-            stiff = stiffer(float(fine.stiffness()[k]), float(other.stiffness()[k]))
-            apart = apart + np.fmax(np.abs(read(other) - best), STIFF * np.abs(read(_remade(fine, stiff)) - best))
-        error = error + np.fmax(GRAIN * np.abs(read(_remade(fine, _spread)) - best), apart)
+        error = error + decays.mesh_error(fine, decays.rough_laws(model, joint.coarse), read)
     if celled:
-        apart = [np.abs(read(_remade(fine, partial(cells_joined, *one))) - best) for one in JOINED]
+        apart = [np.abs(read(fine.remade(partial(cells_joined, *one))) - best) for one in JOINED]
         gap = np.max(apart, axis=0) / CELLS
         share = (gap / np.maximum(np.abs(best), 1e-300))[:, np.isfinite(gap).all(axis=0)]
         usual = np.median(share, axis=1, keepdims=True) if share.size else 0.0
         error = error + np.maximum(gap, usual * np.abs(best))
     return error
-
-
-def _remade(group: Group, change) -> Group:
-    """The laws of a group with other elements: change(stiffness (t,) [N/m], yield slide (t,) [m]) -> both."""
-    other = group.with_samples(group.samples)
-    other.laws = [tuple(Jenkins(*change(one.stiffness, one.limit_slide)) if isinstance(one, Jenkins) else one
-                        for one in laws) for laws in group.laws]
-    return other
-
-
-def _spread(stiffness, slide) -> tuple:
-    """`slip.grain.spread` of elements in any order."""
-    order = np.argsort(slide, kind="stable")
-    return spread(stiffness[order], slide[order])
 
 
 def _free(group: Group, joint: Joint, amplitudes, harmonics: int, count=None) -> np.ndarray:
@@ -564,10 +528,7 @@ def _static(joint: Joint, amplitudes) -> Curve:
         return _on_a_bench(joint, amplitudes)
 
     def read(laws, samples: int) -> np.ndarray:
-        held = joint.modes.held(laws.rows, laws.stiffness(), joint.mode)
-        reach = abs(float(joint.modes.output @ held[1]))
-        along = joint.modes.output / float(joint.modes.output @ held[1])
-        return _rows(joint, quasi_static.along(joint.modes, laws, amplitudes / reach, held, samples, along))
+        return decays.static_rows(joint.modes, laws, joint.mode, amplitudes, samples)
 
     best = read(group, SAMPLES)
     best[0] = np.where(np.abs(best[0] / amplitudes - 1) < CLOSE, amplitudes, best[0])
@@ -598,8 +559,8 @@ def _in_closed_form(joint: Joint, amplitudes) -> Curve | None:
         found = [loop_from(model.friction, _limit(joint) / model.friction.static, float(one)) for one in slides]
         if None in found:
             return None
-        best = _rows(joint, quasi_static.through(modes, modes.interfaces[0], joint.held, slides,
-                                                 [quasi_static.Loops(*one) for one in found]))
+        best = decays.rows_of(modes, quasi_static.through(modes, modes.interfaces[0], joint.held, slides,
+                                                          [quasi_static.Loops(*one) for one in found]))
         if (np.abs(best[0] / amplitudes - 1) < CLOSE).all():
             break
         slides = slides * amplitudes / best[0]  # other shapes at the output than that of the held mode
@@ -607,12 +568,6 @@ def _in_closed_form(joint: Joint, amplitudes) -> Curve | None:
     best = np.where(at, best, np.nan)
     best[0] = amplitudes
     return _rising(best, (ROUND + CLOSE * (modes.omega.size > 1)) * np.abs(best))
-
-
-def _rows(joint: Joint, found: list) -> np.ndarray:
-    """(amplitude [m] at the output, frequency [Hz], damping, loss [J]) (4, k) of `quasi_static.Static`s."""
-    return np.array([(abs(float(joint.modes.output @ one.z)), one.omega / (2 * np.pi), one.zeta, one.loss)
-                     for one in found]).T
 
 
 def _on_a_bench(joint: Joint, amplitudes) -> Curve:
@@ -628,7 +583,7 @@ def _on_a_bench(joint: Joint, amplitudes) -> Curve:
         errors.append(quasi_static.Loops(tip[1] * slide, area[1]))
 
     def read(loops) -> np.ndarray:
-        return _rows(joint, quasi_static.through(modes, row, joint.held, slides, loops))
+        return decays.rows_of(modes, quasi_static.through(modes, row, joint.held, slides, loops))
 
     best = read(found)
     error = ROUND * np.abs(best)
@@ -656,7 +611,7 @@ def _settled(joint: Joint, slide: float, frequency: float) -> tuple:
 def _loop(joint: Joint, slide: float, frequency: float, cycles: float) -> tuple:
     """(BenchRun, its Model, its steps) of some cycles of the contact alone under a sine of amplitude `slide` [m]."""
     path = SlidePath("sine", slide, frequency, None, 0.0, cycles, None, None)
-    alone = replace(_steady(joint.model), kind="bench", rig=None, slide=path)
+    alone = replace(decays.steadily(joint.model), kind="bench", rig=None, slide=path)
     steps = steps_of(alone)
     return bench.run(alone, joint.patch, steps), alone, steps
 
@@ -674,7 +629,8 @@ def _decayed(joint: Joint, amplitudes) -> Curve:
             break
         how = how.finer()
         found = engine.run(what, how, joint.patch, 0, None, None)
-    error += reading
+    error = np.fmax(error, decays.left_by_mesh(joint.model, joint.patch, joint.coarse, amplitudes,
+                                               lambda laws: joint.mode)) + reading
     if not known.any():
         raise NotConverged("the free decay gave no frequency and damping at these amplitudes")
     return Curve(amplitudes, best[0], error[0], best[1], error[1], np.full(amplitudes.size, np.nan)).at(known)
@@ -708,7 +664,7 @@ def _come_down(joint: Joint, amplitudes) -> tuple:
 
 def released(joint: Joint, amplitude: float) -> Model:
     """The model of a joint whose mode is released at an amplitude [m] of the output."""
-    model, modes = _steady(joint.model), joint.modes
+    model, modes = decays.steadily(joint.model), joint.modes
     start = _start(joint, amplitude)
     period = 2 * np.pi / (joint.held[0] or modes.omega[joint.mode])
     rig = replace(model.rig, drive=drives.release(period), start=start, kind="free", waveform="", frequency=None,

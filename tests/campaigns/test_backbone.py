@@ -172,7 +172,7 @@ def test_amplitudes_stay_within_the_stop():
     found = backbone(stopped, methods=("decay", "quasi-static"))
     assert found.curves["quasi-static"].amplitude[-1] == pytest.approx(0.2e-3 / 1.15)
     assert 1.5e-4 < found.curves["decay"].amplitude[-1] < 0.2e-3
-    with pytest.raises(pf.PatchfemError, match=r"structure\.travel: the largest amplitude, 300 um, is larger than the"):
+    with pytest.raises(pf.PatchfemError, match=r"structure\.travel: the largest amplitude, 300 um, is larger than"):
         backbone(stopped, "", [1e-4, 3e-4])
 
 
@@ -306,7 +306,7 @@ def test_exact_a_decay_goes_on_where_the_contact_holds(two):
                                              shaken(PLASTIC.replace("1 mm", "10 um")))
     found = backbone(pf.build(text), "", a, ("decay",))
     one = found.curves["decay"]
-    assert one.amplitude.size == 13 and not any("points left out" in note for note in found.notes)
+    assert one.amplitude.size == 13 and not any("have a result" in note for note in found.notes)
     still = one.amplitude < 2e-6
     if two:
         own, shape, phi = np.array([1, 4.7]) * OMEGA, np.diag([0.004, 0.006 * 4.7]) * OMEGA, np.array([1, 0.8])
@@ -369,7 +369,7 @@ def test_always_the_mesh_is_in_the_bars_of_micro_slip():
     assert own == pytest.approx(0.002, rel=1e-9) and one.damping_error[0] > 1e-6 * one.damping[0]  # no slip is seen
     assert fine.micro == pytest.approx(3, abs=0.3) and fine.expected == 3 and coarse.micro is None
     assert any("the exponent of micro-slip cannot be determined" in note for note in coarse.notes)
-    assert any("than the frequencies by balance" in note for note in fine.notes)
+    assert any("higher than the frequencies by balance" in note for note in fine.notes)
 
 
 def test_the_held_frequency_is_that_of_the_stiffness_which_a_run_prints():

@@ -6,9 +6,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scene_texts import DRIVE, KILOGRAM, POINT, friction_of
-from scipy.integrate import solve_ivp
+from scipy.integrate import quad, solve_ivp
+from scipy.optimize import brentq
 
 import patchfem as pf
+from patchfem.campaigns.backbone import backbone
 from patchfem.response.decay_curve import curve_of, of_turns, turns
 from patchfem.runs.rig.decays import decay_of
 
@@ -126,3 +128,75 @@ def test_always_runs_that_do_not_reach_leave_an_infinite_error_and_no_warning_of
     assert np.isinf(found.damping_error).all() and np.isinf(found.frequency_error).all()
     same = decay_of(run(1.0, (run(1.0), None)))
     assert same.damping == pytest.approx(0.05, rel=1e-4) and np.isfinite(same.damping_error).all()
+
+
+CROWNED = """[contact]
+length = "40 mm"
+width = "30 mm"
+height = "15 mm"
+load = "8 kN"
+substrate = "steel"
+[contact.crown]
+radius = "5 m"
+[contact.shear]
+[friction]
+law = "coulomb"
+static = 0.2
+[structure]
+moving_mass = "2 kg"
+[[structure.mode]]
+name = "first"
+frequency = "150 Hz"
+damping = 0.002
+slide = 1.0
+output = 1.0
+[drive]
+kind = "free"
+displacement = "20 um"
+cycles = 60
+"""
+
+
+def mindlins(amplitude, stuck: float, slide: float):
+    """Damping ratio of CROWNED at amplitudes [m] of the output, its mode held at `stuck` [Hz].
+
+    A crown gives way by du/dQ = 1/K - ln(1 - Q/(mu P))/(pi E* b) under a force Q (Jaeger 1998: as under the normal load
+    P of a half-plane, whose stiffness goes with its half width a, a^2 with P), and unloads by Masing's rule."""
+    held, own = (2 * np.pi * stuck)**2, (2 * np.pi * 150)**2
+    stiffness, limit, modulus = 2.0 * (held - own) / slide**2, 0.2 * 8e3, 2.1e11 / (2 * (1 - 0.3**2))
+    soft = np.pi * modulus * 0.03
+
+    def way(q):
+        return q / stiffness + limit / soft * ((1 - q / limit) * np.log1p(-q / limit) + q / limit)
+
+    out = []
+    for one in np.atleast_1d(amplitude):
+        top = brentq(lambda q, one=one: way(q) - slide * one, 0.0, (1 - 1e-9) * limit, xtol=1e-14, rtol=1e-14)
+        lost = 4 * top * slide * one - 8 * quad(way, 0.0, top, epsabs=0.0, epsrel=1e-12)[0]
+        out.append(0.002 * np.sqrt(own / held) + lost / (2 * np.pi * 2.0 * held * one**2))
+    return np.array(out)
+
+
+@pytest.mark.parametrize("slide", [1.0, 0.03])
+def test_a_decay_holds_mindlins_damping_where_nodes_stick(slide):
+    """Of (6.3632 +- 0.0076)e-5 at 9.13 nm, where neither mesh slips, Mindlin's 2.3e-4 was no part."""
+    a = np.array([9.13e-9, 6e-8]) / slide
+    found = backbone(pf.build(CROWNED.replace("slide = 1.0", f"slide = {slide}")), "", a, ("decay",))
+    one, law = found.curves["decay"], mindlins(a, found.stuck, slide)
+    assert one.amplitude.size == a.size
+    assert (np.abs(one.damping - law) <= one.damping_error).all()
+    assert one.damping[0] == pytest.approx(0.002 * 150 / found.stuck, rel=2e-3) and law[0] > 1.01 * one.damping[0]
+    assert (np.abs(one.frequency - found.stuck) <= one.frequency_error)[0]
+    assert (one.damping_error < 0.1 * one.damping)[-1]
+
+
+def test_a_release_and_what_rings_hold_mindlins_damping():
+    result = pf.run(CROWNED)
+    decay, ring = result.extra["decay"], result.measures["ring_damping"]
+    stuck = result.measures["ring_frequency"].value
+    known = np.flatnonzero(np.isfinite(decay.damping_error))[::20]
+    law = mindlins(decay.amplitude[known], stuck, 1.0)
+    assert known.size > 20 and law.max() > 2e-4
+    assert (np.abs(decay.damping[known] - law) <= decay.damping_error[known]).all()
+    beside = mindlins(result.measures["relative_displacement_amplitude"].value, stuck, 1.0)[0]
+    assert abs(ring.value - beside) <= ring.error and beside > 1.5 * ring.value

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array
 from .harmonic import Fold
-from .laws import Track, analysis, law_of_model, synthesis
+from .laws import Jenkins, Track, analysis, law_of_model, synthesis
 
 FEWEST, MOST = 256, 65536  # samples of a cycle
 
@@ -41,6 +41,13 @@ class Group:
         """The same laws on the same rows, on a grid of `samples` per cycle."""
         other = object.__new__(Group)
         other.rows, other.laws, other.samples = self.rows, self.laws, samples
+        return other
+
+    def remade(self, change) -> "Group":
+        """The same with other elements: change(stiffness (t,) [N/m], yield slide (t,) [m]) -> both."""
+        other = self.with_samples(self.samples)
+        other.laws = [tuple(Jenkins(*change(one.stiffness, one.limit_slide)) if isinstance(one, Jenkins) else one
+                            for one in laws) for laws in self.laws]
         return other
 
     def samples_for(self, harmonics: int, amplitudes=None) -> int:

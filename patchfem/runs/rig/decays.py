@@ -1,7 +1,26 @@
-"""Frequency and damping of a released rig over its amplitude, with the errors of its coarser runs."""
+"""Frequency and damping of a released rig over its amplitude, with the errors of its coarser runs and of its mesh.
 
+Where the nodes of a mesh and of a coarser one hold, their decays are alike, and both leave out the loss of micro-slip.
+What the mesh leaves open is read off the static loops of its elements instead (`slip.grain`).
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from ...compiled import load
+from ...core import NotConverged, PatchfemError
+from ...dynamics.harmonic import forces, quasi_static
+from ...dynamics.march import models
 from ...response.decay_curve import DecayCurve, curve_of, of_turns, turns
+from ...slip.grain import spread, stiffer
+from ..bench import shear
+from ..patch import faces
+from . import interface, numerics
 from .solution import Solution
+from .steady import balance
+
+APART = 16  # amplitudes a decade at which the error of the mesh is computed
 
 
 def decay_of(raw: Solution) -> DecayCurve | None:
@@ -22,3 +41,95 @@ def decay_of(raw: Solution) -> DecayCurve | None:
 def _read(run: Solution) -> DecayCurve:
     motion = run.response
     return curve_of(of_turns(*turns(motion.time, motion.output, motion.output_rate)))
+
+
+def laws_on(model, patch, meshed: tuple = ()):
+    """The `harmonic.forces.Group` of a rig on one of its meshes; patch: of its [contact], None without; meshed:
+    interfaces whose own patches are those on a coarser one. PatchfemError where a law has no steady loop of its own."""
+    rig = model.rig
+    if len(rig.interfaces) < 2:
+        return balance.BalanceFinder(model, replace(numerics.choose(steadily(model)), meshed=meshed), patch).group
+    load("dynamics.harmonic.cycle_kernels", None)
+    return forces.Group(rig.modes, list(enumerate(map(models.element_model, interface.own_elements(model, meshed)))))
+
+
+def rough_laws(model, coarse) -> list:
+    """(number of the interface, Group) of the laws on coarser meshes; coarse: the Patch of a coarser one of its
+    [contact] or None."""
+    return [*([] if coarse is None else [(0, laws_on(model, coarse))]),
+            *((one[0], laws_on(model, None, one)) for one in faces.meshed(model))]
+
+
+def steadily(model):
+    """The model with the method left to the program."""
+    return replace(model, accuracy=model.accuracy.model_copy(update={"method": "auto"}))
+
+
+def static_rows(modes, laws, number: int, amplitudes, samples: int) -> np.ndarray:
+    """(amplitude [m], frequency [Hz], damping, loss [J]) (4, k) by a static force along the mode `number` held by laws,
+    a Group, at amplitudes (k,) [m] of the output; samples: of a cycle."""
+    held = modes.held(laws.rows, laws.stiffness(), number)
+    moved = float(modes.output @ held[1])
+    return rows_of(modes, quasi_static.along(modes, laws, amplitudes / abs(moved), held, samples,
+                                             modes.output / moved))
+
+
+def rows_of(modes, found: list) -> np.ndarray:
+    """(amplitude [m] at the output, frequency [Hz], damping, loss [J]) (4, k) of `quasi_static.Static`s."""
+    return np.array([(abs(float(modes.output @ one.z)), one.omega / (2 * np.pi), one.zeta, one.loss)
+                     for one in found]).T
+
+
+def mesh_error(fine, rough, read) -> np.ndarray:
+    """Error of what read(Group) gives by the mesh of a patch that slips part by part: what a coarser mesh changes, or
+    what the grain of its nodes or the change of its stiffness would (`slip.grain`), where that is more.
+
+    rough: of (number of the interface, Group on its coarser mesh).
+    """
+    best, apart = read(fine), 0.0
+    for k, other in rough:
+        stiff = stiffer(float(fine.stiffness()[k]), float(other.stiffness()[k]))
+        apart = apart + np.fmax(np.abs(read(other) - best), shear.STIFF * np.abs(read(fine.remade(stiff)) - best))
+    return np.fmax(shear.GRAIN * np.abs(read(fine.remade(_spread)) - best), apart)
+
+
+def _spread(stiffness, slide) -> tuple:
+    """`slip.grain.spread` of elements in any order."""
+    order = np.argsort(slide, kind="stable")
+    return spread(stiffness[order], slide[order])
+
+
+def left_by_mesh(model, patch, coarse, amplitudes, mode) -> np.ndarray:
+    """Static errors (2, k) of frequency [Hz] and damping by the mesh at amplitudes (k,) [m] of the output; 0 without a
+    patch that slips part by part, NaN where its law has no steady loop of its own.
+
+    patch, coarse: of the [contact] of the rig, None without; mode(Group) -> number of the mode.
+    """
+    rig, apart = model.rig, np.zeros((2, len(amplitudes)))
+    if not (model.soft or rig.soft):
+        return apart
+    if model.grooves is not None or rig.load_varies or rig.strips_slide_apart:
+        return apart * np.nan
+    try:
+        fine = laws_on(model, patch)
+        number = mode(fine)
+        return mesh_error(fine, rough_laws(model, coarse), lambda laws: static_rows(
+            rig.modes, laws, number, amplitudes, balance.SAMPLES)[1:3])
+    except (NotConverged, PatchfemError):
+        return apart * np.nan
+
+
+def left_by_mesh_on(found: DecayCurve, model, patch, coarse) -> np.ndarray:
+    """Errors (2, k) of `left_by_mesh` at the points of a release, of the held mode whose frequency is nearest to that
+    of the smallest amplitude."""
+    low, high = np.log10([found.amplitude.min(), found.amplitude.max()])
+    at = np.logspace(low, high, 2 + int(APART * (high - low)))
+    wide = left_by_mesh(model, patch, coarse, at, lambda laws: _mode(model.rig.modes, laws, found.frequency[-1]))
+    return np.array([np.interp(np.log(found.amplitude), np.log(at), one) for one in wide])
+
+
+def _mode(modes, laws, frequency: float) -> int:
+    """Number of the held mode that moves the output and is nearest to a frequency [Hz]."""
+    held = [modes.held(laws.rows, laws.stiffness(), k) for k in range(modes.omega.size)]
+    return int(np.argmin([abs(omega / (2 * np.pi) - frequency) if modes.output @ shape else np.inf
+                          for omega, shape in held]))

@@ -7,12 +7,11 @@ import numpy as np
 
 from ...core import Outcome, PatchfemError
 from ...model.rig import BEYOND
-from ...response import reasons, stationary
+from ...response import reasons, run_events, stationary
 from ...response.coarser import estimate, left_open
 from ...response.errors import with_errors
 from ...response.outcome import settle, without_bars
 from ...response.rows import judged
-from ...response.run_events import events_of, with_own
 from ...response.settling import slip_period
 from ...structure.drive_sizes import decay_rate, sinusoidal
 from ..patch import faces
@@ -70,6 +69,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     run = Coupled(model, numerics, patch, raw, raw.extra.get("at", rig.drive), known, measures)
     for go in (_levelled, _settled, _started, _reasoned):
         run = go(run)
+    run, decay = _decayed(run, coarse[0])
     warned, notes = remarks.warnings_of(run), remarks.notes_of(run)
     if decay_rate(rig.modes) < 0 and run.rubs:
         fluttering, more = flutter.flutter_of(run)
@@ -80,7 +80,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
         outcome = outcome_on_piece(outcome, face.model.patch, face.patch, face.slide(raw.response))
     fields = {} if patch is None else fields_of(model, numerics, patch, raw)
     return Result(what, outcome, run.measures, raw.response, raw.window, patch, fields, seconds, [*warnings, *warned],
-                  _extra(run, notes))
+                  _extra(run, notes) | ({} if decay is None else {"decay": decay}))
 
 
 def _levelled(run: Coupled) -> Coupled:
@@ -94,7 +94,7 @@ def _levelled(run: Coupled) -> Coupled:
 
 def _settled(run: Coupled) -> Coupled:
     """With its outcome, and what the run itself leaves open in the errors."""
-    found = without_errors(with_own(run.measures, run.raw.own), run.estimated)
+    found = without_errors(run_events.with_own(run.measures, run.raw.own), run.estimated)
     rig = run.model.rig
     outcome, found = settle(run.raw, found, run.model.accuracy.tolerance, run.drive, rig.level_cycles,
                             decay_rate(rig.modes))
@@ -119,6 +119,21 @@ def _reasoned(run: Coupled) -> Coupled:
         found, window, run.drive, run.rubs, rig.beside_first(window.modal)))
 
 
+def _decayed(run: Coupled, coarse) -> tuple:
+    """(The run, the curve of its decay), neither with smaller errors than the mesh leaves; of what rings in the last
+    stick the largest there. None without a release; coarse: the Patch of a coarser mesh or None."""
+    found = decays.decay_of(run.raw) if run.model.rig.kind == "free" and run.estimated else None
+    if found is None or not (run.model.soft or run.model.rig.soft):
+        return run, found
+    mesh = decays.left_by_mesh_on(found, run.model, run.patch, coarse)
+    sticks = run_events.spans_of(run.raw.window, run.drive, run.raw.log, run.raw.held)
+    late = np.nan_to_num(mesh[:, found.time >= sticks[-1][0]] if sticks else mesh[:, :0]).max(axis=1, initial=0.0)
+    rings = {name: replace(one, error=max(one.error, float(least))) for name, least in
+             zip(("ring_frequency", "ring_damping"), late) if (one := run.measures.get(name)) and one.error is not None}
+    return replace(run, measures=run.measures | rings), found._replace(
+        frequency_error=np.fmax(found.frequency_error, mesh[0]), damping_error=np.fmax(found.damping_error, mesh[1]))
+
+
 def _judged(run: Coupled) -> Coupled:
     """With the final floors of its measures; a steady motion that does not exist has none."""
     found = judged(run.measures, run.model.accuracy.tolerance)
@@ -141,7 +156,7 @@ def _extra(run: Coupled, notes: list) -> dict:
     if rig.soft and raw.snapshots and "faces" in raw.snapshots[0]:
         out["shots"] = raw.snapshots
     if run.rubs:
-        out["events"] = events_of(raw.window, run.drive, raw.log, raw.held)
+        out["events"] = run_events.events_of(raw.window, run.drive, raw.log, raw.held)
     reduced = getattr(raw.contact, "reduction", None)
     if reduced is not None:
         out["elements" if hasattr(reduced, "yield_slide") else "shear_modes"] = int(np.size(reduced.stiffness))
@@ -150,8 +165,6 @@ def _extra(run: Coupled, notes: list) -> dict:
     if rig.waveform == "random":
         out["spectra"] = stationary.spectra(raw.window, rig.drive)
         notes = [*notes, *stationary.short(run.measures, raw.window)]
-    if rig.kind == "free" and run.estimated and (decay := decays.decay_of(raw)) is not None:
-        out["decay"] = decay
     return out | {"still_rings": run.rings.remedies, "book": raw.book, "period": run.drive.period, "notes": notes}
 
 
