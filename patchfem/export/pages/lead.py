@@ -131,13 +131,15 @@ def span(measures: dict, trusted: dict, settled: np.ndarray, names: Sequence = F
         values, errors, unit = (part if isinstance(part, str) else np.asarray(part, float)[there]
                                 for part in measures[name])
         low, high = (short(one, unit, 4, zero_below(name)) for one in (values.min(), values.max()))
-        ran = f"is {high} throughout" if low == high else f"ranges from {low} to {high}"
+        alike = there.sum() > 1  # of one case nothing runs
+        ran = f"ranges from {low} to {high}" if low != high else f"is {high} throughout" if alike else f"is {high}"
         known = np.isfinite(errors) & (errors > 0) & (np.abs(values) > zero_below(name))  # 0 is known absolutely
         share = float(np.max(errors[known] / np.abs(values[known]))) if known.any() else 0.0
         band = f", with errors of at most {plain(100 * share, 1)} %" if share > EXACT else ""
         counts, ended = there.sum(), (every & settled).sum()
-        whose = "" if counts == every.sum() else " of the settled cases" if counts == ended else \
-            " in the cases that meet the tolerance"
+        whose = "" if counts == every.sum() else \
+            f" of the {'only settled case' if counts == 1 else 'settled cases'}" if counts == ended else \
+            f" in the {'only case that meets' if counts == 1 else 'cases that meet'} the tolerance"
         return f"{ranked.called(name).capitalize()}{whose} {ran}{band}."
     return ""
 

@@ -232,6 +232,8 @@ def test_exact_too_few_settled_cases_are_no_ranking():
     assert lead.answer() == (
         "Only 1 of 64 cases settled (32 failed, 31 transient), so no ranking is possible; raise drive.cycles so that "
         "the transient cases settle and correct what the messages of the failed cases name.")
+    assert lead.span.startswith("Relative displacement amplitude of the only settled case is ")
+    assert "throughout" not in lead.span and lead.span in lead.sentences()
     table = table | {"outcome": ["failed"] * 32 + ["transient"] * 32}
     assert lead_of(table).answer().startswith("None of 64 cases settled (32 failed, 32 transient), so no ranking")
     table = table | {"outcome": ["failed"] * 40 + ["done"] * 24}

@@ -272,14 +272,14 @@ def test_exact_the_span_of_the_first_measure_of_interest_with_its_largest_relati
     assert span(measures, trusted, settled) == "Pressure peak of the settled cases ranges from 2 MPa to 3.142 MPa, " \
         "with errors of at most 0.2 %."
     measures["loop_area"] = ([1e-3, lost, lost], [lost] * 3, "J")
-    assert span(measures, trusted, settled) == "Loop area is 1 mJ throughout."
+    assert span(measures, trusted, settled) == "Loop area is 1 mJ."
     both = np.ones(2, bool)
     amplitude = {"relative_displacement_amplitude": ([2.939e-8, 8.2614e-3], [1e-9, 8e-8], "m")}
     start = "Relative displacement amplitude"
     assert span(amplitude, {"relative_displacement_amplitude": both}, both) == \
         f"{start} ranges from 29.39 nm to 8.261 mm, with errors of at most 3 %."
     assert span(amplitude, {"relative_displacement_amplitude": np.array([False, True])}, both) == \
-        f"{start} in the cases that meet the tolerance is 8.261 mm throughout, with errors of at most 0.001 %."
+        f"{start} in the only case that meets the tolerance is 8.261 mm, with errors of at most 0.001 %."
     amplitude["relative_displacement_amplitude"] = ([0.0, 1.963e-5], [1e-13, 2e-14], "m")
     assert span(amplitude, {"relative_displacement_amplitude": both}, both) == f"{start} ranges from 0 to 19.63 um."
     assert span({"loop_area": ([lost], [lost], "J"), "heat": ([1.0], [0.0], "J")}, {}, both[:1]) == ""
