@@ -77,7 +77,7 @@ def test_exact_panels_show_the_pieces_and_scale_to_their_stress(bench):
     spiky, beside = panels(replace(frame, cell_data=frame.cell_data | {"von_mises": sharp}))
     assert beside.top == spiky.top  # one scale: 4.8 MPa once stood for the colour that was 8.85 MPa beside it
     above = size[whole.cells & (sharp > spiky.top)].sum()
-    assert spiky.over and spiky.top <= np.nanmax(mises) and "and more" in spiky.title()
+    assert spiky.over and spiky.top <= np.nanmax(mises) and "or more" in spiky.title()
     assert 0 < above <= 0.005 * size.sum()
     drawn = Picture(frame, "a", (spiky, beside), (18, 10))
     assert sum("von Mises" in axes.get_ylabel() for axes in drawn.figure.axes) == 1

@@ -348,7 +348,7 @@ def test_placebos_are_whole_fits_of_their_own(tmp_path):
 
 
 @pytest.mark.parametrize("words, said", [
-    (["--offset", "force"], "belongs to a loop"), (["--starts", "0"], "at least one"),
+    (["--offset", "force"], "applies only to fits to a loop"), (["--starts", "0"], "at least one"),
     (["--placebo", "friction.static"], "table.key=value,value"), (["--leave-out", "displacement"], "no column"),
     (["--placebo", "structure.mode.axial.damping=0.01,0.2"], "already fits this key"),
     (["--placebo", "drive.frequency=140 Hz"], "the rows of the file give the drive"),

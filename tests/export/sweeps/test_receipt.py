@@ -26,7 +26,7 @@ def swept(tmp_path_factory):
 
 
 def words(*over) -> tuple:
-    return (*over, "", "draw=0,0,0", "page=True")
+    return (*over, "", "draw=0,0,0", "of=", "page=True")
 
 
 def test_exact_a_resumed_whole_sweep_says_the_same_and_loads_no_numpy(swept):

@@ -173,7 +173,7 @@ def test_a_short_trace_has_peaks_though_half_of_it_tells_none(tmp_path):
     z = 2 * np.sin(0.5 * x) + 0.3 * np.random.default_rng(3).normal(size=24)
     (tmp_path / "short.csv").write_text("x [um],z [um]\n" + "".join(f"{a},{b!r}\n" for a, b in zip(x, z.tolist())))
     (tmp_path / "scene.toml").write_text(PATCH + 'from = "short.csv"\n')
-    assert any("from every second sample: no such surface" in text for text in
+    assert any("from every second sample: no surface of such peaks" in text for text in
                pf.plan(tmp_path / "scene.toml").verdict)
 
 
