@@ -5,7 +5,7 @@ from html import escape
 import numpy as np
 
 from .. import __version__, scales
-from ..campaigns.backbone import Backbone
+from ..campaigns.backbone import Backbone, Curve
 from ..disk.whole import write_rows, write_text
 from .drawing import charts, pictures
 from .netcdf import Contents, write
@@ -14,6 +14,7 @@ from .results import Folder
 from .summary import write_json
 
 COLUMNS = ("amplitude", "frequency", "frequency_error", "damping", "damping_error")
+LEFT_OUT = " Frequencies with errors larger than the frequency itself are left out of the picture, not of the table."
 HEAD = ("method", "amplitude [m]", "frequency [Hz]", "frequency_error [Hz]", "damping", "damping_error")
 WAYS = {"balance": "The curve belongs to the periodic motion that the rig would have without a net loss of energy. A "
                    "slow decay follows this motion, and so does a test in phase resonance.",
@@ -73,21 +74,29 @@ def write_into(found: Backbone, title: str, resolved: str, folder: Folder, with_
 
 
 def drawn(found: Backbone) -> list:
-    """The two charts: frequency and damping ratio over the amplitude, with their errors."""
+    """The two charts: frequency and damping ratio over the amplitude, with their errors; frequencies that their errors
+    exceed would stretch the axis, and stand in the table alone."""
     unit, scale = scales.axis_unit(np.concatenate([one.amplitude for one in found.curves.values()]), "m")
     out = []
     for name, label, of, log in (("frequency", "frequency", "Hz", False), ("damping", "damping ratio", "", True)):
         log, marks = log and all((one.damping > 0).all() for one in found.curves.values()), []
         for way, one in found.curves.items():
             x, y = one.amplitude * scale, getattr(one, name)
-            shown = (y > 0) | (not log)
+            error = getattr(one, f"{name}_error")
+            shown = (y > 0) | (not log) if name == "damping" else _bounded(one)
             marks.append(charts.line(x[shown], y[shown], COLOURS[way], way))
-            error = getattr(one, f"{name}_error")[shown]
+            error = error[shown]
             marks.append(charts.mark("dots", COLOURS[way], "", x=x[shown], y=y[shown], errors=error, shape="circle",
                                      **({"floor": 0.1 * float(y[shown].min(initial=1.0))} if log else {})))
         out.append(charts.chart(label.capitalize(), charts.axis("amplitude at the output", unit, True),
                                 charts.axis(label, of, log), marks))
     return out
+
+
+def _bounded(one: Curve) -> np.ndarray:
+    """Which points of a curve (k,) have a frequency that its error does not exceed; all, where none has."""
+    found = one.frequency_error <= one.frequency
+    return found | (not found.any())
 
 
 def page(found: Backbone, title: str) -> str:
@@ -99,7 +108,8 @@ def page(found: Backbone, title: str) -> str:
     told = f"<div class=verdict><b>{escape(first)}</b>{''.join(f'<p>{escape(text)}</p>' for text in more)}</div>"
     sections = [Section("curves", "Frequency and damping against amplitude",
                         f"<figure><div class=row>{cells}</div><figcaption>The bars show the numerical "
-                        f"errors.</figcaption>"
+                        f"errors.{LEFT_OUT * (not all(_bounded(one).all() for one in found.curves.values()))}"
+                        "</figcaption>"
                         "</figure>" if made else "<p>No curve was found.</p>"),
                 Section("ways", "How the curves were computed", table(("", ""), [
                     [escape(way), escape(text if way in found.curves else f"not known: {found.missing[way]}")]

@@ -3,12 +3,15 @@
 import csv
 import json
 
+import numpy as np
 import pytest
 import xarray as xr
 from scene_texts import IWAN, shaken
 
 from patchfem import scales
 from patchfem.__main__ import main
+from patchfem.campaigns.backbone import Backbone, Curve
+from patchfem.export.backbone import drawn, page
 
 COLUMNS = ["method", "amplitude [m]", "frequency [Hz]", "frequency_error [Hz]", "damping", "damping_error"]
 
@@ -68,9 +71,23 @@ def test_the_largest_damping_is_told_of_the_amplitudes_that_were_computed(scene,
 
 @pytest.mark.parametrize("words, said", [
     (("--amplitudes", "1..2"), "bare number"), (("--amplitudes", "1 um..x"), "--amplitudes"),
-    (("--mode", "yaw"), "the rig has axial"), (("--method", "static"), "balance"),
+    (("--mode", "yaw"), "the modes of the rig are axial"), (("--method", "static"), "balance"),
     (("--amplitudes", "0 um,1 um"), "--amplitudes")])
 def test_refuses_with_the_option_that_is_wrong(scene, capsys, words, said):
     assert run("backbone", "joint.toml", *words) == 2
     told = capsys.readouterr().err
     assert said in told and "Traceback" not in told
+
+
+def test_exact_a_frequency_that_its_error_exceeds_is_in_the_table_alone():
+    """One of 3.6 +- 9.8 kHz beside others of 100 Hz stretched the axis of the picture."""
+    a, none = np.array([1e-6, 2e-6, 3e-6]), np.full(3, np.nan)
+    one = Curve(a, np.array([100.0, 90.0, 3.6e3]), np.array([1.0, 1.0, 9.8e3]), np.array([1e-4, 2e-3, 0.28]),
+                np.array([2e-4, 1e-4, 0.34]), none)
+    found = Backbone("first", 50.0, 100.0, {"decay": one}, {}, None, None, None, ())
+    frequency, damping = drawn(found)
+    assert [list(each["x"]) for each in frequency["marks"]] == [[1.0, 2.0]] * 2
+    assert [list(each["x"]) for each in damping["marks"]] == [[1.0, 2.0, 3.0]] * 2
+    assert "9.8 kHz" in page(found, "") and "left out of the picture" in page(found, "")
+    sure = page(found._replace(curves={"decay": one.at(slice(2))}), "")
+    assert "left out of the picture" not in sure
