@@ -119,13 +119,12 @@ def left_by_mesh(model, patch, coarse, amplitudes, mode) -> np.ndarray:
         return apart * np.nan
 
 
-def left_by_mesh_on(found: DecayCurve, model, patch, coarse) -> np.ndarray:
-    """Errors (2, k) of `left_by_mesh` at the points of a release, of the held mode whose frequency is nearest to that
-    of the smallest amplitude."""
-    low, high = np.log10([found.amplitude.min(), found.amplitude.max()])
+def left_by_mesh_on(amplitude, frequency: float, model, patch, coarse) -> np.ndarray:
+    """Errors (2, k) of `left_by_mesh` at many amplitudes (k,) [m], of the held mode nearest to a frequency [Hz]."""
+    low, high = np.log10([amplitude.min(), amplitude.max()])
     at = np.logspace(low, high, 2 + int(APART * (high - low)))
-    wide = left_by_mesh(model, patch, coarse, at, lambda laws: _mode(model.rig.modes, laws, found.frequency[-1]))
-    return np.array([np.interp(np.log(found.amplitude), np.log(at), one) for one in wide])
+    wide = left_by_mesh(model, patch, coarse, at, lambda laws: _mode(model.rig.modes, laws, frequency))
+    return np.array([np.interp(np.log(amplitude), np.log(at), one) for one in wide])
 
 
 def _mode(modes, laws, frequency: float) -> int:

@@ -120,18 +120,25 @@ def _reasoned(run: Coupled) -> Coupled:
 
 
 def _decayed(run: Coupled, coarse) -> tuple:
-    """(The run, the curve of its decay), neither with smaller errors than the mesh leaves; of what rings in the last
-    stick the largest there. None without a release; coarse: the Patch of a coarser mesh or None."""
-    found = decays.decay_of(run.raw) if run.model.rig.kind == "free" and run.estimated else None
-    if found is None or not (run.model.soft or run.model.rig.soft):
+    """(The run, the curve of its decay), neither with smaller errors than the mesh leaves; of what rings, at half the
+    swing in the last stick. None without a release; coarse: the Patch of a coarser mesh or None."""
+    found, raw = decays.decay_of(run.raw) if run.model.rig.kind == "free" and run.estimated else None, run.raw
+    if run.model.rig.kind != "free" or not run.estimated or not (run.model.soft or run.model.rig.soft):
         return run, found
-    mesh = decays.left_by_mesh_on(found, run.model, run.patch, coarse)
-    sticks = run_events.spans_of(run.raw.window, run.drive, run.raw.log, run.raw.held)
-    late = np.nan_to_num(mesh[:, found.time >= sticks[-1][0]] if sticks else mesh[:, :0]).max(axis=1, initial=0.0)
-    rings = {name: replace(one, error=max(one.error, float(least))) for name, least in
-             zip(("ring_frequency", "ring_damping"), late) if (one := run.measures.get(name)) and one.error is not None}
-    return replace(run, measures=run.measures | rings), found._replace(
-        frequency_error=np.fmax(found.frequency_error, mesh[0]), damping_error=np.fmax(found.damping_error, mesh[1]))
+    ring, own = run.measures.get("ring_frequency"), (run.model, run.patch, coarse)
+    sticks = run_events.spans_of(raw.window, run.drive, raw.log, raw.held)
+    if ring is not None and ring.value and ring.error is not None and sticks:
+        swing = np.ptp(raw.window.output[raw.window.time >= sticks[-1][0]]) / 2
+        if swing > 0:
+            left = decays.left_by_mesh_on(np.array([swing]), ring.value, *own)[:, 0]
+            wider = {name: replace(run.measures[name], error=float(np.fmax(run.measures[name].error, one)))
+                     for name, one in zip(("ring_frequency", "ring_damping"), left)}
+            run = replace(run, measures=run.measures | wider)
+    if found is not None:
+        mesh = decays.left_by_mesh_on(found.amplitude, found.frequency[-1], *own)
+        found = found._replace(frequency_error=np.fmax(found.frequency_error, mesh[0]),
+                               damping_error=np.fmax(found.damping_error, mesh[1]))
+    return run, found
 
 
 def _judged(run: Coupled) -> Coupled:
