@@ -100,3 +100,34 @@ def test_always_patches_that_wear_share_a_mesh_as_fine_as_their_own():
     cases = [replace(one, patch=replace(one.patch, sweeps="wear", still=False)) for one in family(1e-5, 1e-4)]
     for own, shared in zip(cases, meshed(cases), strict=True):
         assert shared.patch.meshes.levels[0][0].x.size >= 0.75 * solve_all(own.patch, 1e-2)[0].x.size
+
+
+JOINT = """\
+[contact]
+length = "40 mm"
+width = "30 mm"
+height = "15 mm"
+load = "8 kN"
+substrate = "steel"
+[contact.crown]
+radius = "5 m"
+[contact.shear]
+[friction]
+law = "coulomb"
+static = 0.2
+[slide]
+kind = "sine"
+amplitude = "{} um"
+frequency = "1 Hz"
+cycles = 3
+[accuracy]
+tolerance = 1e-2
+"""
+
+
+def test_always_a_sweep_of_amplitudes_knows_the_loops_of_a_joint_as_well_as_single_runs():
+    cases = [build(scene.loads(JOINT.format(size))) for size in (0.2, 1.4, 10.0)]
+    for own, shared in zip(cases, meshed(cases), strict=True):
+        alone, found = (run(one).measures["loop_area"] for one in (own, shared))
+        assert found.error <= 1.5 * alone.error
+        assert abs(found.value - alone.value) <= found.error + alone.error

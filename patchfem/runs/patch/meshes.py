@@ -23,6 +23,7 @@ from .press import pressed
 from .static import missed_on, patches_on
 
 CASES = 48  # cases that a mesh is chosen by; of more, those that lie farthest apart
+CORNERS = 5  # of them, whose own ladders are climbed where a patch slips part by part
 ROUNDS = 4  # of the search for the contacts
 MOST_NODES = 400  # of the finest interface
 FASTEST = 3.0  # order by which errors of static measures fall at most: meshes too coarse by it are not tried
@@ -52,9 +53,10 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None
     cases, every = farthest_apart(patches)
     swept = [replace(one, load=share * one.load) for one in cases if one.sweeps == "load" and one.load is not None
              for share in grids.SWING]
-    layout = _layout([*cases, *swept], not (every and all_))
-    # a contact that moves on the way has measures that its first state tells nothing of
-    shares, fitting = START[-1:] if asked.sweeps else START, None
+    slips = any(one.gives_way for one in patches)
+    layout = _layout([*cases, *swept], not (every and all_), _halvings(cases, tolerance) if slips else {})
+    # a contact that moves on the way, or slips part by part, has measures that its first state tells nothing of
+    shares, fitting = START[-1:] if asked.sweeps or slips else START, None
     while shares and layout is not None:
         share = shares[(len(shares) - 1) // 2]
         levels, missed_by = _climbed(cases, grids.grids_of(asked, layout.times(share)), tolerance, share > START[-1])
@@ -78,12 +80,12 @@ def with_digest(levels) -> Meshes:
     return Meshes(tuple(levels), digest.hexdigest()[:32])
 
 
-def farthest_apart(patches) -> tuple:
-    """(the patches that lie farthest apart in what presses and shapes them, CASES at most, whatever their order;
+def farthest_apart(patches, most: int = CASES) -> tuple:
+    """(the patches that lie farthest apart in what presses and shapes them, `most` at most, whatever their order;
     whether these are all)."""
     rows = {_numbers(one): one for one in patches}
     keys = sorted(rows)
-    if len(keys) <= CASES:
+    if len(keys) <= most:
         return [rows[key] for key in keys], True
     sizes = np.array(keys)
     scale = np.abs(sizes).min(axis=0, where=sizes != 0, initial=np.inf)
@@ -91,7 +93,7 @@ def farthest_apart(patches) -> tuple:
     at = at / np.maximum(np.ptp(at, axis=0), 1e-300)
     picked = [int(np.argmin(at.sum(axis=1)))]
     apart = np.full(len(keys), np.inf)
-    while len(picked) < CASES:
+    while len(picked) < most:
         apart = np.minimum(apart, np.abs(at - at[picked[-1]]).max(axis=1))
         picked.append(int(np.argmax(apart)))
     return [rows[keys[k]] for k in sorted(picked)], False
@@ -106,10 +108,23 @@ def _numbers(asked) -> tuple:
     return (*(float(value or 0.0) for value in own), *shapes, *skin)
 
 
-def _layout(cases: list, between: bool) -> Layout | None:
+def _halvings(cases: list, tolerance: float) -> dict:
+    """How often the run of a case by itself halves its cells beyond the least levels, of CORNERS cases by `_numbers`.
+    """
+    out = {}
+    for one in farthest_apart(cases, CORNERS)[0]:
+        try:
+            out[_numbers(one)] = len(ladder.climb(one, one.mesh_tolerance or tolerance)) - grids.LEAST_LEVELS
+        except PatchfemError:  # its own run says why
+            continue
+    return out
+
+
+def _layout(cases: list, between: bool, halvings: dict) -> Layout | None:
     """The layout of the coarsest grids, that no case wants finer; None where no case can be pressed.
 
-    between: there are more cases than these, and their contacts end between those of neighbouring ones.
+    between: there are more cases than these, and their contacts end between those of neighbouring ones; halvings: as
+    `_halvings`, by which the cells of these cases are shorter from the first level on.
     """
     first, along = cases[0], grids.EDGE[cases[0].still]
     layout = grids.search_layout(first)
@@ -119,7 +134,8 @@ def _layout(cases: list, between: bool) -> Layout | None:
         seen = [(one, found) for one, patch in zip(cases, known) if (found := _loaded(one, pair, patch)) is not None]
         if not seen:
             return None
-        layout = _merged([grids.layout_of(one, [found]) for one, found in seen], between)
+        layout = _merged([grids.layout_of(one, [found]).times(0.5 ** halvings.get(_numbers(one), 0))
+                          for one, found in seen], between)
         if max(found.cell / found.wide for _, found in seen) <= 1 / (along - 1):
             break
     return layout
