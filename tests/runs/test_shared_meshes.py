@@ -131,3 +131,13 @@ def test_always_a_sweep_of_amplitudes_knows_the_loops_of_a_joint_as_well_as_sing
         alone, found = (run(one).measures["loop_area"] for one in (own, shared))
         assert found.error <= 1.5 * alone.error
         assert abs(found.value - alone.value) <= found.error + alone.error
+
+
+@pytest.mark.parametrize("tolerance", ["1e-2", "1e-3"])
+def test_exact_a_sweep_of_amplitudes_is_told_the_same_remedies_as_single_runs(tolerance):
+    text = JOINT.replace("tolerance = 1e-2", f"tolerance = {tolerance}")
+    cases = [build(scene.loads(text.format(size))) for size in (0.2, 1.4)]
+    for own, shared in zip(cases, meshed(cases), strict=True):
+        alone, found = run(own), run(shared)
+        assert any("the mesh (" in one for one in alone.warnings)
+        assert found.warnings == alone.warnings

@@ -54,12 +54,15 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None
     swept = [replace(one, load=share * one.load) for one in cases if one.sweeps == "load" and one.load is not None
              for share in grids.SWING]
     slips = any(one.gives_way for one in patches)
-    layout = _layout([*cases, *swept], not (every and all_), _halvings(cases, tolerance) if slips else {})
+    halvings = _halvings(cases, tolerance) if slips else {}
+    common = min(halvings.values(), default=0)  # what all of them halve are levels of the ladder
+    layout = _layout([*cases, *swept], not (every and all_), {key: one - common for key, one in halvings.items()})
     # a contact that moves on the way, or slips part by part, has measures that its first state tells nothing of
     shares, fitting = START[-1:] if asked.sweeps or slips else START, None
     while shares and layout is not None:
         share = shares[(len(shares) - 1) // 2]
-        levels, missed_by = _climbed(cases, grids.grids_of(asked, layout.times(share)), tolerance, share > START[-1])
+        levels, missed_by = _climbed(cases, grids.grids_of(asked, layout.times(share)), tolerance, share > START[-1],
+                                     grids.LEAST_LEVELS + common)
         if missed_by <= 1 or share == START[-1]:
             fitting, shares = levels, tuple(one for one in shares if one > share)
         else:
@@ -124,7 +127,7 @@ def _layout(cases: list, between: bool, halvings: dict) -> Layout | None:
     """The layout of the coarsest grids, that no case wants finer; None where no case can be pressed.
 
     between: there are more cases than these, and their contacts end between those of neighbouring ones; halvings: as
-    `_halvings`, by which the cells of these cases are shorter from the first level on.
+    `_halvings`, beyond those of all of them; the cells of these cases are so much shorter from the first level on.
     """
     first, along = cases[0], grids.EDGE[cases[0].still]
     layout = grids.search_layout(first)
@@ -178,15 +181,15 @@ def _filled(layouts: list) -> list:
     return out
 
 
-def _climbed(cases: list, bodies, tolerance: float, once: bool) -> tuple:
+def _climbed(cases: list, bodies, tolerance: float, once: bool, least: int) -> tuple:
     """Levels of nested meshes from the coarsest `bodies`, fine to coarse, up to one on which every case meets the
     tolerance, or the dearest that is worth it; and the largest error over the tolerance of the first case that misses
-    it, 0 where none does. once: no more than the least levels."""
+    it, 0 where none does. once: no more than the `least` levels."""
     pairs, tolerance = [], cases[0].mesh_tolerance or tolerance
     while True:
         pairs.insert(0, condensed(cases[0], *bodies))
         bodies = [finer(body) for body in bodies]
-        if len(pairs) < grids.LEAST_LEVELS:
+        if len(pairs) < least:
             continue
         known = missed_on(cases, pairs, tolerance)
         missed_by = next((by for one, seen in zip(cases, known) if (
