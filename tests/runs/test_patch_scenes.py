@@ -241,7 +241,7 @@ def test_refuses_a_profile_finer_than_the_mesh_and_leaves_it_to_the_asperities(t
                                             r"shorter than 2 elem.*element_size"):
         run(scene(tables, path=tmp_path / "scene.toml"))
     patch, _ = solved(tables + SKINS["linear"], path=tmp_path / "scene.toml")
-    assert any("left to [contact.asperities]" in note for note in patch.notes)
+    assert any("are represented by [contact.asperities]" in note for note in patch.notes)
     # what the filter passes at a hundredth of the length, and the mean over a cell
     seen = 0.5 ** (LENGTH / 100 / 50e-6)**2 * np.sinc(0.127e-3 / 50e-6)
     inner = patch.gap[12:-12] - np.polyval(np.polyfit(patch.x[12:-12], patch.gap[12:-12], 1), patch.x[12:-12])
