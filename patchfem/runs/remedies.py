@@ -9,8 +9,7 @@ from ..core import say
 from ..effects import has
 from ..response import rows
 from ..scales import plain
-from .patch import faces, high_order, ladder
-from .patch.press import Patch
+from .patch import faces, high_order, ladder, press
 from .results import notes, patch_rows
 from .rig import costs, engines
 
@@ -145,7 +144,7 @@ def _climbing(seen, coarse) -> float | None:
     Where its coarser meshes are not at hand it is one of at least one halving more.
     """
     asked, tolerance = seen.model.patch, seen.model.accuracy.tolerance
-    if asked.meshes is not None and asked.chosen and isinstance(seen.patch, Patch) and \
+    if asked.meshes is not None and asked.chosen and isinstance(seen.patch, press.Patch) and \
             ladder.next_seconds(seen.patch) > ladder.SPENT[asked.still]:
         return None
     if not any(coarse) or asked.meshes is not None:

@@ -150,7 +150,7 @@ def test_always_pinned_keys_of_the_sum_are_kept():
 def test_refuses_a_list_that_takes_too_long_and_merging_where_none_is():
     model = model_of(BONDS + "order = 2\n", "sine", "accuracy.quadrature=direct", "slide.cycles=400",
                      "accuracy.steps_per_cycle=4000")
-    with pytest.raises(Missing, match=f"more than {LONGEST:.0f} s; lower accuracy.steps_per_cycle"):
+    with pytest.raises(Missing, match=f"more than the limit of {LONGEST:.0f} s; lower accuracy.steps_per_cycle"):
         plan(model)
     with pytest.raises(SceneError, match=r"'merged' with friction\.breakaway, or with a pressure"):
         plan(model_of(BONDS + "order = 2\n", "sine", "accuracy.quadrature=merged", where=PATCH + 'on = "lower"\n'))

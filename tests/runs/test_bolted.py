@@ -106,10 +106,11 @@ def test_exact_a_patch_is_taken_off_as_it_is_pressed():
 
 
 @pytest.mark.parametrize("text, said", [
-    (POINT + friction_of("iwan") + MODES % (STUCK, 14.0, 1.0, 1.0) + DRIVE, "joint has .* % of the stiffness"),
+    (POINT + friction_of("iwan") + MODES % (STUCK, 14.0, 1.0, 1.0) + DRIVE,
+     "stiffness of the joint is .* % of the stiffness"),
     (POINT + friction_of("coulomb") + MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE, "law 'coulomb' sticks rigidly"),
     (POINT + friction_of("tanh") + MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE, "law 'tanh' has no stiffness"),
-    (SHEARED + MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE, "joint has .* % of the stiffness")])
+    (SHEARED + MODES % (STUCK, 143.0, 1.0, 1.0) + DRIVE, "stiffness of the joint is .* % of the stiffness")])
 def test_refuses_a_joint_that_cannot_come_off(text, said):
     with pytest.raises(PatchfemError, match=f"(?s)structure.measured.*{said}"):
         pf.run(text)

@@ -149,7 +149,7 @@ def test_always_the_words_stand_in_few_files():
     (POINT + RUBS + SHAKEN, [*BONDS, "friction.breakaway=0.2", "accuracy.quadrature=direct"], "accuracy.quadrature",
      "'direct' with friction.breakaway in a rig is not supported yet; use 'recursion' or 'auto'"),
     (PATCH + RUBS + SHAKEN, [*BONDS, *LOWER, "accuracy.quadrature=merged"], "accuracy.quadrature",
-     "'merged' with the pressure on the lower piece in a rig is not supported yet"),
+     "'merged' with a shape on the lower piece in a rig is not supported yet"),
     (MASSES.format(FACE.format(2)), ["structure.interface.1.law=convolution", "structure.interface.1.bond_length=1 um"],
      "structure.interface[2].law", "law 'convolution' with other interfaces is not supported"),
     (MASSES.format(FACE.format(2)), ["structure.interface.1.law=tanh", "structure.interface.1.reference_speed=1 mm/s",

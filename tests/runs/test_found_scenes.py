@@ -68,7 +68,7 @@ def test_exact_a_random_scene_holds_what_the_independent_program_found(seed, mea
 def test_always_a_printed_law_that_creates_energy_has_a_wide_bar():
     """The steps of this run do not converge yet; with many more the amplitude is 1.43e-5 m. Those that it would choose
     take longer than LONGEST: the law holds the block, and its list grows with every step."""
-    with pytest.raises(Missing, match=r"the bond list .* more than 600 s"):
+    with pytest.raises(Missing, match=r"the list of bonds .* more than the limit of 600 s"):
         run(load(FOUND / "s77_58.toml"))
     found = run(load(FOUND / "s77_58.toml", ["accuracy.steps_per_cycle=200"])).measures[
         "relative_displacement_amplitude"]

@@ -175,7 +175,7 @@ def test_refuses_a_broken_lateral_column(table, text, says):
     (POINT, ["friction.breakaway=0.2"], "friction.breakaway"),
     (POINT, ["normal.amplitude=1 N", "normal.frequency=50 Hz"], "normal.amplitude"),
     (SMALL_PATCH, ["contact.shear={}"], "[contact.shear]"),
-    (SMALL_PATCH, ["contact.tilt.on=lower"], "pressure on the lower piece"),
+    (SMALL_PATCH, ["contact.tilt.on=lower"], "a shape on the lower piece"),
 ])
 def test_refuses_what_two_directions_cannot_do(table, scene, sets, says):
     found = table(L_SHAPE, scene + LONGER, *sets)

@@ -75,7 +75,7 @@ def test_exact_one_direction_turned_or_not_is_the_engine_of_one_direction(tmp_pa
                                                             abs=1e-9 * line.measures[name].value), name
     r = turned.response
     np.testing.assert_allclose(r.extra["lateral_forces"], -np.tan(TURN) * r.extra["forces"], atol=1e-9 * 20)
-    assert "belongs to one direction" in turned.measures.equivalent_stiffness.reason
+    assert "defined only for one direction" in turned.measures.equivalent_stiffness.reason
 
 
 @pytest.mark.share(0, 2)

@@ -54,7 +54,7 @@ def test_beside_asperities_the_stiffness_does_not_hang_on_the_cells(tmp_path, si
     mine = found.measures["normal_stiffness"]
     assert abs(mine.value - even.value) <= mine.error + even.error
     assert mine.value == pytest.approx(even.value, rel=5e-3)
-    assert any("waves longer than 127 um shape the gap" in text for text in found.warnings)
+    assert any("waves longer than 127 um give the shape of the gap" in text for text in found.warnings)
 
 
 # the independent program of test_order_four.py: contact interval [m], approach [m], peak [Pa], stiffness [N/m]

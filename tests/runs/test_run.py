@@ -429,7 +429,7 @@ def test_refuses_what_takes_too_long_or_cannot_be_written(written, tmp_path):
     scene = written(POINT + NONLOCAL + STRUCTURE)
     costly = cli("run", scene, "--set", "friction.reading=report", "--set", "drive.cycles=10000000", "-o",
                  tmp_path / "out")
-    assert costly.code == 4 and "bond list" in costly.err
+    assert costly.code == 4 and "list of bonds" in costly.err
     assert cli("run", written(POINT + COULOMB + SLIDE), "-o", scene / "inside").code == 4
 
 

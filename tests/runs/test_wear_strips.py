@@ -124,7 +124,7 @@ def test_exact_a_rig_wears_its_strips_by_their_own_slides(yaw):
         swing, share = across(found.patch, found.window, 1 / 143)
         assert swing == pytest.approx(20 * 6.35e-3 * found.measures["relative_displacement_amplitude"].value, rel=0.05)
         assert share == pytest.approx((20 * 12.7e-3)**2 / 24, rel=0.25)
-        assert f"{100 * share:.2g} % longer" in said[0] and "friction and wear leave out" in said[0]
+        assert f"{100 * share:.2g} % longer" in said[0] and "the friction and the wear are computed without" in said[0]
 
 
 def test_exact_files_hold_the_depth_of_every_strip(tmp_path):

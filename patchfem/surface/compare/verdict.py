@@ -62,7 +62,7 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
         out.insert(0, "The heights of both scans are the same; was the same file given twice?")
     for one, word, name in zip(parts, words, names):
         if not isinstance(one.before, Areal):
-            out += [*_variant(one, name), *_no_place(one, name), _worn(one, name), *_reference(one)]
+            out += [*_variant(one, name), _worn(one, name), *_no_place(one, name), *_reference(one)]
         if one.sizes or not isinstance(one.before, Areal):
             out += [_amplitude(one.amplitude_ratio, word, name), _slope(one.slope_ratio, name), *_gain(one, name)]
         else:

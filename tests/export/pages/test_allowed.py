@@ -118,7 +118,7 @@ def test_exact_a_limit_among_the_cases_comes_before_one_that_errors_leave_open()
     tilt, loop, slip = np.array([1e-3, 0.15, 0.17, 0.19]), [1, 0.955, 0.94993, 0.9477], [1, 0.96, 0.9495, 0.9497]
     said = sentence(limits({"slip_amplitude": slip, "loop_area": loop}, 5e-4, tilt))
     assert said == ("Tilt may reach 0.15 mrad (1.9 um over the patch, between cases at 0.15 and 0.19 mrad) before slip "
-                    "amplitude or loop area changes by 5 % (loop area first).")
+                    "amplitude or loop area changes by 5 % (first to change: loop area).")
     said = sentence(limits({"slip_amplitude": [1, 1.01, 1.05, 1.05], "loop_area": [1, 1.01, 1.01, 1.2]}, 5e-4, tilt))
     assert said == ("Tilt may reach at least 0.15 mrad (1.9 um over the patch) before slip amplitude or loop area "
                     "changes by 5 %; loop area has changed by more at 0.19 mrad.")

@@ -158,7 +158,7 @@ def test_refuses_a_scene_whose_rates_leave_the_range():
 
 
 @pytest.mark.parametrize("text, says", [
-    (GROWING, "activations"),
+    (GROWING, "activation temperatures"),
     ('[friction]\nlaw = "nonlocal"\nstatic = 0.6\nbond_length = "2 um"\n', "growth of the bonds")])
 def test_exact_a_table_without_effect_is_remarked(text, says):
     table = WARM if "growth" in says else WARM.split("rest_act")[0]
