@@ -5,7 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scene_texts import DRIVE, KILOGRAM, POINT, friction_of
+from scene_texts import CROWNED_JOINT, DRIVE, KILOGRAM, POINT, friction_of
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
@@ -130,18 +130,7 @@ def test_always_runs_that_do_not_reach_leave_an_infinite_error_and_no_warning_of
     assert same.damping == pytest.approx(0.05, rel=1e-4) and np.isfinite(same.damping_error).all()
 
 
-CROWNED = """[contact]
-length = "40 mm"
-width = "30 mm"
-height = "15 mm"
-load = "8 kN"
-substrate = "steel"
-[contact.crown]
-radius = "5 m"
-[contact.shear]
-[friction]
-law = "coulomb"
-static = 0.2
+CROWNED = CROWNED_JOINT + """\
 [structure]
 moving_mass = "2 kg"
 [[structure.mode]]

@@ -56,7 +56,7 @@ def test_refuses_steady_where_energy_is_lost(tmp_path, monkeypatch):
     monkeypatch.setattr(Run, "book", lambda self: kept(self) | {"viscous": kept(self)["viscous"] * (1 + 1e-6)})
     found = run(tmp_path, 0.3, 4)
     assert found.outcome is Outcome.NOT_CONVERGED
-    assert any("energy balance of engine march has an error" in line and "1e-8" in line
+    assert any("energy balance of engine march has an error" in line and "the limit of 1e-8" in line
                and "accuracy." not in line for line in found.warnings)
     assert all(measure.error is None for measure in found.measures.values())
 

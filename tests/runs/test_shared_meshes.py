@@ -4,7 +4,7 @@ run on it."""
 from dataclasses import replace
 
 import pytest
-from scene_texts import COATING, PIECE
+from scene_texts import COATING, CROWNED_JOINT, PIECE
 
 from patchfem.core import PatchfemError
 from patchfem.model.model import build
@@ -102,19 +102,7 @@ def test_always_patches_that_wear_share_a_mesh_as_fine_as_their_own():
         assert shared.patch.meshes.levels[0][0].x.size >= 0.75 * solve_all(own.patch, 1e-2)[0].x.size
 
 
-JOINT = """\
-[contact]
-length = "40 mm"
-width = "30 mm"
-height = "15 mm"
-load = "8 kN"
-substrate = "steel"
-[contact.crown]
-radius = "5 m"
-[contact.shear]
-[friction]
-law = "coulomb"
-static = 0.2
+JOINT = CROWNED_JOINT + """\
 [slide]
 kind = "sine"
 amplitude = "{} um"

@@ -89,7 +89,7 @@ def test_exact_the_table_of_the_mesh_is_what_the_command_prints(words, tmp_path,
 
     Round-off moves these errors by less than 1e-4 of themselves, except with cells of order 4 (tolerances of 1e-4 and
     1e-5): there a node at the edge of the contact bears or not by round-off, and with three sets of BLAS kernels the
-    error of the contact fraction is 1.8e-6, 2.2e-6 and 2.3e-6.
+    error of the contact fraction is 1.8e-6, 2.2e-6 and 2.3e-6, and no other differs by more than 4 %.
     """
     monkeypatch.setattr("patchfem.campaigns.cost.TIMINGS", 1)
     said = cli("cost", STUDIES / "rig/pieces.toml", *words, "-o", tmp_path, "-q")
@@ -102,7 +102,8 @@ def test_exact_the_table_of_the_mesh_is_what_the_command_prints(words, tmp_path,
     errors, known = ([cells for *_, cells in rows] for rows in (ours, theirs))
     if not words:
         last, printed = ([float(cell.split()[0]) for cell in cells.pop()] for cells in (errors, known))
-        assert last == pytest.approx(printed, rel=0.3)
+        loose = [0.3 if name == "contact_fraction" else 0.05 for name in names]
+        assert all(abs(one - other) <= part * other for one, other, part in zip(last, printed, loose, strict=True))
     assert errors == known
     ratios = np.array([float(one[1]) / float(other[1]) for one, other in zip(ours, theirs, strict=True)])
     assert (np.abs(np.log(ratios / np.median(ratios))) < np.log(3)).all()

@@ -134,6 +134,22 @@ acceleration = "20 g"
 cycles = 20
 """
 
+# a joint whose points slip from its edges on
+CROWNED_JOINT = """\
+[contact]
+length = "40 mm"
+width = "30 mm"
+height = "15 mm"
+load = "8 kN"
+substrate = "steel"
+[contact.crown]
+radius = "5 m"
+[contact.shear]
+[friction]
+law = "coulomb"
+static = 0.2
+"""
+
 # whole scenes
 BENCH = POINT + COULOMB + SLIDE
 SMALL_PATCH = 'title = "a small patch"\n' + COATED + '[contact.tilt]\nangle = "0.02 mrad"\n'
