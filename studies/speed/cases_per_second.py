@@ -12,10 +12,12 @@ in Python, no step longer than an eighth of a cycle, on the first few of the sam
 in one run, compiled code made before.
 
 Run: python studies/speed/cases_per_second.py            (2000 cases, 3 by DOP853 and CVODE)
+     python studies/speed/cases_per_second.py --laws     (whole sweeps of all laws and of patches)
      python studies/speed/cases_per_second.py --full     (10 000 cases, 10 by DOP853 and CVODE)
 """
 
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +30,7 @@ from numba import njit
 from peer import Peer, run, timed
 from switched import PROBLEMS, follow
 
+from patchfem.api import load
 from patchfem.campaigns.sweeps.asked import Asked
 from patchfem.campaigns.sweeps.cases import Cases
 from patchfem.campaigns.sweeps.executors import Here
@@ -170,6 +173,104 @@ def row(name: str, knob: str, seconds: float, amplitudes, exact) -> dict:
     return out
 
 
+def _block(law: str) -> str:
+    """The block of a family of cases under a law."""
+    return SCENE.replace('law = "coulomb"\nstatic = 0.5', f'{law}\nstatic = 0.5')
+
+
+def _log(low: float, high: float):
+    return lambda r, n: 10 ** r.uniform(np.log10(low), np.log10(high), n)
+
+
+def _even(low: float, high: float):
+    return lambda r, n: r.uniform(low, high, n)
+
+
+PIECES = """[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6.35 mm"
+load = "26 lbf"
+substrate = "Ti-8Al-1Mo-1V"
+[contact.tilt]
+angle = "0.1 mrad"
+"""
+JOINT = PIECES + """[contact.shear]
+[friction]
+law = "coulomb"
+static = 0.30
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "143 Hz"
+acceleration = "5 g"
+cycles = 200
+"""
+RIG = Path(__file__).parents[1] / "rig/rig.toml"
+BLOCK = {"friction.static": _even(0.1, 0.9), "structure.mode.block.damping": _log(0.003, 0.1)}
+SOFT = BLOCK | {"friction.stiffness": _log(3, 30)}  # stiffer contacts of LuGre's law are run one by one, for seconds
+STIFF = BLOCK | {"friction.stiffness": _log(3, 300)}
+LENGTHS = BLOCK | {"friction.bond_length": _log(3e-3, 0.1)}
+UNITS = {"friction.stiffness": "N/m", "friction.bond_length": "m", "friction.reference_speed": "m/s",
+         "drive.acceleration": "m/s^2", "contact.tilt.angle": "rad", "contact.load": "N"}
+# of a family: its scene, the cases of a run, the keys that are drawn and from what, in SI units
+FAMILIES = {
+    "coulomb": (_block('law = "coulomb"'), 2000, BLOCK),
+    "elastic-plastic": (_block('law = "elastic-plastic"\nbond_length = "10 mm"'), 1000, LENGTHS),
+    "iwan": (_block('law = "iwan"\nstiffness = "10 N/m"\nchi = -0.5\nbeta = 0.5'), 1000, STIFF),
+    "tanh": (_block('law = "tanh"\nreference_speed = "0.1 m/s"'), 1000,
+             BLOCK | {"friction.reference_speed": _log(0.01, 1)}),
+    "nonlocal": (_block('law = "nonlocal"\nbond_length = "10 mm"'), 1000, LENGTHS),
+    "bouc-wen": (_block('law = "bouc-wen"\nstiffness = "10 N/m"'), 256, SOFT),
+    "lugre": (_block('law = "lugre"\nstiffness = "10 N/m"\nstribeck_speed = "0.1 m/s"'), 256, SOFT),
+    "patch, coulomb: level x friction": (JOINT, 256, {
+        "drive.acceleration": _log(1, 200), "friction.static": _even(0.1, 0.6)}),
+    "patch, coulomb: tilt x friction": (JOINT, 256, {
+        "contact.tilt.angle": _log(1e-6, 5e-4), "friction.static": _even(0.1, 0.6)}),
+    "shipped rig: tilt x friction": (RIG.read_text("utf-8"), 64, {
+        "contact.tilt.angle": _log(1e-6, 5e-4), "friction.static": _even(0.1, 0.6)}),
+    "static: load x tilt": (PIECES, 2000, {
+        "contact.load": _log(10, 1000), "contact.tilt.angle": _log(1e-6, 1e-3)}),
+}
+
+
+def of_family(name: str, count: int, seed: int):
+    """Answers of random cases of a family, from the values of their keys on."""
+    text, _, keys = FAMILIES[name]
+    r = np.random.default_rng(seed)
+    axes = [values_of(key, [f"{one!r} {UNITS.get(key, '')}".strip() for one in draw(r, count).tolist()], False)
+            for key, draw in keys.items()]
+    return swept(Asked(RIG, text), Cases(tuple(axes), True), Here())
+
+
+def families(seed: int = 1, names=tuple(FAMILIES), goes: int = 3, share: float = 1.0) -> list[dict]:
+    """Cases per CPU second of every family: the median of some goes, each of other cases, after a small one that
+    compiles and imports what it needs; the share of the cases whose amplitude (peak pressure) has a bar within the
+    tolerance of the scene."""
+    rows = []
+    for name in names:
+        count = max(8, int(FAMILIES[name][1] * share))
+        of_family(name, min(count, 64), seed + 1000)
+        took, good, tolerance = [], [], load(FAMILIES[name][0]).accuracy.tolerance
+        for go in range(goes):
+            found, seconds = timed(partial(of_family, name, count, seed + go))
+            measure = AMPLITUDE if AMPLITUDE in found.values else "pressure_peak"
+            error, value = found.errors[measure], found.values[measure]
+            good.append(np.mean(error <= tolerance * np.abs(value) + found.floors[measure]))
+            took.append(seconds)
+        rows.append({"family": name, "cases": count, "rate": count / float(np.median(took)),
+                     "best": count / min(took), "known": float(np.mean(good))})
+        print(f"{name:34} {count:6} cases  {rows[-1]['rate']:8.1f} a CPU s (best {rows[-1]['best']:8.1f})   "
+              f"within the tolerance: {100 * rows[-1]['known']:.1f} %", flush=True)
+    return rows
+
+
 def main(count: int = 2000, few: int = 3, steps=(100, 200, 400, 800), tolerances=(1e-3, 1e-5, 1e-8)) -> list[dict]:
     """Measure all ways and print them; the rows."""
     cases = drawn(count)
@@ -203,4 +304,6 @@ def main(count: int = 2000, few: int = 3, steps=(100, 200, 400, 800), tolerances
 
 
 if __name__ == "__main__":
+    if "--laws" in sys.argv[1:]:
+        raise SystemExit(run(lambda: families(*(int(one) for one in sys.argv[2:]))))
     raise SystemExit(run(lambda: main(10_000, 10) if "--full" in sys.argv[1:] else main()))
