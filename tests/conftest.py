@@ -42,7 +42,8 @@ KEPT = kept()
 def pytest_configure(config):
     """How many examples a property test draws; "costly" is for @settings. Of the workers every other one collects from
     the end: what one of them has read and rewritten the other finds as bytecode."""
-    if int(getattr(config, "workerinput", {}).get("workerid", "gw0")[2:]) % 2 and len(config.args) == 1:
+    odd = int(getattr(config, "workerinput", {}).get("workerid", "gw0")[2:]) % 2
+    if odd and len(config.args) == 1 and Path(config.args[0]).is_dir():
         config.args = [str(path) for path in sorted(Path(config.args[0]).iterdir(), reverse=True)
                        if path.match("test_*.py") or (path.is_dir() and path.name[0].isalpha())]
     often = 10 if config.option.markexpr == "slow" else 1
