@@ -223,13 +223,15 @@ class Folder:
         return np.array([number for number in numbers.tolist() if self._kept(number, keep, number in failed)], int)
 
     def _kept(self, number: int, keep: str, failed: bool) -> bool:
-        place = self.target / CASES / key_of(self.chunks.names[number])
+        place = os.path.join(self.target, CASES, key_of(self.chunks.names[number]))
         asked = () if failed or keep == "summaries" else ("scene.resolved.toml", PAGE)[:KEEP.index(keep) - 1]
         try:
-            text = (place / SUMMARY).read_bytes()
+            with open(os.path.join(place, SUMMARY), "rb") as file:
+                text = file.read()
         except OSError:
             return False
-        return text[:1] == b"{" and text.rstrip()[-1:] == b"}" and all((place / name).is_file() for name in asked)
+        return text[:1] == b"{" and text.rstrip()[-1:] == b"}" and \
+            all(os.path.isfile(os.path.join(place, name)) for name in asked)
 
     def answers(self, total: Answers) -> Answers:
         """`total` with the answers of all cases that have one."""
