@@ -7,6 +7,8 @@ from .quantity import SIDE
 SURE = 5.0  # noises of a mean of neighbours from which they are worn: chance brings it in 1 of 1000 traces
 MEANS = (1, 4, 16, 64)  # neighbours
 DEEP, LEAST, MOST = 10.0, 12, 400  # noises at which a flank of the wear ends; samples of it to either side
+ABOVE = 3.0  # noises above the trace before from which a height is pile-up
+CLEARLY = 12.0  # noises squared that a step leaves less than a flank from zero, to be taken
 FLOOR = 5  # parts of a track, the deepest of which is its floor
 
 
@@ -26,24 +28,36 @@ def edge(rest, noise: float, together: float):
 def edge_near(rest, worn: int, noise: float, together: float) -> tuple:
     """(edge, lowest, highest) index of the first worn height beside one that is worn (`extent_of`).
 
-    What stands above the trace before, as pile-up beside a track does, is unworn: it counts with the noise alone, and
-    no flank begins there but for the error of its first height.
+    The flank begins at zero, unless one that begins with a step fits clearly better: a step is free to stand within a
+    flank that begins at zero, which draws the edge into the track. What stands above the trace before, as pile-up
+    beside a track does, is unworn: it counts with the noise alone, and no flank begins there but for the error of its
+    first height.
     """
     deep = np.flatnonzero(rest[worn:] > DEEP * noise)
     reach = int(np.clip(deep[0] if deep.size else MOST, LEAST, MOST))
     low, high = max(worn - 2 * reach, 0), min(worn + reach, rest.size)
-    part, sums = rest[low:high], []
-    unworn = np.concatenate([[0.0], np.cumsum(np.where(part > 0, part**2, noise**2))])
-    for k in range(part.size - 3):
-        base = np.vander(np.arange(part.size - k) / part.size, 3)
-        shape = np.linalg.lstsq(base, part[k:], rcond=None)[0]
-        left = part[k:] - base @ shape
-        above = shape[2] < -3 * noise * np.sqrt(together / left.size) and k < worn - low
-        sums.append(np.inf if above else float(unworn[k] + left @ left))
-    sums = np.array(sums)
+    part = rest[low:high]
+    unworn = np.concatenate([[0.0], np.cumsum(np.where(part > -ABOVE * noise, part**2, noise**2))])
+    sums = np.full((2, max(part.size - 3, 1)), np.inf)
+    for k in range(sums.shape[1]):
+        sums[:, k] = unworn[k] + _left(part[k:], noise * np.sqrt(together), k < worn - low)
+    sums = sums[int(sums[1].min() < sums[0].min() - CLEARLY * noise**2 * together)]
     near = np.flatnonzero(sums <= sums.min() + 1.5 * SIDE**2 * noise**2 * together)
     best = low + int(np.argmin(sums))
     return best, max(low + int(near[0]) - 1, 0), min(low + int(near[-1]) + 1, rest.size - 1)
+
+
+def _left(flank, noise: float, before: bool) -> tuple:
+    """Sums of squares that flanks from zero and from a step leave of depths (n,) [m]; noise [m] of their mean times
+    sqrt(n); before: no step up begins there."""
+    base = np.vander(np.arange(flank.size) / flank.size, 3)
+    step = np.linalg.lstsq(base, flank, rcond=None)[0]
+    smooth = np.linalg.lstsq(base[:, :2], flank, rcond=None)[0]
+    if smooth[1] < 0:  # a foot that rises out of the surface, not one that dips above it first
+        smooth = np.array([max(float(base[:, 0] @ flank) / float(base[:, 0] @ base[:, 0]), 0.0), 0.0])
+    left = flank - base[:, :2] @ smooth, flank - base @ step
+    above = before and step[2] < -3 * noise / np.sqrt(flank.size)
+    return float(left[0] @ left[0]), np.inf if above else float(left[1] @ left[1])
 
 
 def floor_of(x, depth, track: tuple, noise: float) -> tuple:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import frozen_array
-from ..edges import FLOOR, edge, edge_near, floor_of
+from ..edges import FLOOR, MEANS, SURE, edge, edge_near, floor_of
 from ..profile import Profile, runs_of
 from ..quantity import SIDE, Quantity, around, refused
 from ..roughness.filter import mean_line
@@ -77,12 +77,13 @@ def tracks_of(found: Registration, together: float, longest: float) -> Tracks:
 
 def _ends(found: Registration, span: tuple, around_it: tuple, together: float) -> tuple:
     """Where a track begins and ends, each a `Quantity`; around_it: samples without another track."""
-    rest, x, (first, last), (low, high) = np.asarray(found.rest), found.x, span, around_it
+    rest, x, (low, high) = np.asarray(found.rest), found.x, around_it
+    first, last = span if found.track is not None else _with_flanks(rest, span, found.loudest, together)
     centre, out = (first + last) // 2, []
     for side, outside, text in ((slice(low, centre), first - low, FROM),
                                 (slice(centre, high), high - 1 - last, TO)):
-        part, places = (one[side] if text is FROM else one[side][::-1] for one in (rest, x))
-        deep = np.flatnonzero(part[:max(outside - MEDIAN, 0)] > 2 * REACH * found.noise)
+        part, places, scatter = (one[side] if text is FROM else one[side][::-1] for one in (rest, x, found.scatter))
+        deep = np.flatnonzero((part > 2 * REACH * scatter)[:max(outside - MEDIAN, 0)])
         beside = int(deep[-1]) + 1 if deep.size else 0  # other worn places do not count
         if found.track is not None:
             beside, at = 0, found.track[0] if text is FROM else [rest.size - 1 - k for k in found.track[1]]
@@ -92,6 +93,18 @@ def _ends(found: Registration, span: tuple, around_it: tuple, together: float) -
         value, *ends = (float(places[beside + k] + half) for k in at)
         out.append(Quantity(value, min(ends), max(ends), "m", text))
     return tuple(out)
+
+
+def _with_flanks(rest, span: tuple, noise: float, together: float) -> tuple:
+    """First and last sample of a track with the shallow ends of its flanks, where single heights do not stand out: as
+    far as means of `MEANS[2]` neighbours do."""
+    many, (first, last) = MEANS[2], span
+    worn = rest > SURE * noise
+    if rest.size >= many:
+        mean = np.convolve(rest, np.full(many, 1 / many), "same")
+        worn = mean > SURE * noise * np.sqrt(together / many)
+    worn[first:last + 1] = True
+    return next((a, b) for a, b in runs_of(worn) if a <= first <= b)
 
 
 def _sizes(found: Registration, start: Quantity, end: Quantity, together: float) -> dict:
