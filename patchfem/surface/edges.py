@@ -4,7 +4,7 @@ import numpy as np
 
 from .quantity import SIDE
 
-SURE = 5.0  # noises of a mean of neighbours from which they are worn: chance brings it in 1 of 1000 traces
+CHANCE = 1e-3  # of traces in which noise alone is taken for worn
 MEANS = (1, 4, 16, 64)  # neighbours
 DEEP, LEAST, MOST = 10.0, 12, 400  # noises at which a flank of the wear ends; samples of it to either side
 ABOVE = 3.0  # noises above the trace before from which a height is pile-up
@@ -12,14 +12,22 @@ CLEARLY = 12.0  # noises squared that a step leaves less than a flank from zero,
 FLOOR = 5  # parts of a track, the deepest of which is its floor
 
 
+def sure_of(count: int, looks: int = len(MEANS)) -> float:
+    """Deviations that normal noise exceeds, in one of so many looks at each of so many heights, in 1 of 1000 traces
+    (Bonferroni)."""
+    from scipy.special import ndtri
+
+    return float(-ndtri(CHANCE / max(count * looks, 1)))
+
+
 def edge(rest, noise: float, together: float):
     """(edge, lowest, highest) index of the first worn height, None without one."""
-    worn = None
+    worn, sure = None, sure_of(rest.size)
     for many in MEANS:
         if many > rest.size:
             break
         mean = np.convolve(rest, np.full(many, 1 / many), "valid")
-        deep = np.flatnonzero(mean > SURE * noise * np.sqrt((together if many > 1 else 1.0) / many))
+        deep = np.flatnonzero(mean > sure * noise * np.sqrt((together if many > 1 else 1.0) / many))
         if deep.size and (worn is None or deep[0] + many - 1 < worn):
             worn = int(deep[0] + many - 1)
     return None if worn is None else edge_near(rest, worn, noise, together)

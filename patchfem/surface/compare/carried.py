@@ -102,6 +102,16 @@ def hidden_wear(found: Registration | None, by: Carried | None) -> Quantity:
     return Quantity((abs(found.slope) + SIDE * found.errors[1]) * length / 2, 0.0, None, "m", HIDDEN)
 
 
+def outside(by: Carried, extent) -> Carried:
+    """The same with the unworn parts cut off where the wear begins and ends; extent: `depth.Extent` or None."""
+    if extent is None:
+        return by
+    first, last = (one.value for one in extent.after)
+    parts = ((a, min(b, first) if a < first else b) for a, b in by.parts)
+    parts = ((max(a, last) if b > last else a, b) for a, b in parts)
+    return by._replace(parts=tuple((a, b) for a, b in parts if b > a))
+
+
 def _what(by: Carried) -> str:
     return "valleys between worn tops" if by.by == "valleys" else "unworn parts"
 

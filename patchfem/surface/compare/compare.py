@@ -12,7 +12,7 @@ from ..quantity import SIDE, Quantity, around, refused
 from ..roughness.spectrum import BAND
 from ..scans.change import Change, changed
 from . import depth as worn_depth
-from .carried import Carried, carried, hidden_wear, raised
+from .carried import Carried, carried, hidden_wear, outside, raised
 from .depth import Worn
 from .flanks import Flanks, flanks_of
 from .place import Match
@@ -164,6 +164,7 @@ def _placed(place: Place, direction: str, band: tuple, removed: tuple) -> Compar
                                   "wear cannot be told from no wear", worn.deposited if raised(found) else 0.0)
     pieces = pieces_of(found, tracks, band[1])
     flat = pieces_of(found, tracks, band[1], True)
+    by = outside(by, worn.extent)
     ratios, sizes = [], [tuple(_pooled(side, step, band) for side in zip(*one)) for one in (flat, pieces)]
     for name, text, alike, noise in zip(("amplitude", "slope"), (AMPLITUDE, SLOPE), _alike(flat, step, band),
                                         of_noise(sizes[0], float(np.sqrt(np.mean(found.scatter**2))), step, band)):

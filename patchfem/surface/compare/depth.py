@@ -76,10 +76,11 @@ def within(found: Registration, start: Quantity, end: Quantity) -> Quantity | No
 def extent_of(found: Registration, together: float) -> Extent | None:
     """Where the wear begins and ends, None where none stands out from the noise.
 
-    The outermost heights count as worn whose mean, of 1 to 64 neighbours, is deeper than five times its noise. The edge
-    is then that of the least-squares flank, zero outside and a + b t + c t^2 inside, fitted beside it as far as the
-    depth reaches ten noises; every edge whose sum of squares is within 5.8 noise^2 of the least is in the interval
-    (3.84, were the flank a parabola). What is worn less than the noise shows lies outside.
+    The outermost heights count as worn whose mean, of 1 to 64 neighbours, is deeper than noise alone brings it in 1 of
+    1000 traces. The edge is then that of the least-squares flank, zero outside and b t + c t^2 inside, fitted beside it
+    as far as the depth reaches ten noises, or a + b t + c t^2 where a step a fits clearly better; every edge whose sum
+    of squares is within 5.8 noise^2 of the least is in the interval (3.84, were the flank a parabola). What is worn
+    less than the noise shows lies outside.
     together: how many neighbouring heights err alike.
     """
     rest = np.asarray(found.rest)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...core import frozen_array, say
+from ..edges import sure_of
 from ..profile import Profile, runs_of
 from .registration import Registration
 
@@ -16,15 +17,16 @@ GROWN, FALLEN = 9.0, 2.0  # such parts of the height is a step of the walls of w
 def without_specks(found: Registration, before: Profile, after: Profile) -> tuple:
     """Both traces without what stands out of their registered difference as no surface does; the same where nothing.
 
-    A speck is 12 samples wide or less at half of its height, and the difference climbs and falls at it by steps larger
-    than four deviations of those of the first trace: tops that wore off have the slopes of the surface. Nothing that
-    wears stands above the first trace, nor below all of it nearby: there less will do, a ninth of the height of what
-    grew, half of a hollow. It is left out of the trace that has the larger steps there.
+    A speck is 12 samples wide or less at half of its height, and the difference climbs and falls at it by steps
+    larger than four deviations of those of the first trace: tops that wore off have the slopes of the surface.
+    Nothing that wears stands above the first trace, nor below all of it nearby: there less will do, a ninth of the
+    height of what grew, half of a hollow. None is so low that noise alone would bring it (`edges.sure_of`). It is
+    left out of the trace that has the larger steps there.
     """
     rest, first = np.asarray(found.rest), np.asarray(found.first)
     if rest.size < 2 * MEDIAN:
         return before, after
-    off = rest - _median(rest)
+    off, sure = rest - _median(rest), sure_of(2 * rest.size, 1)  # above or below
     steps = 1.4826 * float(np.median(np.abs(np.diff(first)))) + 1.5 * found.noise
     sides = first, first - rest
     marked = [np.zeros(before.x.size, bool), np.zeros(after.x.size, bool)]
@@ -32,7 +34,7 @@ def without_specks(found: Registration, before: Profile, after: Profile) -> tupl
     for low, high in runs_of(np.abs(off) > 3 * found.noise):
         here, size = slice(max(low - 1, 0), high + 2), np.abs(off[low:high + 1])
         walls, height, at = np.diff(rest[here]), float(size.max()), low + int(np.argmax(size))
-        if (size > height / 2).sum() > WIDEST or size.size > 3 * WIDEST or \
+        if height < sure * float(found.scatter[at]) or (size > height / 2).sum() > WIDEST or size.size > 3 * WIDEST or \
                 min(walls.max(), -walls.min()) < _least(found, at, off[at] > 0, height, steps):
             continue
         which = int(np.argmax([np.abs(np.diff(side[here])).max() for side in sides]))

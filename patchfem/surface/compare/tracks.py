@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import frozen_array
-from ..edges import FLOOR, MEANS, SURE, edge, edge_near, floor_of
+from ..edges import FLOOR, MEANS, edge, edge_near, floor_of, sure_of
 from ..profile import Profile, runs_of
 from ..quantity import SIDE, Quantity, around, refused
 from ..roughness.filter import mean_line
@@ -98,11 +98,11 @@ def _ends(found: Registration, span: tuple, around_it: tuple, together: float) -
 def _with_flanks(rest, span: tuple, noise: float, together: float) -> tuple:
     """First and last sample of a track with the shallow ends of its flanks, where single heights do not stand out: as
     far as means of `MEANS[2]` neighbours do."""
-    many, (first, last) = MEANS[2], span
-    worn = rest > SURE * noise
+    many, (first, last), sure = MEANS[2], span, sure_of(rest.size)
+    worn = rest > sure * noise
     if rest.size >= many:
         mean = np.convolve(rest, np.full(many, 1 / many), "same")
-        worn = mean > SURE * noise * np.sqrt(together / many)
+        worn = mean > sure * noise * np.sqrt(together / many)
     worn[first:last + 1] = True
     return next((a, b) for a, b in runs_of(worn) if a <= first <= b)
 
