@@ -57,15 +57,23 @@ def edge_near(rest, worn: int, noise: float, together: float) -> tuple:
 
 def _left(flank, noise: float, before: bool) -> tuple:
     """Sums of squares that flanks from zero and from a step leave of depths (n,) [m]; noise [m] of their mean times
-    sqrt(n); before: no step up begins there."""
-    base = np.vander(np.arange(flank.size) / flank.size, 3)
-    step = np.linalg.lstsq(base, flank, rcond=None)[0]
-    smooth = np.linalg.lstsq(base[:, :2], flank, rcond=None)[0]
-    if smooth[1] < 0:  # a foot that rises out of the surface, not one that dips above it first
-        smooth = np.array([max(float(base[:, 0] @ flank) / float(base[:, 0] @ base[:, 0]), 0.0), 0.0])
-    left = flank - base[:, :2] @ smooth, flank - base @ step
-    above = before and step[2] < -3 * noise / np.sqrt(flank.size)
-    return float(left[0] @ left[0]), np.inf if above else float(left[1] @ left[1])
+    sqrt(n); before: no step up begins there.
+
+    A flank from zero begins at its first height, at the last unworn one, or half-way, and rises out of the surface: one
+    that would dip above it first is c t^2.
+    """
+    n, square = flank.size, float(flank @ flank)
+    base = np.vander(np.arange(n) / n, 3)
+    shape = np.linalg.lstsq(base, flank, rcond=None)[0]
+    left = flank - base @ shape
+    smooth = []
+    for t in ((np.arange(n) + off) / n for off in (0.0, 0.5, 1.0)):
+        t2 = t * t
+        (a, b, c), p, q = (float(t @ t), float(t @ t2), float(t2 @ t2)), float(flank @ t), float(flank @ t2)
+        rise = (c * p - b * q) / (a * c - b * b)
+        smooth.append(square - (rise * p + (q - b * rise) / c * q if rise >= 0 else max(q, 0.0)**2 / c))
+    above = before and shape[2] < -3 * noise / np.sqrt(n)
+    return min(smooth), np.inf if above else float(left @ left)
 
 
 def floor_of(x, depth, track: tuple, noise: float) -> tuple:
