@@ -26,6 +26,7 @@ from .tracks import Tracks, beside_flanks, of_flanks, pieces_of, tracks_of
 SHIFT = "shift: the point at x in the first trace (before wear) is at x + shift in the second trace (after wear)"
 STRETCH = ("length of the second trace (after wear) divided by the length of the first trace for the same stretch of "
            "surface, found from the unworn valleys")
+LOUD = 1.0  # mean square of the noise over that of the surface, from which a ratio is one of noise
 TILT = "tilt of the second trace (after wear) relative to the first (before wear)"
 AMPLITUDE = ("amplitude of a sine with the same mean square as the waves of 60 um to 110 um: value after wear divided "
              "by value before")
@@ -86,7 +87,8 @@ class Comparison:
                "tilt": self.tilt, "scale": self.stretch}
         if self.worn.extent is not None:
             names = (f"worn_{end}_{when}" for when in ("before", "after") for end in ("from", "to"))
-            out.update(zip(names, (*self.worn.extent.before, *self.worn.extent.after)))
+            known = self.worn.extent.known
+            out.update(zip(names, (*known.before, *known.after)))
             out |= {} if self.worn.within is None else {"worn_depth_within": self.worn.within}
         out |= _named(self.tracks.sizes)
         if isinstance(self.before, Profile):
@@ -157,8 +159,7 @@ def _placed(place: Place, direction: str, band: tuple, removed: tuple) -> Compar
     worn, tracks = worn_depth.of_registration(found), Tracks(())
     if by.by:
         tracks = tracks_of(found, worn_depth.neighbours(found), band[1])
-        if found.track is not None:  # no single height stands out, only the floor does
-            worn = replace(worn, largest=tracks.sizes["depth_floor"]._replace(text=worn_depth.MAX))
+        worn = replace(worn, largest=_deepest(found, worn.largest, tracks.sizes.get("depth_floor")))
     else:
         worn = worn_depth.nowhere("no part of the traces is known to be unworn, so uniform, wedge-shaped or bow-shaped "
                                   "wear cannot be told from no wear", worn.deposited if raised(found) else 0.0)
@@ -170,7 +171,10 @@ def _placed(place: Place, direction: str, band: tuple, removed: tuple) -> Compar
                                         of_noise(sizes[0], float(np.sqrt(np.mean(found.scatter**2))), step, band)):
         one, other = (ratio(name, text, *pair[::-1], alike) for pair in sizes)
         off = abs(np.log(one.value / other.value)) if one.value and other.value else 0.0
-        ratios.append(loose(one, float(np.hypot(np.hypot(BEYOND, noise), off))))
+        ratios.append(loose(one, float(np.hypot(np.hypot(BEYOND, noise), off))) if noise < LOUD else refused(
+            "1", text, f"the noise of the measurement, {say(found.noise)} between the traces, has a larger {name} than "
+                       "the surface, so this ratio tells nothing of the surface; measure with less noise, or smooth "
+                       "both traces alike"))
     stretch = around(1 + found.stretch[0], found.stretch[1], "1", STRETCH) if np.isfinite(found.stretch[0]) \
         else refused("1", STRETCH, "too few heights are unworn")
     grew = worn.deposited > (worn.area.high or 0.0) and not (worn.mean.low or 0.0) > 0
@@ -178,6 +182,15 @@ def _placed(place: Place, direction: str, band: tuple, removed: tuple) -> Compar
                       stretch, around(found.slope, found.errors[1], "rad", TILT), worn, *ratios, None, sizes[0], found,
                       None, tuple(notes), grew, tracks, by, hidden, removed, place.mirrored, place.turned, gain,
                       visible=None if visible is None or by.by else visible.least)
+
+
+def _deepest(found: Registration, largest: Quantity, floor: Quantity | None) -> Quantity:
+    """The largest worn depth, which is not less than the floor of a track: both are told with their errors."""
+    if floor is None or (found.track is None and floor.value <= largest.value):
+        return largest
+    if found.track is not None:  # no single height stands out, only the floor does
+        return floor._replace(text=worn_depth.MAX)
+    return largest._replace(value=floor.value, low=min(largest.low, floor.value), high=max(largest.high, floor.high))
 
 
 def _apart(place: Place, direction: str, band: tuple, removed: tuple) -> Comparison:

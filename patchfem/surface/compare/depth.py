@@ -23,14 +23,25 @@ WITHIN = "mean worn depth between the first and the last worn point, including t
 TAIL = (0.02, 0.25)  # share of the lowest heights that both Abbott curves are laid on each other over
 DEPOSIT = 4.0  # deviations above the trace before from which a height is a deposit, not noise
 FROM, TO = "first worn place", "last worn place"
+OUTSIDE = 5  # unworn heights, of which fewer do not show that the wear ends
 SLIGHT = 0.5  # noises: wear less deep than that passes for none (test_registration)
 
 
 class Extent(NamedTuple):
-    """First and last worn place in the x of the trace before and of the trace after, each a `Quantity` [m]."""
+    """First and last worn place in the x of the trace before and of the trace after, each a `Quantity` [m]; cut:
+    whether either is at the end of the common part, so that the wear may go on."""
 
     before: tuple
     after: tuple
+    cut: tuple = (False, False)
+
+    @property
+    def known(self) -> "Extent":
+        """The same without the places at which only the common part ends."""
+        why = "the wear reaches the end of the common part of the traces here and may go on"
+        sides = (tuple(refused(one.unit, one.text, why) if cut else one for one, cut in zip(ends, self.cut))
+                 for ends in (self.before, self.after))
+        return Extent(*sides, self.cut)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +114,7 @@ def extent_of(found: Registration, together: float) -> Extent | None:
     before = tuple(Quantity(back(place), back(low) - moved, back(high) + moved, "m",
                             f"{text}, as x of the first trace (before "
                             "wear)") for (place, low, high), text in zip(places, (FROM, TO)))
-    return Extent(before, after)
+    return Extent(before, after, (ends[0][0] < OUTSIDE, ends[1][0] < OUTSIDE))
 
 
 def summed(found: Registration, inside, deposits: bool = True) -> tuple:

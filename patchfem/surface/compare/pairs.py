@@ -102,7 +102,7 @@ def means_of(rows: list) -> list[tuple]:
     for group, each in groups.items():
         names = dict.fromkeys(name for one in each for name in one if name.removesuffix("_x").removesuffix("_y")
                               in AVERAGED)
-        found = {name: mean_of([quantity(one[name]) for one in each if one.get(name, {}).get("value") is not None],
+        found = {name: mean_of([quantity(one[name]) for one in each if one.get(name, {}).get("high") is not None],
                                "mean over the pairs") for name in names}
         out.append((group, len(each), {name: one for name, one in found.items() if one is not None}))
     return out

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import frozen_array
+from ...core import frozen_array, say
 from ..edges import FLOOR, MEANS, edge, edge_near, floor_of, sure_of
 from ..profile import Profile, runs_of
 from ..quantity import SIDE, Quantity, around, refused
@@ -76,10 +76,11 @@ def tracks_of(found: Registration, together: float, longest: float) -> Tracks:
 
 
 def _ends(found: Registration, span: tuple, around_it: tuple, together: float) -> tuple:
-    """Where a track begins and ends, each a `Quantity`; around_it: samples without another track."""
+    """Where a track begins and ends, each a `Quantity`, and whether it reaches either end of the common part, so that
+    it may be longer; around_it: samples without another track."""
     rest, x, (low, high) = np.asarray(found.rest), found.x, around_it
     first, last = span if found.track is not None else _with_flanks(rest, span, found.loudest, together)
-    centre, out = (first + last) // 2, []
+    centre, out, cut = (first + last) // 2, [], []
     for side, outside, text in ((slice(low, centre), first - low, FROM),
                                 (slice(centre, high), high - 1 - last, TO)):
         part, places, scatter = (one[side] if text is FROM else one[side][::-1] for one in (rest, x, found.scatter))
@@ -90,9 +91,10 @@ def _ends(found: Registration, span: tuple, around_it: tuple, together: float) -
         else:
             at = edge_near(part[beside:], outside - beside, found.loudest, together)
         half = (places[0] - places[1]) / 2  # an edge lies between the last unworn sample and the first worn one
+        cut.append(beside + at[0] < MEDIAN and outside == (first if text is FROM else rest.size - 1 - last))
         value, *ends = (float(places[beside + k] + half) for k in at)
         out.append(Quantity(value, min(ends), max(ends), "m", text))
-    return tuple(out)
+    return (*out, tuple(cut))
 
 
 def _with_flanks(rest, span: tuple, noise: float, together: float) -> tuple:
@@ -107,10 +109,10 @@ def _with_flanks(rest, span: tuple, noise: float, together: float) -> tuple:
     return next((a, b) for a, b in runs_of(worn) if a <= first <= b)
 
 
-def _sizes(found: Registration, start: Quantity, end: Quantity, together: float) -> dict:
+def _sizes(found: Registration, start: Quantity, end: Quantity, cut: tuple, together: float) -> dict:
     """Width, depths, net and lost area, and pile-up of the track from start to end [m], each a `Quantity`.
 
-    The interval of the mean depth has that of the width.
+    The interval of the mean depth has that of the width. cut: whether the common part ends within it on either side.
     """
     x, width = found.x, max(end.value - start.value, 1e-300)
     area, error = summed(found, (x > start.value) & (x < end.value), False)[:2]
@@ -121,13 +123,28 @@ def _sizes(found: Registration, start: Quantity, end: Quantity, together: float)
              ((start.value - width, start.value, LEFT), (end.value, end.value + width, RIGHT))]
     piled = sides[0].value + sides[1].value
     loose = float(np.hypot(*(max(one.high - one.value, one.value - one.low) for one in sides))) / SIDE
-    return {"from": start, "to": end, "width": around(width, wide, "m", WIDTH, 0.0),
+    out = {"from": start, "to": end, "width": around(width, wide, "m", WIDTH, 0.0),
             "depth_mean": around(depth, float(np.hypot(error / width, depth * wide / width)), "m", DEPTH, 0.0),
             "depth_floor": _floor(found, start.value, width, together),
             "step": around(third[0] / third[2], third[1] / third[2], "m", STEP, 0.0),
             "area_net": around(area - piled, float(np.hypot(error, loose)), "m2", NET),
             "area_gross": around(area, error, "m2", GROSS, 0.0), "pile_up": around(piled, loose, "m2", PILED, 0.0),
             "pile_up_left": sides[0], "pile_up_right": sides[1]}
+    return _open(out, found.x, cut) if any(cut) else out
+
+
+def _open(sizes: dict, x, cut: tuple) -> dict:
+    """Sizes of a track that reaches an end of the common part: what is seen of it is the least that there is."""
+    where = " and ".join(f"x = {say(float(x[k]), 4)}" for k, one in zip((0, -1), cut) if one)
+    why = f"the track reaches the end of the common part of the traces at {where} and may be longer"
+    gone = {"from": cut[0], "to": cut[1], "step": True, "area_net": True, "pile_up": True, "pile_up_left": cut[0],
+            "pile_up_right": cut[1]}
+    out = {name: refused(one.unit, one.text, why) if gone.get(name) else one for name, one in sizes.items()}
+    least = {name: out[name]._replace(high=None, text=f"{out[name].text}, at least: {why}")
+             for name in ("width", "area_gross")}
+    seen = {name: out[name]._replace(text=f"{out[name].text}, of the part that the traces show")
+            for name in ("depth_mean", "depth_floor")}
+    return out | least | seen
 
 
 def _pile_up(found: Registration, low: float, high: float, together: float, text: str) -> Quantity:

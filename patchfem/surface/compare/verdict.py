@@ -120,7 +120,7 @@ def _slope(ratio: Quantity, name: str) -> str:
 
 def _gain(one: Comparison, name: str) -> list:
     """That waves or slopes changed by one factor of all heights, as a sentence."""
-    if one.gain is None or {changed(one.amplitude_ratio), changed(one.slope_ratio)} == {"no change shown"}:
+    if one.gain is None or not {changed(one.amplitude_ratio), changed(one.slope_ratio)} & {"reduced", "increased"}:
         return []
     return [f"All heights{name} after wear are {one.gain:.4g} times the heights before; a difference in the gain of "
             "the instrument explains this factor, but wear does not; calibrate z of both measurements."]
@@ -190,7 +190,7 @@ def _worn(one: Comparison, name: str) -> str:
     text = (f"Worn{name}: {_track(one)}{_length(mean)} on average {what}, {_length(one.worn.largest)} at the deepest "
             f"place.{above}")
     if one.worn.extent is not None and not one.tracks.sizes:
-        before, after = (_span(*(end.value for end in ends)) for ends in one.worn.extent)
+        before, after = (_span(*(end.value for end in ends)) for ends in one.worn.extent[:2])
         text += f" Worn from x = {before} in the first trace (before wear), that is from {after} in the second"
         mean = one.worn.within
         text += "." if mean is None else f", with a depth of {_length(mean)} on average between these places."
@@ -215,8 +215,14 @@ def _track(one: Comparison) -> str:
         return f"a track from about x = {_span(one.flanks.start, one.flanks.end)} in the second trace (after wear); "
     if not found:
         return ""
-    return (f"a track from x = {_span(found['from'].value, found['to'].value)} in the second trace (after wear), "
-            f"{_length(found['depth_mean'])} deep on average, its floor {_length(found['depth_floor'])}; ")
+    ends = found["from"], found["to"]
+    depths = f"{_length(found['depth_mean'])} deep on average, its floor {_length(found['depth_floor'])}; "
+    if None not in (ends[0].value, ends[1].value):
+        return f"a track from x = {_span(*(each.value for each in ends))} in the second trace (after wear), {depths}"
+    places = [f"{word} {f'the {edge} of the common part' if each.value is None else f'x = {say(each.value, 4)}'}"
+              for word, edge, each in zip(("from", "to"), ("beginning", "end"), ends)]
+    return (f"a track {' '.join(places)} in the second trace (after wear), so the track may be longer than the "
+            f"{say(found['width'].value)} that both traces show of it; there {depths}")
 
 
 def _apart(one: Comparison) -> list:
