@@ -307,6 +307,19 @@ def sticks(begin, end, way, k, h, u):
 
 
 @njit(error_model="numpy", **LEAN)
+def edge(begin, end, way, k, h, low, high):
+    """Share of a part of a step, in [low, high], at which a stick begins or ends; arguments as of `held`."""
+    first = sticks(begin, end, way, k, h, low)
+    for _ in range(HALVINGS):
+        u = 0.5 * (low + high)
+        if sticks(begin, end, way, k, h, u) == first:
+            low = u
+        else:
+            high = u
+    return low
+
+
+@njit(error_model="numpy", **LEAN)
 def held(begin, end, way, room, i, h):
     """(share of a part of a step in which the contact sticks; share inside it at which it begins to slip, 2: nowhere;
     irreversible part of the slide where that turns inside it, that of its end without).
@@ -315,17 +328,15 @@ def held(begin, end, way, room, i, h):
     irreversible part turns where there is no stretch; at a kink `advance` tells where.
     """
     k, (x, v, _, z), (x1, v1, _, z1) = numbers(room, i), begin, end
-    furthest, low, high = slid(x1, z1, room, i), 0.0, 1.0
-    if not friction.BENDS and z * z1 < 0.0:
-        u = zero(z, z1, h * v * friction.flowing(k, z, v, way)[1], h * v1 * friction.flowing(k, z1, v1, way)[1])
-        furthest = cubic(x, x1, h * v, h * v1, u)
-    first = sticks(begin, end, way, k, h, 0.0)
-    if first == sticks(begin, end, way, k, h, 1.0):
+    furthest, middle = slid(x1, z1, room, i), 1.0
+    if z * z1 < 0.0:
+        middle = zero(z, z1, h * v * friction.flowing(k, z, v, way)[1], h * v1 * friction.flowing(k, z1, v1, way)[1])
+        furthest = furthest if friction.BENDS else cubic(x, x1, h * v, h * v1, middle)
+    first, last = sticks(begin, end, way, k, h, 0.0), sticks(begin, end, way, k, h, 1.0)
+    if first != last:
+        u = edge(begin, end, way, k, h, 0.0, 1.0)
+        return u if first else 1 - u, u if first else 2.0, furthest
+    if first or not sticks(begin, end, way, k, h, middle):
         return 1.0 if first else 0.0, 2.0, furthest
-    for _ in range(HALVINGS):
-        u = 0.5 * (low + high)
-        if sticks(begin, end, way, k, h, u) == first:
-            low = u
-        else:
-            high = u
-    return low if first else 1 - low, low if first else 2.0, furthest
+    u = edge(begin, end, way, k, h, middle, 1.0)  # it slips at both ends, by stretches of opposite sign
+    return u - edge(begin, end, way, k, h, 0.0, middle), u, furthest
