@@ -107,6 +107,25 @@ def test_always_a_batch_that_is_contradicted_is_exact(monkeypatch):
     np.testing.assert_array_equal(found.values["loop_area"], ones.values["loop_area"])
 
 
+def test_always_a_case_that_is_contradicted_by_itself_is_exact_by_itself(monkeypatch):
+    """One of all that are checked: the others stay what they are."""
+    cases = models("coulomb", 5, 64)
+    real, clean = lanes.contradicted, many.answers(cases)
+    one = []
+
+    def wrong(found, ones, looked, exact, times):
+        one[:] = one or [looked[0]]
+        return real(found, ones, looked, exact, times) | (dict.fromkeys(one, "loop_area") if one[0] in looked else {})
+
+    monkeypatch.setattr(lanes, "contradicted", wrong)
+    found, exact = many.answers(cases), lumped_answers(cases)
+    assert found.numerics[one[0]]["engine"] == "exact" != clean.numerics[one[0]]["engine"]
+    assert "differed from it in 1, in loop_area of this case, so this case was" in found.notes[one[0]][-1]
+    assert found.values["loop_area"][one[0]] == exact.values["loop_area"][one[0]]
+    others = np.arange(64) != one[0]
+    np.testing.assert_array_equal(found.values["loop_area"][others], clean.values["loop_area"][others])
+
+
 def test_always_a_contradicted_law_of_a_stretch_marches_by_twice_the_steps(monkeypatch):
     """Where that mends what the check found, no case is run by itself."""
     cases = models("tanh", 5, 64)
