@@ -143,6 +143,19 @@ def test_always_a_contradicted_law_of_a_stretch_marches_by_twice_the_steps(monke
     assert all("creeps" in notes[-1] and len(notes) == 1 for notes in found.notes.values()) and len(found.notes) == 64
 
 
+def test_exact_a_stick_shorter_than_a_step_counts():
+    """Bonds that turn over by a slide far shorter than that of a step stick while their stretch passes the middle."""
+    base = base_of(load(SCENE.format(law=LAWS["nonlocal"])))
+    cases = [build(base.changed(["normal.load=0.03 N", f"friction.bond_length={length!r} m"]))
+             for length in np.geomspace(3e-8, 3e-7, 64).tolist()]
+    found = many.answers(cases)
+    some = [case for case in (0, 31, 63) if found.numerics[case]["engine"] == "lanes"]
+    stick, ones = found.values["stick_fraction"], one_by_one.solve([cases[case] for case in some])
+    assert len(some) == 3 and (stick / 2 < 1 / min(found.numerics[case]["steps_per_cycle"] for case in some)).all()
+    np.testing.assert_allclose(stick[some], ones.values["stick_fraction"], rtol=2e-3)
+    np.testing.assert_allclose(np.diff(np.log(stick)), np.log(10) / 63 / 2, rtol=0.3)  # as the root of the length
+
+
 @pytest.mark.parametrize("law", EXACT[:3])
 def test_exact_what_sticks_is_told_by_lanes(law):
     """Cases that end stuck, with their rings: the answers of the exact batch within the bars, and no measure less."""

@@ -5,9 +5,9 @@ which shows how its errors fall. Such a case and one of Iwan march by twice the 
 tolerance: what they said before tells the errors then. A case of Iwan or of the elastic-plastic law that has not
 settled marches on. What rings in a stick that lasts all the time is told in closed form behind one spring, else by a
 fit. A case goes to the exact batch `lumped`, or under a law of a stretch to a run of its own, where a bar still misses
-its tolerance, rings in shorter sticks are to be told, or a motion grows. Where these contradict one of a few cases (under a
-law of a stretch twice: by its steps and by as many again), more are checked; where more than 3 in 100 of them are
-contradicted, every case of the batch is exact, else those are.
+its tolerance, rings in shorter sticks are to be told, or a motion grows. Where these contradict one of a few (under a
+law of a stretch twice: by its steps and by as many again), more are checked; where more than 3 in 100 are contradicted,
+every case of the batch is exact, else those are.
 """
 
 from collections.abc import Callable, Sequence
