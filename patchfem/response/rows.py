@@ -272,8 +272,8 @@ ROWS = (
         "returns more energy than it dissipates",
         lambda s: s.cycle.get("loop_area"), group="energy"),
     Row("equivalent_stiffness", "N m-1", 1.0,
-        "first harmonic of the friction force (only the part in phase with the slide) divided by the first harmonic of "
-        "the slide; negative if friction holds the spring deflected during stick",
+        "part of the first harmonic of the friction force that is in phase with the slide, divided by the first "
+        "harmonic of the slide; negative if friction keeps the spring of the structure deflected during stick",
         lambda s: s.cycle.get("equivalent_stiffness"), group="friction",
         term=("magnitude of the complex ratio of the two first harmonics", first_harmonic)),
     Row("secant_stiffness", "N m-1", 1.0,

@@ -113,7 +113,8 @@ def _of_matrices(data, pairs, pushed, forced, where) -> ModalBasis:
     M, K, C = (_square(data, key, where) for key in ("M", "K", "C"))
     n = len(M)
     if n == 0:
-        raise PatchfemError(f"{where}: M has no coordinate; a square matrix [kg] of at least one coordinate is needed")
+        raise PatchfemError(f"{where}: M has no coordinate (the matrix is empty); a square matrix [kg] with at least "
+                            "one row is needed")
     if pairs and "slide" in data:
         raise PatchfemError(f"{where}: contains `slide`, but [[structure.interface]] also defines where sliding "
                             "occurs: keep only one of these two descriptions")

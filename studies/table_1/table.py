@@ -246,8 +246,8 @@ def head(rows: dict) -> list:
         f"{none['constant'][0]} for a constant times the input; {none['power_input_frequency'][0]} for a power "
         f"law in input and frequency; {three(one['spring']['others'])} for \"spring and yaw\" with √2 x fundamental "
         f"(three fitted parameters); {three(one['path']['others'])} for \"path of Fig. 27\" with peak x stuck (three "
-        f"fitted parameters; the path itself is not fitted); and {three(one['root']['others'])} for \"path of Fig. 27\" "
-        "with √2 x fundamental.",
+        f"fitted parameters; the path itself is not fitted); and {three(one['root']['others'])} for \"path of Fig. "
+        "27\" with √2 x fundamental.",
         "Compared with a constant times the input, \"spring and yaw\" predicts the displacements better and the "
         "accelerations worse. \"Path of Fig. 27\" predicts displacements and accelerations better than the constant "
         "does. Its advantage in the accelerations is small: if the rows of Table 1 are resampled (bootstrap), \"path "

@@ -217,7 +217,7 @@ def test_always_a_bench_says_whether_it_slipped():
 
     done = Outcome.DONE.sentence
     assert said(1.5e-6, 1e-9) == \
-        f"{done} Slip amplitude 1.5000 ± 0.0010 um, half peak-to-peak, averaged over the interface."
+        f"{done} Slip amplitude (half the peak-to-peak slip, averaged over the interface): 1.5000 ± 0.0010 um."
     for holds in ((1e-12, 2e-12), (1e-23, 1e-33), (1e-11, None)):
         assert said(*holds) == f"{done} The interface sticks: no slip in the last cycle."
     assert verdict({"outcome": "done", "kind": "bench", "measures": {}}) == done

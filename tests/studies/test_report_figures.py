@@ -76,7 +76,8 @@ def test_figure_5_ringing_of_the_block():
     ratio = one.swings(exact)[2] / one.swings(exact)[1]
     assert ratio == pytest.approx(np.exp(-0.02 * np.pi), rel=2e-3)
     inside(one.ANSWER, f"amplitude of {exact.peak:.3f} a0", f"swing is {ratio:.3f} of",
-           f"{euler[0.1].peak:.3f} a0 with a step of 0.1/w0", f"{euler[0.2].peak:.3f} a0 with 0.2/w0")
+           f"{euler[0.1].peak:.3f} a0 with a time step of 0.1/w0",
+           f"{euler[0.2].peak:.3f} a0 with a time step of 0.2/w0")
     inside(one.__doc__, f"for {100 * one.held(exact):.0f} % of the time")
     assert one.swings(euler[0.04])[2] == pytest.approx(one.swings(euler[0.04])[1], rel=3e-3)  # nothing is left of 2 %
     assert one.turns(exact).size == 18 and one.REPRODUCED == "yes"

@@ -132,7 +132,8 @@ def _slid(slip: dict | None, done: str, patch: bool) -> str:
         return done
     if slip["value"] <= max(_open(slip), NO_SLIP):
         return f"{done} {_holds(patch, 'cycle')}"
-    return f"{done} Slip amplitude {pair('slip_amplitude', slip)}, half peak-to-peak, averaged over the interface."
+    return (f"{done} Slip amplitude (half the peak-to-peak slip, averaged over the interface): "
+            f"{pair('slip_amplitude', slip)}.")
 
 
 def _open(one: dict) -> float:
@@ -176,7 +177,7 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str, str], s
         else:
             for name, text in SHAKEN.items():
                 said(name, text)
-            said("relative_displacement_amplitude", "the largest swing is {} half peak-to-peak"
+            said("relative_displacement_amplitude", "half the peak-to-peak displacement of the output is {}"
                  if next(iter(SHAKEN)) in measures else "displacement amplitude at the output {} (half peak-to-peak)")
             said("relative_displacement_amplitude_steady", "this amplitude would settle at {}")
             said("absolute_acceleration_peak", "peak acceleration {}")

@@ -37,8 +37,8 @@ class Accuracy(Table):
                                             "tolerance") = None
     shear_modes: key(whole(1, 10_000) | None, "number of shear modes of the pieces; default: set by the "
                                               "tolerance") = None
-    convergence: key(Literal["force", "velocity", "displacement"] | None, "quantity whose relative change per "
-                     "iteration decides when method 'duhamel' stops iterating") = None
-    convergence_tolerance: key(Positive | None, "relative change of the quantity `convergence` below which method "
-                               "'duhamel' stops iterating") = None
+    convergence: key(Literal["force", "velocity", "displacement"] | None, "method 'duhamel' stops iterating when the "
+                     "relative change of this quantity in one iteration is below `convergence_tolerance`") = None
+    convergence_tolerance: key(Positive | None, "method 'duhamel' stops iterating when the relative change of the "
+                               "quantity named in `convergence` is below this value") = None
     stick_speed: key(Speed | None, "sliding speed below which method 'newmark' treats the interface as stuck") = None

@@ -317,12 +317,12 @@ class Drive(Table):
                        "amplitude of the base acceleration of each sine, zero to peak") = None
     phases: key(Annotated[tuple[quantity("angle"), ...], Field(min_length=2)] | None, "phase of each sine at the "
                 "start of the run; default: 0") = None
-    onset: key(Literal["slip", "distortion", "gauge"], "what counts as the onset of slip in the measure onset_level: "
-               "'slip', the first irreversible motion (for an elastic interface, more than a thousandth of its "
-               "elastic range); 'distortion', a third harmonic of the acceleration above 3 % of the first harmonic; "
-               "'gauge', half the peak-to-peak motion at the output above `onset_length`") = "distortion"
-    onset_length: key(Length | None, "smallest motion that the gauge shows, as half the peak-to-peak motion at the "
-                      "output", "with onset `gauge`") = None
+    onset: key(Literal["slip", "distortion", "gauge"], "event that counts as the onset of slip in the measure "
+               "onset_level. 'slip': the interface slips irreversibly (an elastic interface: by more than a thousandth "
+               "of its elastic range). 'distortion': the third harmonic of the acceleration exceeds 3 % of the first "
+               "harmonic. 'gauge': half the peak-to-peak motion at the output exceeds `onset_length`") = "distortion"
+    onset_length: key(Length | None, "smallest motion at the output that the gauge can show, half peak-to-peak",
+                      "with onset `gauge`") = None
     force: key(Force | None, "amplitude of the force, zero to peak",
                "with kind `force` and waveform `sine`, `step` or `sweep`") = None
     mass: key(whole(1, MOST_MASSES) | None, "number of the mass on which the force acts; default: the force acts at "

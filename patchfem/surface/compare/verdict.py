@@ -160,8 +160,9 @@ def _variant(one: Comparison, name: str) -> list:
         out.append(f"The second trace{name} was measured in the opposite direction; the trace was mirrored here, so "
                    "its x counts from the other end.")
     if one.turned:
-        out.append(f"The heights of both traces{name} have opposite signs: one trace was inverted here, so that wear "
-                   "counts as missing material; check in which file the heights point into the material.")
+        out.append(f"In one trace{name} the heights point out of the material, in the other trace into the material. "
+                   "One trace was inverted here: the one with which wear counts as missing material. Check in which "
+                   "file the heights point into the material.")
     return out
 
 
@@ -186,7 +187,8 @@ def _worn(one: Comparison, name: str) -> str:
         return text
     if not _sure(mean):
         return f"Worn depth{name}: none shown; at most {say(mean.high)} on average.{above}"
-    what = "over the track below its unworn flanks" if one.reference == "flanks" else "over the common length"
+    what = "over the track, measured from its unworn flanks" if one.reference == "flanks" else \
+        "over the common length"
     text = (f"Worn{name}: {_track(one)}{_length(mean)} on average {what}, {_length(one.worn.largest)} at the deepest "
             f"place.{above}")
     if one.worn.extent is not None and not one.tracks.sizes:

@@ -218,8 +218,9 @@ def _ways(one: Change) -> list:
     if abs(abs(one.registration["rotation"].value) - np.pi) < 0.2:
         out.append("The second scan (after wear) is rotated by 180 degrees.")
     if guess.turned:
-        out.append("The heights of both scans have opposite signs: one scan was inverted here, so that more material "
-                   "is lost than gained; check in which file the heights point into the material.")
+        out.append("In one scan the heights point out of the material, in the other scan into the material. One scan "
+                   "was inverted here: the one with which more material is lost than gained. Check in which file the "
+                   "heights point into the material.")
     return out
 
 

@@ -41,7 +41,7 @@ def not_one_sine(rig) -> str:
     if rig.modes.omega.size != 1 or not isinstance(rig.drive, BaseSine) or rig.levels:
         return "the case is not one mode driven by one sine"
     if np.isfinite(rig.travel):
-        return "its motion may reach a stop, or may gain energy"
+        return "its flexure has an end stop, or its motion may gain energy"
     if rig.cycles != int(rig.cycles) or not rig.modes.base[0] or not rig.modes.slide[0] or not rig.modes.output[0]:
         return "its cycles are not whole, or it has no drive, slide or output"
     return ""
