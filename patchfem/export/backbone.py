@@ -43,7 +43,7 @@ def contents(found: Backbone, title: str = "") -> Contents:
     for way, one in found.curves.items():
         name = way.replace("-", "_")
         coordinates[f"{name}_amplitude"] = (f"{name}_amplitude", one.amplitude, {
-            "units": "m", "long_name": "half peak-to-peak at the output"})
+            "units": "m", "long_name": "half the peak-to-peak motion at the output"})
         for of, unit, words in (("frequency", "Hz", "frequency"), ("frequency_error", "Hz", "error of the frequency"),
                                 ("damping", "1", "damping ratio, structure and friction together"),
                                 ("damping_error", "1", "error of the damping ratio")):

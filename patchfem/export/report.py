@@ -112,12 +112,12 @@ def _spectra(data: dict) -> Picture | None:
     found = data["summary"]["measures"]
     at = found.get("response_frequency", {}).get("value")
     told = "" if at is None else (
-        " The peak of H1, marked by a ring, belongs to a mode at {} ({}) with a damping ratio of {} ({}), friction "
-        "included.".format(
+        " The peak of H1 is marked by a ring. It is the peak of a mode at {} ({}) with a damping ratio of {} ({}), "
+        "friction included.".format(
             *of_records("response_frequency", found), *of_records("response_damping", found)))
-    return Picture(charts.spectra, (data["spectra"], at), "One-sided spectral densities of output and drive, and H1, "
-                                                          "the displacement of the output divided by the acceleration "
-                                                          "of the base; H1 is drawn "
+    return Picture(charts.spectra, (data["spectra"], at), "One-sided spectral densities of output and drive, and the "
+                                                          "frequency response H1 (displacement of the output divided "
+                                                          "by acceleration of the base). H1 is drawn "
                    f"faint where the coherence is below {charts.COHERENT:g}.{told}")
 
 
@@ -347,7 +347,7 @@ def _table_of_levels(levels: list) -> Section:
         rows.append([str(number), drive, *cells, *([escape(one["outcome"])] if judged else []),
                      "stuck" if one["stuck"] else "slips"])
     sized = "force" if any(one.get("unit") == "N" for one in levels) else "base acceleration"
-    texts = ("half peak-to-peak", "peak acceleration", "its first harmonic", "third / first harmonic")
+    texts = ("half the peak-to-peak motion", "peak acceleration", "its first harmonic", "third / first harmonic")
     heads = [">level", f">{sized}", *(f">{linked(text, name)}" for text, (name, _) in zip(texts, OF_LEVELS)),
              *(["outcome"] if judged else []), "interface"]
     return Section("levels", "Levels", table(heads, rows))

@@ -163,9 +163,9 @@ def test_exact_a_level_between_two_others_does_not_claim_the_tolerance():
         return least_known(SimpleNamespace(plan=SimpleNamespace(model=model), measures=measures))
 
     jump, fine = Measure(5 * 9.80665, "m s-2", 9.80665, 9.80665), Measure(2.0, "J", 1e-2)
-    between = "jump_level, 5.0 ± 1.0 g, has an error of one step between drive levels"
+    between = "jump_level, 5.0 ± 1.0 g, has an error of one step between the drive levels of the scene"
     assert said(jump_level=jump, loop_area=fine) == "Every measure with an error estimate meets the tolerance 0.01; " \
-        f"closest to the tolerance is loop_area, 2.000 ± 0.010 J; {between}, which the scene sets."
+        f"closest to the tolerance is loop_area, 2.000 ± 0.010 J; {between}."
     assert said(jump_level=jump) == f"{between}."
     assert said(loop_area=fine).endswith("closest to the tolerance is loop_area, 2.000 ± 0.010 J.")
     assert said(jump_level=jump, loop_area=Measure(2.0, "J", 1.0)) == ""

@@ -450,7 +450,7 @@ def test_exact_the_answer_begins_with_the_measure_that_is_asked_for(tmp_path):
     assert data_of(page)["first"] == "secant_stiffness" and "--of secant_stiffness" in page
     again = cli("sweep", scene, *drawn, "--of", "pressure_peak", "-o", tmp_path / "a", "--resume")
     assert json.loads(data.read_text("utf-8"))["answer"].endswith(
-        "(no case has a value of pressure peak, so this describes other measures).")
+        "(no case has a value of pressure peak, so this answer describes other measures).")
     assert "no case has a value of pressure peak" in again.out
     assert pf.sweep(scene, {"friction.static": [0.1, 0.2]}, of="secant_stiffness").attrs["answer"].startswith(
         "Secant stiffness ranges from 10 N/mm to 20 N/mm")

@@ -203,9 +203,9 @@ def picture(ranks: dict) -> str:
                  f"<td class=bars>{_bar(one)}</td>"] for one in shares]
         parts.append(f"<h3>{linked(label(name), name)}</h3>"
                      + document.table(("key", ">alone", ">total", ">from, to", "share"), rows, "wide", "shares"))
-    return ("<p class=soft>The bars show the share of each key in the variance over the cases: the key alone (dark) "
-            "and with its interactions (light). "
-            "The line is the interval of the share with interactions.</p>" + "".join(parts))
+    return ("<p class=soft>The bars show the fraction of the variance over the cases that is due to each key: due to "
+            "the key alone (dark), and due to the key together with its interactions with other keys (light). The "
+            "line is the interval of the fraction with interactions.</p>" + "".join(parts))
 
 
 def _bar(one) -> str:
@@ -229,5 +229,6 @@ def spread(found: dict) -> str:
     if not rows:
         return ""
     return (document.table(("measure", ">5 %", ">half", ">95 %", "unit", ">cases", ">miss the tolerance"), rows, "wide")
-            + "<p class=soft>The curve gives the share of the random cases with a smaller value. If any case has "
-              "settled, only settled cases count. Cases that miss the tolerance are included with their values.</p>")
+            + "<p class=soft>The curve gives, for each value, the fraction of the random cases with a smaller value. "
+              "If any case has settled, only settled cases count. Cases that miss the tolerance are included with "
+              "their values.</p>")

@@ -34,7 +34,8 @@ OF_WHAT = {  # said behind a value that would otherwise be taken for another, or
 SCATTER = "_scatter"  # behind the name of what a record of a random drive shows: how far other records differ
 SHAKEN = {"relative_displacement_rms": "the displacement of the output is {} rms",
           "absolute_acceleration_rms": "the acceleration of the output is {} rms",
-          "response_frequency": "H1 peaks at {}", "response_damping": "the damping ratio of that peak is {}"}
+          "response_frequency": "the frequency response H1 peaks at {}",
+          "response_damping": "the damping ratio of that peak is {}"}
 BETWEEN = ("jump_level",)  # known to lie between two levels of the drive, whatever the tolerance
 ROUND = 1e-12  # of the friction force times the motion: work that is round-off
 NONE = MappingProxyType({})
@@ -208,10 +209,10 @@ def least_known(result: Result) -> str:
 
     steps = [name for name in wide if name in BETWEEN]
     name = max(wide.keys() - set(steps), key=lambda one: ("±" in told[one], wide[one], one), default="")
-    of_steps = f"{', '.join(map(known, steps))}, has an error of one step between drive levels"
+    of_steps = f"{', '.join(map(known, steps))}, has an error of one step between the drive levels of the scene"
     if not name:
         return f"{of_steps}."
-    but = f"; {of_steps}, which the scene sets" if steps else ""
+    but = f"; {of_steps}" if steps else ""
     least = f"; closest to the tolerance is {known(name)}" if "±" in told[name] else ""
     sharp = "" if all("±" in one for one in told.values()) else f"; {SHARP}"
     return f"Every measure with an error estimate meets the tolerance {tolerance:g}{least}{but}{sharp}."

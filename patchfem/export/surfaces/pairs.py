@@ -16,7 +16,7 @@ TRACES, SCANS = ("worn_depth_mean", "amplitude_ratio"), ("worn_volume", "worn_de
 ABOUT = ("The mean is taken over the pairs that have a value, each with equal weight. The interval is the 95 % "
          "interval of the mean, by Student's t from the scatter of the pairs, or from the intervals of the pairs if "
          "these give a wider interval. The interval does not include an error that all pairs share, such as "
-         "calibration. The scatter is the standard deviation of one pair.")
+         "calibration. The scatter is the standard deviation of the values of single pairs.")
 
 
 def answers(asked: list, direction: str = "", done=None, **how) -> list[dict]:

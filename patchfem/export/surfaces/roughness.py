@@ -21,7 +21,8 @@ AREAL = ("Interval: 90 % interval (from 5 % to 95 %) of the mean over all scans 
          "Gaussian heights and the spectrum of this scan. A kurtosis above 3 makes the interval wider. The interval "
          "holds neither for a surface that differs from place to place nor for waves longer than the scan.")
 MEANS = ("Interval: 95 % of the mean, by Student's t from the scatter of the files, each with equal weight; an error "
-         "common to all, such as calibration, is not included. Scatter: standard deviation of one file.")
+         "common to all, such as calibration, is not included. Scatter: standard deviation of the values of "
+         "single files.")
 INTERVAL = ("Interval: 90 % interval (from 5 % to 95 %) of the mean over all traces of this length, for a surface with "
             "Gaussian heights and the spectrum of this trace. A kurtosis above 3 makes the interval wider. The "
             "interval does not hold for a surface that differs from place to place.")
@@ -65,9 +66,10 @@ def heading(report: RoughnessReport) -> str:
             f' (--cutoff "{say(fits)}" '
             'is the longest standard cut-off that fits five times into the trace)' if fits else
             ", and no standard cut-off fits five times into the trace")
-        return text + (f"; S-filter at {say(short)}, half of it trimmed at each end" if short else "")
-    return (f"{text}; Gaussian filter at {say(report.cutoff)}, half of it trimmed at each end, "
-            + (f"S-filter at {say(short)}, trimmed in the same way" if short else "no filter for short waves"))
+        return text + (f"; S-filter at {say(short)}, half this length trimmed at each end" if short else "")
+    return (f"{text}; Gaussian filter at {say(report.cutoff)}, half this length trimmed at each end, "
+            + (f"S-filter at {say(short)}, half this length trimmed at each end" if short else
+               "no filter for short waves"))
 
 
 def _areal_filters(short: float | None, cutoff: float | None, holes: bool) -> str:
@@ -76,7 +78,8 @@ def _areal_filters(short: float | None, cutoff: float | None, holes: bool) -> st
     if not parts:
         return "; no filter"
     surface = " (the S-L surface)" if short and cutoff else " (the S-F surface)" if short else ""
-    return (f"; Gaussian {' and '.join(parts)}{surface}, half of {'each' if parts[1:] else 'it'} trimmed at each border"
+    lengths = "each length" if parts[1:] else "this length"
+    return (f"; Gaussian {' and '.join(parts)}{surface}, half {lengths} trimmed at each border"
             + ("; near a hole the filter weights of the measured heights are scaled to a sum of one" if holes else ""))
 
 

@@ -323,9 +323,11 @@ def verdict(one: Lost) -> tuple:
         mean, unseen, seen = track["depth_mean"], track["hidden_wear"], "trace within this part"
         inside = (x >= track["from"].value) & (x <= track["to"].value)
         ends = hidden_line(x[inside], one.depth[inside])
-        head += f", by {say(mean.value, 3)} from x = {say(track['from'].value, 3)} to {say(track['to'].value, 3)}"
+        head += (f", and by {say(mean.value, 3)} on average from x = {say(track['from'].value, 3)} to "
+                 f"{say(track['to'].value, 3)}")
     if unseen.value > 0.01 * mean.value:
-        head += f"; {say(unseen.value, 3)} of this is {_kind(ends)} that a {seen} alone could not show"
+        head += (f"; of the {say(mean.value, 3)}, {say(unseen.value, 3)} is {_kind(ends)} that a {seen} alone could "
+                 "not show")
     place, volume = place_of(one.after, np.argmax(one.depth)), one.values["worn_volume"]
     told = [f"Worn volume {' '.join(shown(volume)[::2])}; {say(float(one.depth.max()), 3)} at the deepest place, "
             f"{place}; both pieces together; {one.after.cycles:.6g} cycles of wear"
