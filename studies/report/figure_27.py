@@ -35,7 +35,8 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
-REPRODUCED = ("in part: a mode is critically damped, but not at 148 Hz (with grooves its damping ratio there is 1.3). "
+REPRODUCED = ("in part: a mode is critically damped, but not at 148 Hz (in the model with grooves the damping ratio "
+              "at 148 Hz is 1.3). "
               "With a single contact point yaw is not suppressed")
 MIL, ONSET = 25.4e-6, 4.14  # of block.toml [g]
 POINT = '[normal]\nload = "26 lbf"\n\n[friction]\nlaw = "elastic-plastic"\nbond_length = "0.243 um"\n'

@@ -250,10 +250,12 @@ def head(rows: dict) -> list:
         "27\" with √2 x fundamental.",
         "Compared with a constant times the input, \"spring and yaw\" predicts the displacements better and the "
         "accelerations worse. \"Path of Fig. 27\" predicts displacements and accelerations better than the constant "
-        "does. Its advantage in the accelerations is small: if the rows of Table 1 are resampled (bootstrap), \"path "
+        "does. The advantage of \"path of Fig. 27\" in the accelerations is small: if the rows of Table 1 are "
+        "resampled (bootstrap), \"path "
         f"of Fig. 27\" predicts the accelerations better than the constant in {draws[0]:.0f} % (peak x stuck) and "
         f"{draws[1]:.0f} % (√2 x fundamental) of the samples. \"Path of Fig. 27\" predicts the displacements worse "
-        "than \"spring and yaw\" does. At 143 Hz all scores of \"path of Fig. 27\" are worse: "
+        "than \"spring and yaw\" does. At 143 Hz all scores of \"path of Fig. 27\" are worse than those of \"spring "
+        "and yaw\": "
         f"{three(one['path']['fitted'])}, compared with {three(one['spring']['fitted'])} for \"spring and yaw\"."]
     if "-" not in left.values():
         said.append(
@@ -262,8 +264,9 @@ def head(rows: dict) -> list:
             f"law in input and frequency; {left['spring']} for \"spring and yaw\" with √2 x fundamental; and "
             f"{left['path']} for \"path of Fig. 27\" with peak x stuck. The last two models predict the displacements "
             "better than the constant and the power law do. The scores of \"second path\" (a spring and a damper) with "
-            f"peak x stuck are {left['damped']}. They are no better than the scores of the constant, because the fit "
-            "without 143 Hz sets \"yaw arm\" to 0. If the accelerometer also measures the yaw mode, the scores of "
+            f"peak x stuck are {left['damped']}. These scores are no better than the scores of the constant, because "
+            "the fit without 143 Hz sets \"yaw arm\" to 0. If the accelerometer also measures the yaw mode, the "
+            "scores of "
             f"this model are {left['seen']}. No model predicts the accelerations better "
             "than the power law in input and frequency, although this power law contains no mechanics.")
     said.append(
