@@ -229,7 +229,7 @@ def undetermined(c, turns: bool, spring: float) -> str:
     except np.linalg.LinAlgError:
         return INDEFINITE
     if not turns:
-        return ("contact: in the contact equations numbers became too large to compute; check the units and magnitudes "
+        return ("contact: numbers in the contact equations became too large to compute; check the units and magnitudes "
                 "of load, gap and stiffnesses")
     holder = "raise" if spring > 0 else "name"
     return ("contact: the nodes that touch do not determine the rotation; lower contact.load_line.offset (with "

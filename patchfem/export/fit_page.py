@@ -8,8 +8,9 @@ from .fit import told_of
 from .pages.document import Section, document, figure, table, warned
 
 PICTURE, FITTED = "fit.svg", "scene.fitted.toml"
-FILES = {"fit.json": "the answer, all digits, in SI", "fit.csv": "measured and fitted, row by row",
-         FITTED: "the scene with the fitted values, which runs"}
+FILES = {"fit.json": "the result of the fit in SI units, with all digits",
+         "fit.csv": "measured and fitted values, row by row",
+         FITTED: "the scene with the fitted values, ready to run"}
 
 
 def page(answer: dict, lines: Sequence, folder: Path) -> str:

@@ -21,7 +21,7 @@ FILES = (("fields.vtkhdf", "fields of both pieces and their interface, frame by 
          ("interfaces", "fields, in the same format, of every interface that has a patch of its own"),
          ("summary.json", "measures, outcome, warnings, effects and numerics"),
          ("result.nc", "histories and fields along the interface (xarray, MATLAB, ncdump)"),
-         ("scene.resolved.toml", "the scene in SI with every default"))
+         ("scene.resolved.toml", "the scene in SI units, with all default values"))
 
 
 def part_of_cycle(data: dict) -> bool:
@@ -163,8 +163,8 @@ def _interface(data: dict) -> Picture | None:
     fields, caption = data["fields"], "Normal stress of the pressed pieces"
     if np.any(fields.get("shear_stress", 0.0)):
         span = "the last cycle" if data["summary"]["kind"] == "rig" and not part_of_cycle(data) else "the run"
-        caption += (f"; shear stress in {len(fields['time']) - 1} frames of {span}, with the largest resultant force "
-                    "in colour")
+        caption += (f"; shear stress at {len(fields['time']) - 1} instants of {span}; the instant with the largest "
+                    "resultant force is in colour")
     if charts.part_in_contact(data["x"], fields["normal_stress"][0]):
         length, scale = scales.axis_unit(data["x"], "m")
         caption += (". Only the part in contact is drawn; the whole length is "
@@ -176,8 +176,9 @@ def _faces(data: dict) -> Picture | None:
     found = [one for one in data.get("faces", ()) if np.any(one[1]["normal_stress"][0] > 0)]
     part = any(charts.part_in_contact(x, fields["normal_stress"][0]) for x, fields, _ in found)
     shear = any(np.any(fields.get("shear_stress", 0.0)) for _, fields, _ in found)
-    return Picture(charts.faces, (found[:MOST],), "Normal stress of the pressed patch of each interface"
-                   f"{'; shear stress in frames of the last cycle, the largest resultant force in colour' * shear}."
+    moved = "; shear stress at several instants of the last cycle; the instant with the largest resultant force is " \
+        "in colour" if shear else ""
+    return Picture(charts.faces, (found[:MOST],), f"Normal stress of the pressed patch of each interface{moved}."
                    f"{' Only the part in contact is drawn.' * part}{_first(found)}") if found else None
 
 
@@ -300,7 +301,8 @@ def _factors(measured: dict) -> tuple:
 
 def _unsettled(data: dict) -> str:
     outcome = data["summary"]["outcome"]
-    return "" if outcome in SETTLED else f" The run ended as {outcome}: the computed values are not of a steady motion."
+    return "" if outcome in SETTLED else (f" The run ended with the outcome '{outcome}': the computed values are not "
+                                          "those of a steady motion.")
 
 
 def _table_one(data: dict) -> list:
@@ -387,13 +389,14 @@ def _cost(data: dict) -> Section:
     summary = data["summary"]
     rows = [[escape(e["effect"]), escape(e["equations"]), f"{e['seconds']:.3f}"] for e in summary["effects"]]
     parts = ", ".join(f"{k} {v:.3f} s" for k, v in summary["seconds"].items())
-    shared = " The time of the loop over law and modes is listed under the law." if summary["kind"] == "rig" else ""
+    shared = " The friction law and the modes are computed in one loop; the row of the law gives the time of this " \
+        "loop." if summary["kind"] == "rig" else ""
     absent = shown_absent(summary["not_in_scene"], summary.get("numerics", {}).get("engine"))
     text = (table(("effect", "equations", ">seconds"), rows)
             + f"<p class=soft>Wall-clock seconds: {escape(parts)}.{shared}</p>"
             "<details><summary>Effects not in the scene, which are neither imported nor computed</summary>"
             f"<p class=soft>{escape(', '.join(absent))}.</p></details>")
-    return Section("cost", "What ran and what it cost", text)
+    return Section("cost", "What was computed, and the computing time", text)
 
 
 def _origin(data: dict) -> Section:

@@ -193,9 +193,9 @@ def test_always_the_verdict_first_and_every_measure_listed(pages, name):
 def test_always_captions_speak_of_what_the_run_has(pages):
     words = {name: captions(text) for name, (_, text) in pages.items()}
     assert "shear" not in words["patch"] and "cycle" not in words["patch"] and "coating" not in words["patch"]
-    assert "with their coatings" in words["rig"] and "4 frames of the last cycle" in words["rig"]
+    assert "with their coatings" in words["rig"] and "4 instants of the last cycle" in words["rig"]
     assert "over the last 3 cycles" in words["rig"] and "only reversals were kept" in words["rig"]
-    assert "frames of the run" in words["short"] and "last cycle" not in words["short"]
+    assert "instants of the run" in words["short"] and "last cycle" not in words["short"]
     assert "whole run" in words["bench"] and "cycle" not in words["bench"]
     coated = captions(report.page(patch(effects=("contact", "contact.coating"))))
     assert "with their coatings under the load." in coated

@@ -34,7 +34,8 @@ def told(table: dict, trusted: dict, settled: np.ndarray) -> tuple:
     moves = not settled.any() or Outcome.TRANSIENT.value in list(table["outcome"])
     names, first = asked_first(SPREAD, table), table.get("first", "")
     rank = sentence(ranks, left, moves) if not first or first in ranks or first not in table["measures"] else \
-        f"What {label(first)} depends on cannot be told from these {of} cases; more cases may show it." if ranks else ""
+        (f"These {of} cases do not show on which key the {label(first)} depends most; more cases may show this."
+         if ranks else "")
     rank = joined([one for one in (rank, trend(table, ranks, settled)) if one])
     few = "" if rank else too_few(table, settled)
     return ranks, rank or few, found, "" if few else scatter(found, of, settled.any() and moves, names)
@@ -133,7 +134,7 @@ def sentence(ranks: dict, left: int = 0, moves: bool = True) -> str:
     if name is None:
         return ""
     first, *others = ranks[name]
-    said = [f"depends most on {first.key}, which is involved in {percent(first)} of the variance{_between(first)}"]
+    said = [f"depends most on {first.key}, which has a part in {percent(first)} of the variance{_between(first)}"]
     said += [f"then on {one.key} ({percent(one)})" for one in others[:NAMED - 1]]
     if len(others) >= NAMED:
         said.append(f"least on {others[-1].key} ({percent(others[-1])})")

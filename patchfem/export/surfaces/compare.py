@@ -205,9 +205,10 @@ def page(parts: list, found: tuple, directions: list = (), pressing: Pressed | N
         said = "; ".join(f"{when} {' '.join(shown(one)[:2])}" for when, one, _ in directions)
         sections.append(Section("directions", "x over y", figure(
             "xy", pictures.crossed(parts, directions),
-            "Left: spectra of both directions. Right: amplitude of the band and slope along x over those along y, with "
-            "their 95 % intervals; the value 1 means that the surface is equally rough in both directions.",
-            f"Waves along x over those along y: amplitude {said}")))
+            "Left: spectra of both directions. Right: amplitude of the band along x divided by that along y, and "
+            "slope along x divided by that along y, with their 95 % intervals; the value 1 means that the "
+            "surface is equally rough in both directions.",
+            f"Waves along x divided by waves along y: amplitude {said}")))
     for number, one in enumerate(parts):
         body = [*(figure(f"{number}{place}", *each) for place, each in enumerate(figures(one))), _table(one),
                 f"<p class=soft>{escape(NOTE)}</p>"]
@@ -234,7 +235,7 @@ def figures(one: Comparison) -> list:
         out.append((pictures.overlay(found.x, found.first - tilt, second - tilt, worn, _closer(found.x, worn)),
                     "The trace measured after wear, moved by shift, tilt and offset, is drawn over the trace measured "
                     "before.",
-                    f"Both traces, registered: mean worn depth {' '.join(shown(one.worn.mean)[::2])}"))
+                    f"Both traces after alignment: mean worn depth {' '.join(shown(one.worn.mean)[::2])}"))
         out.append((pictures.difference(found.x, found.rest, found.used, found.noise, None),
                     "The curve is the depth of the second trace (after wear) below the first trace (before wear). "
                     "Blue: the unworn heights to which shift, tilt and offset were fitted.",
@@ -328,9 +329,9 @@ def _pressing(found: Pressed) -> str:
     if sides:
         peaks = ", ".join(f"{name} {_said('pressure_peak', one.measures.get('pressure_peak'))}" for name, one in
                           (("before", found.before), ("after", found.after)) if one is not None)
-        parts.append(figure("p", pictures.pressures(sides), "Normal stress of the pressed patch; all other settings of "
-                                                            "the scene are the "
-                                                            "same.", f"Pressure along the patch, largest: {peaks}"))
+        parts.append(figure("p", pictures.pressures(sides), "Normal stress of the patch, pressed once with each of "
+                                                            "the two surfaces; all other settings of the scene are "
+                                                            "the same.", f"Pressure along the patch, largest: {peaks}"))
         rows = [[escape(words), *(escape(_said(name, one)) for one in measures), _times(*measures)]
                 for name, words, *measures in found.rows()]
         parts.append(table(("measure", ">before", ">after", ">after / before"), rows))

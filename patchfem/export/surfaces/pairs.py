@@ -56,8 +56,8 @@ def notes(rows: list) -> list:
     for group, count, found in pairs.means_of(rows):
         less = [f"{words(name)} ({one.count})" for name, one in found.items() if one.count < count]
         if less:
-            out.append(f"{title(*group)}: not all {count} pairs have {', '.join(less)}; such a mean says nothing about "
-                       "the other pairs")
+            out.append(f"{title(*group)}: not all {count} pairs have a value of {', '.join(less)}; the mean of this "
+                       "value says nothing about the other pairs")
     return out
 
 
@@ -115,7 +115,7 @@ def headline(rows: list) -> str:
     """How many pairs there are, show wear, and failed."""
     failed = sum(row["outcome"] == "failed" for row in rows)
     worn = sum((row[_leading(row)[0]]["low"] or 0.0) > 0 for row in rows if row["outcome"] == "done")
-    return f"{len(rows)} pairs, {worn} with wear shown{f', {failed} failed' * (failed > 0)}"
+    return f"{len(rows)} pairs, {worn} with detected wear{f', {failed} failed' * (failed > 0)}"
 
 
 def _leading(row: dict) -> tuple:

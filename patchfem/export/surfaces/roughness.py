@@ -20,8 +20,9 @@ ALONG = ("PSm", "RSm", "dominant_wavelength", "Sal")  # lengths along the surfac
 AREAL = ("Interval: 90 % interval (from 5 % to 95 %) of the mean over all scans of this size, for a surface with "
          "Gaussian heights and the spectrum of this scan. A kurtosis above 3 makes the interval wider. The interval "
          "holds neither for a surface that differs from place to place nor for waves longer than the scan.")
-MEANS = ("Interval: 95 % of the mean, by Student's t from the scatter of the files, each with equal weight; an error "
-         "common to all, such as calibration, is not included. Scatter: standard deviation of the values of "
+MEANS = ("Interval: 95 % interval of the mean, by Student's t from the scatter of the files, each with equal weight. "
+         "The interval does not include an error common to all files, such as calibration. Scatter: standard "
+         "deviation of the values of "
          "single files.")
 INTERVAL = ("Interval: 90 % interval (from 5 % to 95 %) of the mean over all traces of this length, for a surface with "
             "Gaussian heights and the spectrum of this trace. A kurtosis above 3 makes the interval wider. The "

@@ -386,7 +386,7 @@ def _rows(one: Lost) -> list:
     track = {f"track_{name.removesuffix('_mean')}": each for name, each in one.track.items()}
     words = WORDS | {"track_from": "worn part from", "track_to": "worn part to", "track_depth": "worn part, mean",
                      "track_depth_floor": "worn part, floor",
-                     "track_hidden_wear": "worn part, uniform wear and wedge",
+                     "track_hidden_wear": "uniform and wedge-shaped wear, in the worn part",
                      "hidden_wear": "uniform wear and wedge, mean", "worn_share": "share of the patch that is worn"}
     of_part = ("track_from", "track_to", "track_depth", "track_depth_floor", "track_hidden_wear")
     shown_of = one.values | {name: track[name] for name in of_part if name in track}
@@ -454,5 +454,5 @@ def _figures(one: Lost) -> list:
     return [(draw([chart("", place, axis("gap of the unloaded surfaces", up), marks)], height=2.9),
              "The gap between the unloaded surfaces includes the wear.", "Gap of the surfaces before and after"),
             (draw([chart("", place, down, depths)], height=2.5), "The curve is the depth lost by both pieces together "
-             "between the two runs. The dashed line is the part that a trace alone could not show.",
+             "between the two runs. The dashed line is the part of this depth that a trace alone could not show.",
              f"Worn depth: mean {say(one.values['worn_depth_mean'].value, 3)}")]

@@ -129,7 +129,8 @@ def read_table(folder: Path) -> dict:
         raise PatchfemError(f"{folder}: not the folder of a sweep: it has no {name}") from None
     except Exception as fault:  # damaged files have many ways to fail
         said = " ".join(str(fault).split())[:200]
-        raise PatchfemError(f"{folder}: its sweep cannot be read: {said or type(fault).__name__}") from None
+        raise PatchfemError(f"{folder}: the sweep in this folder cannot be read: "
+                            f"{said or type(fault).__name__}") from None
 
 
 def _whole(table: dict) -> dict:

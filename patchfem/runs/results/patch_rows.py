@@ -3,9 +3,10 @@
 from ...core import Row
 
 ROWS = (
-    Row("normal_load", "N", 0.0, "normal load on the interface, sum over all pairs", group="patch"),
-    Row("contact_fraction", "1", 0.0, "share of the length of the interface that is in contact; the edges of contact "
-                                      "may lie between nodes",
+    Row("normal_load", "N", 0.0, "normal load on the interface, summed over all equal patches (key `pairs`)",
+        group="patch"),
+    Row("contact_fraction", "1", 0.0, "fraction of the length of the interface that is in contact; the edges of "
+                                      "contact may lie between nodes",
         group="patch"),
     Row("pressure_peak", "Pa", 0.0, "largest normal stress on the interface", group="patch"),
     Row("moment", "N m", 1e-10, "moment of the pressure about the middle of the patch; positive if the pressure centre "

@@ -10,8 +10,8 @@ from .types import Positive, Share, Speed, Table, key, number, whole
 def _still_summed(value: object) -> object:
     """An engine of the sum over bonds; ValueError for the one that 0.4 had besides."""
     if value == "exponential":
-        raise ValueError("'exponential' was removed, because it supported only order 0, 1 and 2 of reading 'report' "
-                         "and made a whole run at most 1.4 times faster; use 'merged'")  # fmt: skip
+        raise ValueError("'exponential' was removed: this method supported only the orders 0, 1 and 2 of reading "
+                         "'report', and a run with it was at most 1.4 times faster; use 'merged'")  # fmt: skip
     return value
 
 

@@ -95,7 +95,8 @@ class Friction(Table):
                  "in the report") = "stretch"
     order: key(number(le=100), "power p with which the strength of a bond rises along its path; must be > -1, and >= "
                "0 with reading 'stretch'") = 1.0
-    rest_growth: key(Acceleration | None, "growth a_s of the bond length at rest (eq. 2.10); without `rest_growth` "
+    rest_growth: key(Acceleration | None, "growth a_s of the bond length at rest (eq. 2.10); without "
+                                          "`rest_growth` "
                      "and `slip_growth` the bond length is constant", "with `slip_growth`") = None
     slip_growth: key(Length | None, "slip length l_k over which the bond length approaches its value in fast slip "
                      "(eq. 2.10)", "with `rest_growth`") = None
@@ -266,7 +267,7 @@ class Structure(Table):
                   "subtracted from the stiffness of the modes") = "free"
     stiffening: Stiffening | None = None
     bonded: Bonded | None = None
-    masses: key(tuple[Mass, ...] | None, "masses that are connected by springs; they replace the modes") = None
+    masses: key(tuple[Mass, ...] | None, "masses that are connected by springs; these masses replace the modes") = None
     output_mass: key(whole(1, MOST_MASSES) | None, "number of the mass that carries the "
                      "accelerometer; default: 1") = None
     spring: tuple[Spring, ...] = ()
@@ -275,13 +276,13 @@ class Structure(Table):
     file: key(Text | None, "file of matrices, modes or measured responses (.npz, .mat, .uff); replaces the tables of "
               "modes") = None
     reduced: Reduced | None = None
-    slide_at: key(Text | None, "node and direction in the file, such as 12:+x, whose motion is the motion of the "
-                  "patch along x") = None
-    output_at: key(Text | None, "node and direction in the file at which the accelerometer is placed") = None
-    base_at: key(Text | None, "node and direction in the file that is driven as the base") = None
-    force_at: key(Text | None, "node and direction in the file on which the force acts") = None
-    normal_at: key(Text | None, "node and direction in the file whose motion opens the contact") = None
-    pitch_at: key(Text | None, "node and direction in the file whose motion rotates the patch") = None
+    slide_at: key(Text | None, "node and direction, as named in the file (such as 12:+x), whose motion is the motion "
+                               "of the patch along x") = None
+    output_at: key(Text | None, "node and direction, as named in the file, at which the accelerometer is placed") = None
+    base_at: key(Text | None, "node and direction, as named in the file, that is driven as the base") = None
+    force_at: key(Text | None, "node and direction, as named in the file, on which the force acts") = None
+    normal_at: key(Text | None, "node and direction, as named in the file, whose motion opens the contact") = None
+    pitch_at: key(Text | None, "node and direction, as named in the file, whose motion rotates the patch") = None
     start: Start | None = None
 
 

@@ -175,7 +175,8 @@ def sentences(one: Change) -> list:
                    f"wore off the second part; if the second part is unworn, up to {_most(grown)} grew on the first "
                    "part. To tell the two cases apart, scan farther beyond the rubbed part.")
     else:
-        out.append("Worn volume: none shown. Uniform wear of any depth would give the same two scans. Wedge-shaped "
+        out.append("Worn volume: no wear detected. Uniform wear of any depth would give the same two scans. "
+                   "Wedge-shaped "
                    "wear would also give the same two scans if the worn part was mounted level for the second scan. To "
                    "tell wear from no wear, scan an unworn part beside the rubbed part before and after wear.")
     out += [] if one.track is None or one.track.why else [_track(one.track)]

@@ -107,8 +107,8 @@ def test_exact_nothing_that_moves_changes():
     assert sentence(limits({"loop_area": [1, 1.01, 1.02, 1.03, 0.96]})) == \
         "Tilt may reach 1 mrad (13 um over the patch): loop area changes by less than 5 %."
     assert sentence(limits({"loop_area": [1, 1.01, 1.02, 1.03, 0.96]}, trusted=[1, 1, 1, 1, 0])) == (
-        "Tilt may reach at least 0.5 mrad (6.4 um over the patch) before loop area changes by 5 %; the limit cannot "
-        "be determined from the cases with larger values.")
+        "Tilt may reach at least 0.5 mrad (6.4 um over the patch) before loop area changes by 5 %; the cases with "
+        "larger values do not show where this limit lies.")
 
 
 def test_exact_a_limit_among_the_cases_comes_before_one_that_errors_leave_open():
