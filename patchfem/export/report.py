@@ -10,7 +10,7 @@ from .. import scales
 from ..effects import shown_absent
 from .drawing import charts
 from .pages import player
-from .pages.document import Section, document, table, warned
+from .pages.document import Section, document, prose, table, warned
 from .pages.words import SHARP, G, headline, in_order, linked, of_records, others, pair, texts, units
 from .results import MOST
 
@@ -37,7 +37,7 @@ def pressed(data: dict) -> bool:
 
 def verdict(data: dict) -> str:
     """The answer of a run in a few sentences of HTML, with the error of each number."""
-    answer = f"<b>{escape(data['summary']['outcome'])}</b>: {escape(data['sentence'])}"
+    answer = f"<b>{escape(data['summary']['outcome'])}</b>: {prose(data['sentence'])}"
     text = headline(data["summary"], data.get("cycles"), lambda number, name: linked(number, name, " class=v"),
                     data.get("released", ""))
     return f"{answer}{escape(charts.regime(data.get('steady')))} {text}".strip()
@@ -54,7 +54,7 @@ def page(data: dict) -> str:
             f"<p class=verdict>{verdict(data)}</p>"]
     warnings = [w for w in summary["warnings"] if w != data["sentence"]]
     lead.append(warned(warnings, "Warnings"))
-    lead += [f"<p class=soft>Note: {escape(text)}</p>" for text in summary["notes"]]
+    lead += [f"<p class=soft>Note: {prose(text)}</p>" for text in summary["notes"]]
     drawn, shown = figures(data)
     drawn = charts.within(drawn, ROOM)
     sections = [Section("pictures", "Pictures", shown)] if drawn else []
@@ -81,7 +81,7 @@ def figures(data: dict) -> tuple:
                 enumerate(found.charts(*found.values))]
         cells = "".join(f'<div id="{one["anchor"]}" class=chart role=img aria-label="{escape(one["title"])}"></div>'
                         for one in made)
-        places.append(f"<figure><div class=row>{cells}</div><figcaption>{escape(found.caption)}</figcaption></figure>")
+        places.append(f"<figure><div class=row>{cells}</div><figcaption>{prose(found.caption)}</figcaption></figure>")
         drawn += made
     return drawn, "\n".join(places)
 
@@ -368,14 +368,14 @@ def _measures(data: dict) -> Section:
         value, error = texts(name, m)
         cells = [f"<td id='measure-{escape(name)}'>{escape(name)}</td>", value]
         if m["value"] is None:
-            cells.append(f"<td class=soft colspan=3>{escape(m.get('reason', ''))}</td>")
+            cells.append(f"<td class=soft colspan=3>{prose(m.get('reason', ''))}</td>")
         else:
             unit = units(name, m["value"], m["unit"], m["error"])[0][0]
             error = error or ("unknown" if m["error"] is None else DASH)
             cells += [error, f"<td class=v>{escape(unit)}</td>", escape(others(name, m))]
         others_lie = of_records(name, found)[1]
         text = means.get(name, "") + (f"; {others_lie} for other records of the random drive" if others_lie else "")
-        rows.append([*cells, f"<td class=soft>{escape(text)}</td>"])
+        rows.append([*cells, f"<td class=soft>{prose(text)}</td>"])
     note = (f"<p class=soft>The run covers only {data['cycles']:.2g} of a cycle, so measures per cycle do not cover a "
             "whole cycle.</p>") if part_of_cycle(data) else ""
     heads = ("measure", ">value", ">error (±)", "unit", "in customary units", "what it is")

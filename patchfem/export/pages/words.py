@@ -13,6 +13,7 @@ from ...response.rows import of_first, of_number
 from ...runs.results.patch_rows import TABLE as STATIC
 from ...runs.results.result import Result
 from ..summary import measure_object
+from .document import prose
 
 G, LBF, INCH = 9.80665, 4.4482216152605, 0.0254
 DEG = ("deg", 180 / pi)
@@ -291,7 +292,7 @@ def fragment(summary: dict, sentence: str, cycles: float | None, released: str =
         cells = f"<td>{escape(name)}</td><td style='text-align:right'>{escape(value.strip())}</td>"
         rows.append(f"<tr>{cells if value else f'<th colspan=2>{escape(name)}</th>'}</tr>")
     title = f"<b>{escape(summary['title'])}</b><br>" if summary["title"] else ""
-    warnings = "".join(f"<p>&#9888; {escape(text)}</p>" for text in summary["warnings"])
+    warnings = "".join(f"<p>&#9888; {prose(text)}</p>" for text in summary["warnings"])
     answer = escape(f"{summary['outcome']}: {sentence} {headline(summary, cycles, released=released)}")
     return f"<div>{title}{answer}{warnings}<table>{''.join(rows)}</table></div>"
 

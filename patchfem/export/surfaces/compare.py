@@ -19,7 +19,7 @@ from ...surface.quantity import LEVEL, Quantity
 from ...surface.roughness.parameters import Heights, abbott
 from ...surface.roughness.spectrum import BAND
 from ...surface.scans.change import Change, hidden
-from ..pages.document import Section, document, figure, table, warned
+from ..pages.document import Section, document, figure, prose, table, warned
 from ..pages.words import pair
 from . import line, pictures
 from .areal import write_columns, write_x3p
@@ -197,8 +197,8 @@ def page(parts: list, found: tuple, directions: list = (), pressing: Pressed | N
     names = [Path(each.source).name for each in (parts[0].before, parts[0].after)]
     title = f"{names[0]} and {names[1]}: before and after"
     lead = (f"<p class=soft>patchfem {escape(__version__)}</p><div class=verdict>"
-            f"<b>{escape(headline[0].upper() + headline[1:])}.</b>"
-            + "".join(f"<p>{escape(text)}</p>" for text in sentences) + "</div>"
+            f"<b>{prose(headline[0].upper() + headline[1:])}.</b>"
+            + "".join(f"<p>{prose(text)}</p>" for text in sentences) + "</div>"
             + warned([f"{text}." for one in parts for text in one.notes]))
     sections = []
     if directions:
@@ -211,7 +211,7 @@ def page(parts: list, found: tuple, directions: list = (), pressing: Pressed | N
             f"Waves along x divided by waves along y: amplitude {said}")))
     for number, one in enumerate(parts):
         body = [*(figure(f"{number}{place}", *each) for place, each in enumerate(figures(one))), _table(one),
-                f"<p class=soft>{escape(NOTE)}</p>"]
+                f"<p class=soft>{prose(NOTE)}</p>"]
         head = "Changes at each place, and waves" if one.change is not None else \
             "Waves" if one.direction and parts[0].change is not None else "What changed"
         sections.append(Section(f"changes{number}", f"{head}{one.direction and f' along {one.direction}'}",
@@ -316,7 +316,7 @@ def _table(one: Comparison) -> str:
         value, interval, unit = shown(quantity)
         cells = [escape(value), escape(interval), escape(unit)] if quantity.value is not None else ["&ndash;", "", ""]
         text = quantity.text if quantity.value is not None else f"{quantity.text}: not available"
-        rows.append([escape(WORDS[key]), *cells, f"<td class=soft>{escape(text)}</td>"])
+        rows.append([escape(WORDS[key]), *cells, f"<td class=soft>{prose(text)}</td>"])
     return table(("quantity", ">value", ">95 %", "unit", "meaning"), rows)
 
 
@@ -335,7 +335,7 @@ def _pressing(found: Pressed) -> str:
         rows = [[escape(words), *(escape(_said(name, one)) for one in measures), _times(*measures)]
                 for name, words, *measures in found.rows()]
         parts.append(table(("measure", ">before", ">after", ">after / before"), rows))
-    parts += [f"<p class=soft>{escape(text)}.</p>" for text in found.lacking]
+    parts += [f"<p class=soft>{prose(text)}.</p>" for text in found.lacking]
     return "\n".join(parts)
 
 

@@ -9,7 +9,7 @@ from ...disk.whole import write_rows, write_text
 from ...scales import LADDERS, plain
 from ...surface.compare import pairs, verdict
 from ...surface.quantity import Mean
-from ..pages.document import Section, document, figure, table, warned
+from ..pages.document import Section, document, figure, prose, table, warned
 from . import compare, pictures, worn
 
 TRACES, SCANS = ("worn_depth_mean", "amplitude_ratio"), ("worn_volume", "worn_depth_mean")  # the main numbers
@@ -151,7 +151,7 @@ def page(rows: list, name: str) -> str:
     sections = [Section(f"means{number}", _heading(group, count), _means(number, group, rows, found))
                 for number, (group, count, found) in enumerate(pairs.means_of(rows)) if found]
     cells = [[str(row["line"]), *map(escape, (row["before"], row["after"] + _along(row), *row["labels"].values())),
-              escape(row["message"] or row["verdict"]), escape("; ".join(_lead(row)))] for row in rows]
+              prose(row["message"] or row["verdict"]), escape("; ".join(_lead(row)))] for row in rows]
     heads = (">line", "before", "after", *map(escape, rows[0]["labels"]), "verdict", "main numbers, 95 %")
     sections.append(Section("pairs", "Each pair", table(heads, cells)))
     return document(f"{name}: pairs before and after", lead, sections)
@@ -177,7 +177,7 @@ def _means(number: int, group: tuple, rows: list, found: dict) -> str:
         value, interval, unit = compare.shown(one.mean)
         cells.append([escape(words(name)), value, interval, _scatter(one, unit), str(one.count), unit])
     return "\n".join([*drawn, table(("quantity", ">mean", ">95 %", ">scatter", ">pairs", "unit"), cells),
-                      f"<p class=soft>{escape(ABOUT)}</p>"])
+                      f"<p class=soft>{prose(ABOUT)}</p>"])
 
 
 def write_page(path: Path, rows: list, name: str) -> None:

@@ -12,7 +12,7 @@ from ...scales import LADDERS, plain, step_of
 from ...surface.quantity import Mean, Quantity
 from ...surface.roughness import means, peaks
 from ...surface.roughness.report import RoughnessReport, fitting_cutoff
-from ..pages.document import Section, document, figure, table, warned
+from ..pages.document import Section, document, figure, prose, table, warned
 from . import asperities, pictures
 from .areal import write_columns, write_profile, write_x3p
 
@@ -231,7 +231,7 @@ def write_page(path: Path, reports: list) -> None:
 def _mean_section(each: means.Means) -> Section:
     rows = table(("parameter", ">mean", ">95 %: from .. to", ">scatter", "unit"), _means(each))
     doubt = warned([f"{each.doubt[0].upper()}{each.doubt[1:]}."]) if each.doubt else ""
-    return Section(f"mean-{each.kind}", _of_many(each), f"{doubt}{rows}<p class=soft>{escape(MEANS)}</p>")
+    return Section(f"mean-{each.kind}", _of_many(each), f"{doubt}{rows}<p class=soft>{prose(MEANS)}</p>")
 
 
 def _section(number: int, report: RoughnessReport) -> Section:
@@ -239,7 +239,7 @@ def _section(number: int, report: RoughnessReport) -> Section:
     told = [*report.notes, *([report.tip.sentence] if report.tip is not None and not report.tip.reaches else [])]
     parts.append(warned([f"{text}." for text in told]))
     if report.tip is not None and report.tip.reaches:
-        parts.append(f"<p class=soft>Stylus: {escape(report.tip.sentence)}.</p>")
+        parts.append(f"<p class=soft>Stylus: {prose(report.tip.sentence)}.</p>")
     parts += [figure(f"{number}{place}", *one) for place, one in enumerate(figures(report))]
     parts += [_table(report), _printed(report), _definitions(report)]
     if report.kind == "profile":
@@ -298,11 +298,11 @@ def _table(report: RoughnessReport) -> str:
     for one in report.values:
         value, interval, unit = shown(one, units[one.name])
         rows.append([escape(one.name), *([escape(value), escape(interval), escape(unit)] if one.value is not None else
-                                         [f"<td colspan=3 class=soft>{escape(one.reason)}</td>"])])
+                                         [f"<td colspan=3 class=soft>{prose(one.reason)}</td>"])])
     return (f"<h3>Parameters</h3>{table(('parameter', '>value', '>90 %: from .. to', 'unit'), rows)}"
             + (f"<p class=soft>{escape(AREAL if report.kind == 'areal' else INTERVAL)}</p>"
                if any(one.low is not None for one in report.values) else "")
-            + "".join(f"<p class=soft>No interval of {escape(', '.join(names))}: {escape(reason)}.</p>"
+            + "".join(f"<p class=soft>No interval of {escape(', '.join(names))}: {prose(reason)}.</p>"
                       for reason, names in _untold(report).items()))
 
 
@@ -318,5 +318,5 @@ def _printed(report: RoughnessReport) -> str:
 
 
 def _definitions(report: RoughnessReport) -> str:
-    rows = [[escape(one.name), escape(one.text)] for one in report.values]
+    rows = [[escape(one.name), prose(one.text)] for one in report.values]
     return f"<h3>Definitions</h3>{table(('', ''), rows)}"

@@ -18,7 +18,7 @@ from ...surface.quantity import LEVEL, Quantity, refused
 from ..drawing.charts import axis, chart, line, loop, mark
 from ..drawing.pictures import draw
 from ..pages import beside
-from ..pages.document import Section, document, figure, table, warned
+from ..pages.document import Section, document, figure, prose, table, warned
 from ..pages.sweep import label
 from ..pages.words import pair
 from ..readback import numeric, readable, variables, wanted
@@ -408,10 +408,10 @@ def write_page(path: Path, one: Lost, found: tuple) -> None:
     """Write the page, the verdict first, nothing fetched."""
     names = [Path(each.path).resolve().name for each in (one.before, one.after)]
     lead = (f"<p class=soft>patchfem {escape(__version__)}</p><div class=verdict>"
-            f"<b>{escape(found[0][0].upper() + found[0][1:])}.</b>"
-            + "".join(f"<p>{escape(text)}</p>" for text in found[1]) + "</div>" + warned(one.notes))
+            f"<b>{prose(found[0][0].upper() + found[0][1:])}.</b>"
+            + "".join(f"<p>{prose(text)}</p>" for text in found[1]) + "</div>" + warned(one.notes))
     rows = [[escape(name), *map(escape, _texts(each)),
-             f"<td class=soft>{escape(each.text + (f': {each.reason}' if each.reason else ''))}</td>"]
+             f"<td class=soft>{prose(each.text + (f': {each.reason}' if each.reason else ''))}</td>"]
             for name, each in _rows(one)]
     body = [figure(number, *each) for number, each in enumerate(_figures(one))]
     body.append(table(("quantity", ">value", ">interval", "unit", "meaning"), rows))

@@ -191,7 +191,8 @@ def test_exact_warnings_of_each_method():
     assert "changes its sign from step to step" in said(grown)
     assert "by the numerical method" in said(euler.run(PLAIN, release(6.0), (tanh(1e-6, 1.0),), 60.0, 100, Start(
         np.ones(1), np.zeros(1))))
-    assert "infinite or undefined" in said(euler.run(basis([300.0], [0.0], [[1.0]], [1.0]), UNIT, (tanh(0.1, 1.0),), 3000.0, 300))
+    assert "infinite or undefined" in said(euler.run(basis([300.0], [0.0], [[1.0]], [1.0]), UNIT, (tanh(0.1, 1.0),),
+                                                     3000.0, 300))
 
 
 @pytest.mark.parametrize("by_force, release_at", [(False, 3.0), (True, 1.0)])
