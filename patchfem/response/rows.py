@@ -296,7 +296,8 @@ ROWS = (
     Row("energy_dissipated", "J", 1e-10, "energy dissipated by friction in all interfaces over the whole run",
         lambda s: s.energies.get("energy_dissipated"), group="energy"),
     Row("energy_created", "J", 1e-10,
-        "energy created over the whole run by a law that is not passive, such as eq. 2.17 as printed in the report",
+        "energy created over the whole run by a law that is not passive, such as equation 2.17 as printed in the "
+        "report",
         lambda s: s.energies.get("energy_created"), group="energy"),
     Row("normal_load_least", "N", 1e-6, "smallest normal load in the last cycles", lambda s: s.of_load(np.min),
         group="friction"),
@@ -331,10 +332,10 @@ ROWS = (
     Row("ring_damping", "1", 1e-6, "damping ratio of the free vibration (ringing) during stick"),
     Row("onset_level", "m s-2", 0.0,
         "drive level at the onset of slip, found by bisection between two levels; the key `drive.onset` defines what "
-        "counts as the onset; in N for a force drive", group="friction"),
+        "counts as the onset; for a force drive the level is in N", group="friction"),
     Row("jump_level", "m s-2", 0.0,
         "drive level just after the largest jump of the amplitude; a jump is a step between two levels at which the "
-        "ratio of the amplitudes is at least 1.5 times the ratio of the levels; in N for a force drive"),
+        "ratio of the amplitudes is at least 1.5 times the ratio of the levels; for a force drive the level is in N"),
     Row("level_hysteresis", "m", 0.0,
         "hysteresis: largest difference between the amplitudes reached at the same level with rising and with falling "
         "levels"),

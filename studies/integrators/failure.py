@@ -1,4 +1,4 @@
-"""Why did mass 2 of Figs 17 to 20 move before its friction was overcome, and what prevents this?
+"""Why did mass 2 of Figures 17 to 20 move before its friction was overcome, and what prevents this?
 
 The method of the report accepted time steps that violate the friction law: the error of the friction force reached 5.4,
 although the friction limit is only 3. A friction law that can stick prevents this error: a law with a static branch, or

@@ -1,4 +1,4 @@
-"""What suppressed yaw and rocking in Fig. 27, and would the coherence have distinguished friction from a damper?
+"""What suppressed yaw and rocking in Figure 27, and would the coherence have distinguished friction from a damper?
 
 The normal stiffness of the flat pieces suppressed rocking: no test was strong enough to overcome it. Friction away from
 the axis suppressed yaw, completely before slip. While the block slides, the height of the yaw peak, divided by the

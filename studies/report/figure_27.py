@@ -1,4 +1,4 @@
-"""What does "nearly critically damped in the vicinity of 148 Hz" (Fig. 27) say about the rig?
+"""What does "nearly critically damped in the vicinity of 148 Hz" (Figure 27) say about the rig?
 
 The block slid during the whole modal test. A block that does not slip moves with the base, and its response has no
 peak. With a random base motion of 4.2 to 5.1 g rms the block slides by 0.5 to 1.9 mil rms, and one fitted mode is

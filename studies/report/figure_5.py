@@ -1,4 +1,4 @@
-"""A slowly moving frame rubs a block. Does the block ring as in Fig. 5, or is the ringing an artefact of Euler's
+"""A slowly moving frame rubs a block. Does the block ring as in Figure 5, or is the ringing an artefact of Euler's
 method?
 
 The block rings in the exact solution too, at its own natural frequency, which is ten times that of the frame. The first

@@ -1,4 +1,4 @@
-"""Does a slightly flexible fixture explain the ringing in the measured friction loops of Fig. 8, and which measured
+"""Does a slightly flexible fixture explain the ringing in the measured friction loops of Figure 8, and which measured
 values does the fixture distort?
 
 Yes. The fixture distorts the bond length, but not the friction coefficient. After each reversal of the slider the piece

@@ -1,4 +1,4 @@
-"""Does a rig whose surfaces ride up the flanks of grooves move as in Figs 28 and 29: distorted at 5 g, and stable or
+"""Does a rig whose surfaces ride up the flanks of grooves move as in Figures 28 and 29: distorted at 5 g, and stable or
 unstable at 8 g?
 
 Partly. At 143 Hz and 7.9 g the amplitude of the block stays at 0.83 mil; at 8.0 g the block runs away after 9 cycles.

@@ -1,6 +1,6 @@
-"""Does a single block with Coulomb friction move as in Figs 2, 3, 32 and 33? These figures are for 143 Hz. At 5 g they
-show the dimensionless amplitude q = 0.15 and an absolute acceleration equal to that of the input; at 4 g they show no
-slip, and at 8 g divergence.
+"""Does a single block with Coulomb friction move as in Figures 2, 3, 32 and 33? These figures are for 143 Hz. At 5 g
+they show the dimensionless amplitude q = 0.15 and an absolute acceleration equal to that of the input; at 4 g they show
+no slip, and at 8 g divergence.
 
 Partly. Amplitude and acceleration at 5 g depend on the onset of slip: if slip begins at 4.14 g, q is 0.150 and the
 acceleration is 0.98 times that of the input; if slip begins at 4.00 g, the two values are 0.287 and 1.09. At 4 g the

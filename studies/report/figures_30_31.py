@@ -1,5 +1,5 @@
-"""The report reads from Figs 30 and 31 that the waves of 80 um are isotropic before the tests, that they are much lower
-after the tests, and that after the tests the waves along x are the lowest. Do the figures show this?
+"""The report reads from Figures 30 and 31 that the waves of 80 um are isotropic before the tests, that they are much
+lower after the tests, and that after the tests the waves along x are the lowest. Do the figures show this?
 
 Partly. The study cuts sets of four traces from a synthetic surface, on which wear multiplies the height of the waves by
 0.55 along x and 0.67 along y. In 7 of 20 such sets `compare` finds that the waves along x became lower; in 5 sets it

@@ -170,9 +170,10 @@ def _left(rows: dict) -> list:
     cells = cells_of(TABLE)
     every = np.ones(cells.row.size, bool)
     out = ["| model | accelerometer shows | score of all readings | score of accelerations | score of displacements | "
-           "samples better than the constant: all, accelerations, displacements | samples better than the power "
-           "law in input and frequency: accelerations | fits whose best minimum was found twice | parameters at an "
-           "end of their range |", "|---|---|---|---|---|---|---|---|---|"]
+           "fraction of samples in which the model is better than the constant: all, accelerations, displacements | "
+           "fraction of samples in which its accelerations are better than those of the power law | "
+           "fits whose best minimum was found twice | parameters at an end of their range |",
+           "|---|---|---|---|---|---|---|---|---|"]
     null = {name: null_left(one) for name, one in RIVALS.items()}
     told = {"constant": "constant x input", "strong": "power law in input and frequency"}
     listed = [(f"without mechanics: {told[name]}", "", None, logs) for name, logs in null.items()] + shared(rows)
@@ -192,8 +193,8 @@ def _ends(folds) -> str:
     """Which numbers lie at an end of their range in which folds."""
     parts = []
     for fold in folds:
-        ends = [f"{SHORT[key.rpartition('.')[2]]} at its {end} end" for key, end in zip(fold["keys"], fold["at_bound"])
-                if end]
+        ends = [f"{SHORT[key.rpartition('.')[2]]} at the {end} end of its range"
+                for key, end in zip(fold["keys"], fold["at_bound"]) if end]
         parts += [f"fit without {fold['protocol'].split()[1]} Hz: {', '.join(ends)}"] if ends else []
     return "; ".join(parts) or "none"
 

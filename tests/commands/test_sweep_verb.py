@@ -444,7 +444,7 @@ def test_exact_the_answer_begins_with_the_measure_that_is_asked_for(tmp_path):
         mu = [float(row["friction.static"]) for row in csv.DictReader(file)]
     ends = re.search(r"have a secant stiffness from (\S+) N/mm to (\S+) N/mm, a loop area", answer).groups()
     assert [float(one) for one in ends] == pytest.approx(1e2 * np.quantile(mu, [0.05, 0.95]), rel=5e-3)
-    assert answer.startswith("Secant stiffness depends most on friction.static, which has a part in 100 %")
+    assert answer.startswith("Secant stiffness depends most on friction.static, which contributes to 100 %")
     assert answer == said.out.splitlines()[0]
     page = (tmp_path / "a/report.html").read_text("utf-8")
     assert data_of(page)["first"] == "secant_stiffness" and "--of secant_stiffness" in page

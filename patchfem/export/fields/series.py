@@ -75,7 +75,7 @@ class Series:
         except OSError as error:
             raise PatchfemError(f"{path}: not a readable HDF5 file ({error})") from None
         try:
-            with readable(path, "a series of fields of patchfem"):
+            with readable(path, "fields of a patchfem run, frame by frame"):
                 self._open()
         except PatchfemError:
             self.file.close()

@@ -134,7 +134,7 @@ def sentence(ranks: dict, left: int = 0, moves: bool = True) -> str:
     if name is None:
         return ""
     first, *others = ranks[name]
-    said = [f"depends most on {first.key}, which has a part in {percent(first)} of the variance{_between(first)}"]
+    said = [f"depends most on {first.key}, which contributes to {percent(first)} of the variance{_between(first)}"]
     said += [f"then on {one.key} ({percent(one)})" for one in others[:NAMED - 1]]
     if len(others) >= NAMED:
         said.append(f"least on {others[-1].key} ({percent(others[-1])})")

@@ -212,7 +212,7 @@ def page(parts: list, found: tuple, directions: list = (), pressing: Pressed | N
     for number, one in enumerate(parts):
         body = [*(figure(f"{number}{place}", *each) for place, each in enumerate(figures(one))), _table(one),
                 f"<p class=soft>{prose(NOTE)}</p>"]
-        head = "Changes at each place, and waves" if one.change is not None else \
+        head = "Changes of depth at each place, and changes of the waves" if one.change is not None else \
             "Waves" if one.direction and parts[0].change is not None else "What changed"
         sections.append(Section(f"changes{number}", f"{head}{one.direction and f' along {one.direction}'}",
                                 "\n".join(body)))

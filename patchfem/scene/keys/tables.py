@@ -90,21 +90,21 @@ class Friction(Table):
     micro_damping: key(quantity("damping", ge=0), "damping force on the bristles divided by the rate of their "
                        "deflection, for the whole contact") = 0.0
     viscous: key(quantity("damping", ge=0), "viscous force divided by the sliding speed, for the whole contact") = 0.0
-    reading: key(Literal["stretch", "report"], "how eq. 2.17 is read: 'stretch' separates the stretch of a bond from "
-                 "its damage, so that no energy is created; 'report' uses eq. 2.17 as printed "
-                 "in the report") = "stretch"
+    reading: key(Literal["stretch", "report"], "how equation 2.17 is read: 'stretch' separates the stretch of a bond "
+                 "from its damage, so that no energy is created; 'report' uses equation 2.17 as printed in the "
+                 "report") = "stretch"
     order: key(number(le=100), "power p with which the strength of a bond rises along its path; must be > -1, and >= "
                "0 with reading 'stretch'") = 1.0
-    rest_growth: key(Acceleration | None, "growth a_s of the bond length at rest (eq. 2.10); without "
+    rest_growth: key(Acceleration | None, "growth a_s of the bond length at rest (equation 2.10); without "
                                           "`rest_growth` "
                      "and `slip_growth` the bond length is constant", "with `slip_growth`") = None
     slip_growth: key(Length | None, "slip length l_k over which the bond length approaches its value in fast slip "
-                     "(eq. 2.10)", "with `rest_growth`") = None
-    rest_speed: key(Speed | None, "lower limit v_h of the sliding speed |v| in the term a_s/|v| (eq. 2.10); default: "
-                    "1e-3 of the largest sliding speed") = None
+                     "(equation 2.10)", "with `rest_growth`") = None
+    rest_speed: key(Speed | None, "lower limit v_h of the sliding speed |v| in the term a_s/|v| (equation 2.10); "
+                    "default: 1e-3 of the largest sliding speed") = None
     initial_bonds: key(Share, "fraction m_0 of all bonds that already exist when the run begins") = 1.0
     breakaway: key(number(ge=0, le=1), "fraction of the bond length over which a bond stretches without damage") = 0.0
-    spread: key(Length | None, "width rho of a bond perpendicular to the path (eq. 2.15); default: this width is "
+    spread: key(Length | None, "width rho of a bond perpendicular to the path (equation 2.15); default: this width is "
                 "ignored") = None
     temperature: Temperature | None = None
 
