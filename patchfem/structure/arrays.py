@@ -70,7 +70,7 @@ def _refuse_long(path) -> None:
     end = tail.rfind(b"PK\x05\x06")
     size = int.from_bytes(tail[end + 12:end + 16], "little") if end >= 0 else 0
     if size > DIRECTORY:
-        raise PatchfemError(f"its list of members takes {size} bytes; {DIRECTORY} is the limit")
+        raise PatchfemError(f"the list of members takes {size} bytes; {DIRECTORY} is the limit")
 
 
 def _refuse_large(key: str, shape: tuple) -> None:

@@ -37,7 +37,8 @@ WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_ma
          "track_depth_floor": "track depth, floor", "track_area_gross": "track, lost area",
          "track_pile_up": "track, pile-up", "track_area_net": "track, lost area minus pile-up",
          "hidden_wear": "mean wear that a tilt may hide",
-         "worn_volume": "worn volume", "grown_volume": "grown volume", "worn_share": "share of the region that is worn",
+         "worn_volume": "worn volume", "grown_volume": "grown volume",
+         "worn_share": "fraction of the common region that is worn",
          "shift_x": "shift along x", "shift_y": "shift along y", "rotation": "rotation",
          "worn_depth_mean_from_abbott": "worn depth, mean, from Abbott curves"}
 DRAWN = 1_000_000  # heights that a histogram and an Abbott curve are drawn from, spread over a larger scan
@@ -277,7 +278,7 @@ def _maps(one: Change) -> list:
     there = there[::-(-there.size // DRAWN)]
     heights = [each.ravel()[there] for each in (first, second)]
     out.append((pictures.both_heights(heights, [_bearing(z) for z in heights]),
-                "Left: share of the heights in each class. Right: Abbott curves. Heights are those of the region "
+                "Left: fraction of the heights in each class. Right: Abbott curves. Heights are those of the region "
                 "common to both scans, measured from the reference plane of the first scan (before wear).",
                 "Histograms and Abbott curves of the heights before and after"))
     if one.track is not None and not one.track.why:

@@ -34,7 +34,7 @@ TEXTS = {"worn_volume": ("m3", "material lost over the whole patch, both pieces 
          "worn_depth_max": ("m", "largest worn depth"), "worn_depth_mean": ("m", "mean worn depth: worn volume divided "
                                                                                  "by the area"),
          "worn_area": ("m2", "worn area of the section: worn volume divided by the width"),
-         "worn_share": ("1", "share of the patch that lost more than the error of the depth"),
+         "worn_share": ("1", "fraction of the patch area that lost more than the error of the depth"),
          "hidden_wear": ("m", "mean of the highest straight line that nowhere exceeds the worn depth: uniform and "
                               "wedge-shaped wear, which a trace of this part alone could not show")}
 PLANE = ("mean of the highest plane that nowhere exceeds the worn depth: uniform and wedge-shaped wear, which a scan "
@@ -125,7 +125,7 @@ def read(path: Path) -> Worn:
         shape = (size,) if y is None else (y.size, size)
         depth = held["worn_depth"][-1] if "worn_depth" in held else np.zeros(size)
         wanted(all(one.shape in ((size,), shape) for one in (depth, held["unloaded_gap"])),
-               "its fields do not match its strips")
+               "the fields do not match the strips")
     area, gap, depth = (np.broadcast_to(one, shape) for one in (held["weight"], held["unloaded_gap"], depth))
     cycles = float(held["wear_cycle"][-1]) if "wear_cycle" in held else 0.0
     return Worn(run, str(path), held["x"], y, area if y is None else area / y.size, gap, depth,
@@ -387,7 +387,8 @@ def _rows(one: Lost) -> list:
     words = WORDS | {"track_from": "worn part from", "track_to": "worn part to", "track_depth": "worn part, mean",
                      "track_depth_floor": "worn part, floor",
                      "track_hidden_wear": "uniform and wedge-shaped wear, in the worn part",
-                     "hidden_wear": "uniform wear and wedge, mean", "worn_share": "share of the patch that is worn"}
+                     "hidden_wear": "uniform wear and wedge, mean",
+                     "worn_share": "fraction of the patch area that is worn"}
     of_part = ("track_from", "track_to", "track_depth", "track_depth_floor", "track_hidden_wear")
     shown_of = one.values | {name: track[name] for name in of_part if name in track}
     return [(words[name], each) for name, each in shown_of.items()]
