@@ -54,7 +54,8 @@ def test_refuses_temperatures_that_are_not_absolute(surface, reference):
         growth_at(1.0, 1e-6, surface, reference, 2500.0, 1500.0)
 
 
-@pytest.mark.parametrize("surface, key", [(0.5, "rest_growth would be about 1e-"), (2.0, "rest_growth would be about 1e-")])
+@pytest.mark.parametrize("surface, key", [(0.5, "rest_growth would be about 1e-"),
+                                          (2.0, "rest_growth would be about 1e-")])
 def test_refuses_rates_beyond_floating_point(surface, key):
     with pytest.raises(PatchfemError, match=key):
         growth_at(10.0, 2e-7, surface, 293.15, 2500.0, 1500.0)
