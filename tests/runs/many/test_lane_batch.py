@@ -241,3 +241,26 @@ def test_exact_a_yield_that_settles_across_the_end_of_a_cycle_is_found():
     levels = [0.7745493775532992, *np.geomspace(5, 60, 71).tolist()]
     found = run_many([build(base.changed(assignments(sets | {"drive.acceleration": one}))) for one in levels])
     assert found.values["slip_amplitude"][0] == pytest.approx(7.025228e-7, rel=1e-5)
+
+
+def test_exact_motions_that_graze_their_yield_are_those_of_a_run_from_event_to_event():
+    """Elastic-plastic elements that slip at the top of their slide, within a step: 14 of 83 amplitudes
+    were off by more than 6e-6, the worst by 0.2 %."""
+    r, base, cases = np.random.default_rng(8), base_of(load(SCENE.format(law=LAWS["elastic-plastic"]))), []
+    for _ in range(100):
+        push, length, damping = 10 ** r.uniform(1, 3), 10 ** r.uniform(-6, -4), 10 ** r.uniform(-3, -1.5)
+        sets = {"normal.load": push, "friction.bond_length": length, "structure.mode.axial.damping": damping,
+                "drive.frequency": r.uniform(50, 400), "drive.cycles": 300, "drive.acceleration": 1.0}
+        modes = (stuck := build(base.changed(assignments(sets)))).rig.modes
+        own, w = modes.omega[0], stuck.rig.drive.omega
+        stiffness = own**2 + 0.3 * push / length * modes.slide[0]**2 / modes.mass - w**2
+        reach = np.abs(modes.slide[0] * modes.base[0]) / np.hypot(stiffness, 2 * damping * own * w)
+        sets["drive.acceleration"] = length / reach * (1 + 10 ** r.uniform(-4, -2))
+        cases.append(build(base.changed(assignments(sets))))
+    cases = [case for case in cases if lanes.steps_of([case])[0] == 96]
+    exact = lumped_answers(cases)
+    values, *_ = lanes._measured("yielding", *lanes.cases_of(cases), 300, 96)
+    for name, size, most in (("relative_displacement_amplitude", values["relative_displacement_amplitude"], 2e-6),
+                             ("loop_area", 4 * values["relative_displacement_amplitude"]
+                              * values["friction_force_peak"], 2e-4)):
+        np.testing.assert_array_less(np.abs(values[name] - exact.values[name]) / size, most)
