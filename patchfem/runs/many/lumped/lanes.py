@@ -63,6 +63,7 @@ OF_LOOP = 4e-10  # least error of the area of a loop over its largest force and 
 OF_MIDDLE = 1e-6  # of the amplitude, by which its middle errs behind sliders or a stretch, of which no event is missed
 ORDERLY, SHOWN = 10.0, 0.25  # a change at half the steps that falls by this shows a high order, and is so much of it
 MORE, SETTLED = 10, 1e-5  # times its cycles marches what has not settled; change over a tenth of these that is left
+LATE = 100  # times that change may be left at last
 PACES = 0.25, 0.25, 0.5, *(MORE - 1) * (1.0,)  # of its cycles, after which it is asked whether it has
 # error of an extrapolated range over what the extrapolation says, and over the range at least: 1 of 571 erred more
 OF_STATED, OF_TAIL = 2.5, 7e-6
@@ -503,29 +504,53 @@ def _settled(law: str, cases, found, steps: int, amplitudes, free) -> tuple:
     for share in PACES:
         if not where.size:
             break
-        more, motion = march.march_on(law, _of(cases, where), motion, max(1, int(share * part)), steps)
+        here, before = _of(cases, where), motion
+        more, motion = march.march_on(law, here, before, max(1, int(share * part)), steps)
         history = np.concatenate([history, more], axis=1)
-        value, error = _known(history, part)
-        near = 10 * SETTLED if history.shape[1] > MORE * part else 2 * SETTLED
-        known = error < near * np.ptp(history[:, -1, :2], axis=1) / 2
+        late = history.shape[1] > MORE * part
+        least = _left(here, before, motion, more.shape[1])
+        value, error = _known(history, part, least, (LATE if late else 1) * SETTLED)
+        near = (LATE if late else 2) * SETTLED
+        ranges = np.ptp(history[:, -part:, :2], axis=2) / 2
+        known = error < near * ranges[:, -1]
+        if law == "yielding":
+            known &= _goes_on(ranges, cases.length[where], value, error)
         out[:, where[known]], lost[where[known]] = (value[known], error[known]), False
         where, motion, history = where[~known], motion[~known], history[~known]
     return tuple(out), lost
 
 
-def _known(history, part: int) -> tuple:
+def _goes_on(ranges, length, value, error) -> np.ndarray:
+    """(n,) whether motions behind one spring slip in all of their last cycles and in the one that they settle to, or in
+    none: their free motion decays otherwise once no cycle slips. ranges (n, c): half those of the slide; length (n,):
+    the stretch beyond which it slips; value, error (n,): half the range that they settle to; all [m]."""
+    least, most = np.minimum(ranges.min(axis=1), value - error), np.maximum(ranges.max(axis=1), value + error)
+    return (least > length) | (most < length)
+
+
+def _left(cases, before, motion, cycles: int) -> np.ndarray:
+    """(n,) [m] the most that is left of a free motion, by what so many cycles changed of a motion `before` and by what
+    its damper takes of it in them at least: where it beats slowly, extremes hardly change as long as it is largest."""
+    own, half = np.sqrt(cases.square + cases.spring), cases.damp / 2
+    step = np.hypot(motion[:, at.X] - before[:, at.X], (motion[:, at.V] - before[:, at.V]) / own)
+    goes = -np.expm1(-2 * np.pi * cycles * (half - np.sqrt(np.maximum(half**2 - cases.square, 0.0))))
+    return step * (1 - goes) / np.maximum(goes, 1e-300)
+
+
+def _known(history, part: int, least, near: float) -> tuple:
     """(half the range of the slide that motions settle to [m], its error, NaN where nothing tells it, (n,) each), of
     their history (n, c, 4) beyond `part` cycles: the last where so many cycles hardly change it, and no more than those
-    before them, else an extrapolation of windows, in the end of windows of `part` cycles."""
+    before them, and no more free motion is left, (n,) `least` [m] at most, than a share `near` of it, else an
+    extrapolation of windows, in the end of windows of `part` cycles."""
     ranges, count = np.ptp(history[:, :, :2], axis=2) / 2, history.shape[1]
     last, left = ranges[:, -1], 2 * np.ptp(ranges[:, -part:], axis=1)
     before = 2 * np.ptp(ranges[:, -2 * part:-part], axis=1) if count >= 2 * part else np.inf
-    closes = (left < SETTLED * last) & (left <= np.maximum(before, 1e-9 * last))
+    closes = (np.maximum(left, least) < near * last) & (left <= np.maximum(before, 1e-9 * last))
     ends = np.arange(count - 1, 0, -(part if count > MORE * part else window_of(part)))[::-1]
     with np.errstate(all="ignore"):
         value, error = steady_amplitudes(ranges[:, ends], history[:, ends, 2:] @ [1, 1j])
     tail = np.maximum(OF_STATED * error, OF_TAIL * value)
-    return np.where(closes, last, value), np.where(closes, left + 1e-9 * last, tail)
+    return np.where(closes, last, value), np.where(closes, np.maximum(left, least) + 1e-9 * last, tail)
 
 
 def cases_of(models, contacts=None) -> tuple:
