@@ -312,6 +312,19 @@ def test_always_energies_balance(law):
     assert np.median(gaps[1]) < np.median(gaps[0]) / (3 if law == "table" else 5)
 
 
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("law", ["masing", FLOWS[0]])
+def test_always_a_march_that_ran_away_has_no_numbers_and_prints_nothing(law):
+    """By 8 steps a cycle of a mode that is 10 times as fast; energies overflowed."""
+    some = cases(law, 60, 3)
+    some = some._replace(square=some.square * np.where(np.arange(60) % 2, 1, 100))
+    found = run.march(law, some, 60, 6, 8)
+    book, angle = reading.books(law, some, found, np.ones(60)), np.ones((60, 6, 2))
+    reading.reading_of(law, some, found, np.ones(60), np.ones(60), angle)
+    assert np.isfinite(book["work_in"][1::2]).all() and np.isnan(book["work_in"][::2]).any()
+    assert (np.isnan(book["stored"]) == np.isnan(found.motion[:, at.X])).all()
+
+
 def test_exact_without_friction_a_march_is_the_closed_form():
     """At any steps the motion after some cycles is that of the linear oscillator."""
     none = np.zeros(3)
