@@ -496,7 +496,10 @@ def open_cycle(i, room):
 def close_cycle(i, room, first, cycles, h):
     """Take the range, the secant and the means of a cycle of a lane, the first or not, into what it shows."""
     size, begun = room[HIGH * LANES + i] - room[LOW * LANES + i], room[BEGUN * LANES + i]
-    secant = (room[PULL_HIGH * LANES + i] - room[PULL_LOW * LANES + i]) / size
+    high, low = room[PULL_HIGH * LANES + i], room[PULL_LOW * LANES + i]
+    if law.RESTS and size > 0.0:  # an extreme at an end of the cycle turns beside it, with no force in the mean
+        high, low = high if high == high else 0.0, low if low == low else 0.0
+    secant = (high - low) / size
     room[RANGE * LANES + i] += size / cycles
     if secant == secant and size > 0.0:
         room[SEEN * LANES + i] += 1.0

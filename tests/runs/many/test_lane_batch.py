@@ -295,3 +295,21 @@ def test_exact_motions_that_graze_their_yield_are_those_of_a_run_from_event_to_e
                              ("loop_area", 4 * values["relative_displacement_amplitude"]
                               * values["friction_force_peak"], 2e-4)):
         np.testing.assert_array_less(np.abs(values[name] - exact.values[name]) / size, most)
+
+
+def test_exact_the_secant_of_a_slide_that_turns_beside_the_end_of_a_cycle_is_that_of_single_runs():
+    """Under Coulomb's law it is 0, as the force at a turn is in the mean. It was missing where the amplitude grew and
+    the slide turned just behind the end of a cycle."""
+    base = base_of(load(SCENE.format(law=LAWS["coulomb"])))
+    sets = {"normal.load": 100.0, "structure.moving_mass": 1.0, "structure.mode.axial.frequency": 98.48857801796105,
+            "structure.mode.axial.damping": 0.003079639, "drive.frequency": 100.0, "drive.cycles": 40,
+            "accuracy.tolerance": 0.01}
+    cases = [build(base.changed(assignments(sets | {"drive.acceleration": level})))
+             for level in (38.649656620695204, 39.275, 40.528, *np.geomspace(20, 60, 69).tolist())]
+    found, ones = run_many(cases), lumped_answers(cases)
+    assert {one["engine"] for one in found.numerics.values()} == {"lanes"}
+    np.testing.assert_array_equal(found.values["secant_stiffness"][:3], 0.0)
+    slides = ones.values["slip_amplitude"] > 0
+    for column in (found.values, found.errors):
+        np.testing.assert_array_equal(column["secant_stiffness"][slides], 0.0)
+    assert ones.values["secant_stiffness"][0] == 0 == np.nansum(np.abs(ones.values["secant_stiffness"][slides]))
