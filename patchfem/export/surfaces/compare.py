@@ -25,7 +25,8 @@ from . import line, pictures
 from .areal import write_columns, write_x3p
 
 WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_max": "worn depth, largest",
-         "worn_depth_mean": "worn depth, mean", "worn_area": "worn area", "amplitude_ratio": "amplitude ratio",
+         "worn_depth_mean": "worn depth, mean", "worn_area": "worn area (volume per width)",
+         "amplitude_ratio": "amplitude ratio",
          "slope_ratio": "slope ratio", "worn_from_before": "worn part begins, x of first trace",
          "worn_to_before": "worn part ends, x of first trace",
          "worn_from_after": "worn part begins, x of second trace", "worn_to_after": "worn part ends, x of second trace",
@@ -43,10 +44,13 @@ WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_ma
          "worn_depth_mean_from_abbott": "worn depth, mean, from Abbott curves"}
 DRAWN = 1_000_000  # heights that a histogram and an Abbott curve are drawn from, spread over a larger scan
 NOTE = ("All intervals are 95 % intervals. The intervals of shift, depth and area hold for the measured place and "
-        "come from the noise of the unworn heights. The intervals of ratios hold for the whole surface and assume "
-        "Gaussian heights with the same statistics everywhere. If both traces are of the same place, their heights "
-        "vary together, and the "
-        "intervals are narrower.")
+        "come from the noise of the unworn heights. A track or worn part begins where the flank that is fitted to its "
+        "depths leaves the unworn surface: a parabola, or a step where this fits clearly better. The intervals of both "
+        "ends, of the width and of the mean depth within hold for flanks that leave the surface at an angle or in a "
+        "step, as those of a parabola or a box do; a flank that runs out flat begins farther outside than its interval "
+        "says. The intervals of ratios hold for the whole surface and assume Gaussian heights with the same statistics "
+        "everywhere. If both traces are of the same place, their heights vary together, and the intervals are "
+        "narrower.")
 
 
 def shown(one: Quantity) -> tuple:

@@ -204,8 +204,7 @@ def _apart(place: Place, direction: str, band: tuple, removed: tuple) -> Compari
     abbott = None if flanks is not None else worn_depth.abbott_estimate(before, after)
     sides = [[before], [after] if flanks is None else beside_flanks(after, flanks, band[1])]
     worn = worn_depth.of_flanks(flanks) if flanks is not None else worn_depth.nowhere(
-        why + ", and there are no unworn flanks beside a track; for a worn depth, either matching traces or such "
-              "flanks are needed")
+        f"{why}; the second trace shows no track between unworn flanks either; a worn depth needs one of the two")
     sizes = tuple(_pooled(side, step, band) for side in sides)
     freedom = [[scattered(one, step, band) for one in side] for side in sides]
     sizes = tuple(one._replace(freedom=tuple(min(a, b) for a, b in zip(one.freedom, np.sum(each, axis=0))))

@@ -183,7 +183,9 @@ def _worn(one: Comparison, name: str) -> str:
         text = f"Worn depth{name}: not available; {mean.reason}."
         if one.abbott is not None and one.abbott.value is not None:
             text += (f" The valley tails of the Abbott curves suggest a mean worn depth of {_length(one.abbott)}, if "
-                     "the surface is uniform and its valleys are unworn.")
+                     "the surface is uniform and its valleys are unworn." if one.abbott.low > 0 else
+                     " The valley tails of the Abbott curves show no wear: their mean worn depth of "
+                     f"{_length(one.abbott)} is not above zero beyond its interval.")
         return text
     if not _sure(mean):
         return f"Worn depth{name}: no wear detected; at most {say(mean.high)} on average.{above}"
