@@ -246,7 +246,8 @@ def _number(rig, name: str) -> int:
     modes, names = rig.modes, list(rig.modes.names)
     if not rig.by_modes:
         if name and not (name.isdecimal() and 1 <= int(name) <= modes.omega.size):
-            raise PatchfemError(f"backbone --mode {name}: the rig has {modes.omega.size} modes, counted from 1", "")
+            raise PatchfemError(f"backbone --mode {name}: the rig has {modes.omega.size} mode"
+                                f"{'s' * (modes.omega.size != 1)}, counted from 1", "")
         return int(name) - 1 if name else int(np.argmax(modes.omega > 0))
     if name and name not in names:
         raise PatchfemError(f"backbone --mode {name}: no mode has this name; the modes of the rig are "

@@ -41,7 +41,8 @@ def compare(before: Path | None = None, after: Path | None = None, /, *other: Pa
             pairs: Annotated[Path | None, Parameter(help="table of pairs in place of BEFORE and AFTER, such as "
                                                          "pairs.csv: each line names two files or two results folders "
                                                          "in the columns `before` and `after`")] = None,
-            direction: word("axis along which the traces run, x or y; not needed for areal scans") = "",
+            direction: word("axis along which the traces run, x or y; it names the direction in the answer and "
+                            "may be left out") = "",
             units: Units = "",
             shift: word('known shift of the second trace (x of AFTER minus x of BEFORE), such as "0 mm" if both traces '
                         'start at the same mark') = "",
@@ -72,7 +73,10 @@ def compare(before: Path | None = None, after: Path | None = None, /, *other: Pa
         return
     if len(files) < 2:
         raise Refused("compare: give two files BEFORE and AFTER, or a table of pairs with --pairs")
-    if before.is_dir() or after.is_dir():
+    folders = before.is_dir(), after.is_dir()
+    if any(folders) and len(files) == 2 and not all(folders):
+        worn.lost(before, after)  # which refuses a file beside a folder
+    if any(folders):
         _no_traces({"a third file": other, "--direction": direction, "--units": units, "--shift": shift,
                     "--keep-spikes": keep_spikes, "--scene": scene, "--set": set_})
         return _runs(before, after, out, json_)
@@ -120,7 +124,8 @@ def _no_traces(asked: dict):
     """Refuse what belongs to files of traces, beside a results folder."""
     for name, value in asked.items():
         if value:
-            raise Refused(f"compare: {name} can only be used for measured surfaces, not for results folders")
+            raise Refused(f"compare: {name} can only be used for measured surfaces, not for results folders; "
+                          "leave it out")
 
 
 def _runs(before: Path, after: Path, out, json_: bool):

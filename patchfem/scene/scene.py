@@ -116,7 +116,8 @@ def text_of(path: str | Path) -> str:
             content = file.read(LARGEST + 1)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
-        raise SceneError([f"{path}: cannot be read: {reason}"]) from None
+        advice = "; give a scene file, such as rig.toml" if Path(path).is_dir() else ""
+        raise SceneError([f"{path}: cannot be read: {reason}{advice}"]) from None
     if len(content) > LARGEST:
         raise SceneError([f"{path}: more than {LARGEST >> 20} MiB, too large for a scene; put matrices into a file and "
                           "give its name in structure.file"])

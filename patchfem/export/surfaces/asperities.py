@@ -44,8 +44,8 @@ def lines_of(told: Told | None, cutoff: float | None) -> list:
                "surface") if half is None else \
         f"with every second sample of the trace the ratio is {_per(half)}, a change of " \
         f"{100 * (half / one['stiffness'] - 1):+.2g} %"
-    return ["  paste this into a scene if the other face is smooth (Greenwood-Williamson peaks, radius "
-            f"{short(one['radius'], 'm', 3)}, {one['density']:.3g} 1/m^2):",
+    return ["  paste this into a scene if the other face is smooth (Greenwood-Williamson: peaks of radius "
+            f"{short(one['radius'], 'm', 3)}, {1e-6 * one['density']:.3g} of them per mm^2):",
             "    [contact.asperities]", '    law = "hertz"', f'    rms_height = "{fine.height * 1e6:.5g} um"',
             f"    rms_slope = {fine.slope:.5g}", f'    rms_curvature = "{fine.curvature:.5g} 1/m"',
             *([f'    cutoff = "{say(cutoff)}"'] if cutoff else []),

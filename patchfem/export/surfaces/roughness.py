@@ -53,7 +53,9 @@ def units_of(report: RoughnessReport) -> dict:
 def heading(report: RoughnessReport) -> str:
     """What was measured and how it was treated, in one line."""
     shape = " x ".join(str(count) for count in report.shape)
-    text = f"{shape} heights, {say(report.length)} long, every {say(report.step)}"
+    text = f"{shape} heights" if report.measured in (None, report.shape[-1]) else \
+        f"{report.measured} heights, resampled to {shape}"
+    text += f", {say(report.length)} long, every {say(report.step)}"
     if report.window is not None:
         ends = [f"{say(low)} to {say(high)}" for low, high in zip(report.window[::2], report.window[1::2])]
         text += f", window {' in x, '.join(ends)}{' in y' * (len(ends) > 1)}"
@@ -64,9 +66,9 @@ def heading(report: RoughnessReport) -> str:
     if report.cutoff is None:
         fits = fitting_cutoff(report.length + report.step, report.step)  # a step for each sample
         text += "; no cut-off, so no roughness profile" + (
-            f' (--cutoff "{say(fits)}" '
-            'is the longest standard cut-off that fits five times into the trace)' if fits else
-            ", and no standard cut-off fits five times into the trace")
+            f' (--cutoff "{say(fits)}" is the longest standard cut-off of which five fit into the trace once half a '
+            'cut-off is trimmed at each end)' if fits else
+            "; no standard cut-off fits five times into the trace once half of it is trimmed at each end")
         return text + (f"; S-filter at {say(short)}, half this length trimmed at each end" if short else "")
     return (f"{text}; Gaussian filter at {say(report.cutoff)}, half this length trimmed at each end, "
             + (f"S-filter at {say(short)}, half this length trimmed at each end" if short else
@@ -188,7 +190,9 @@ def _untold(report: RoughnessReport) -> dict:
 
 def _pair(one) -> str:
     unit, scale = ("", 1.0) if one.unit == "1" else step_of(LADDERS[one.unit], one.printed)
-    return f"{one.name} {one.printed * scale:.6g} {unit}".rstrip() + f"; from its heights {one.here * scale:.6g}"
+    unit = unit and f" {unit}"
+    return (f"{one.name} {one.printed * scale:.6g}{unit}; its heights give {one.here * scale:.6g}{unit} between its "
+            f"cursors, x = {say(one.window[0])} to {say(one.window[1])}")
 
 
 def data_of(report: RoughnessReport) -> dict:

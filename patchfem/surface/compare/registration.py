@@ -226,8 +226,8 @@ class _Fit:
         self.scales = np.array([tilt, tilt, step, step / self.half, tilt])
         inside = self.inside(self.at(np.array([0.0, 0.0, shift, 0.0, 0.0]), 0.0))
         if inside.sum() < FEWEST:
-            raise PatchfemError(f"{self.source}: only {inside.sum()} samples overlap {one.source}; at least {FEWEST} "
-                                "are needed")
+            raise PatchfemError(f"{self.source}: only {inside.sum()} of its samples lie on {one.source}; at "
+                                f"least {FEWEST} are needed")
         self.centre = float(self.x[inside][0] + self.x[inside][-1]) / 2
 
     def inside(self, at):

@@ -76,7 +76,7 @@ def text_of(raw: Raw) -> str:
     """The text of a file with lines that end in \\n, without quotes."""
     path, data = raw.path, raw.data
     if not data.strip(b"\xef\xbb\xbf \t\r\n"):
-        raise PatchfemError(f"{path}: the profile is empty")
+        raise PatchfemError(f"{path}: the profile is empty; export it again as text with two columns and {EXAMPLE}")
     text = data.decode(_encoding(raw), errors="replace").replace("\r\n", "\n").replace("\r", "\n")
     return _QUOTED.sub(r"\1.\2", text).replace('"', "") if '"' in text else text
 

@@ -35,12 +35,14 @@ PRINTED = {"Ra": "Pa", "Rq": "Pq", "Skew": "Psk", "RzDin": "RzDin", "MaxDev": "M
 
 
 class Reread(NamedTuple):
-    """A result that the instrument printed into the file, and the same one read off its heights [SI]."""
+    """A result that the instrument printed into the file, and the same one read off its heights [SI] between its
+    cursors, the window [m]."""
 
     name: str
     printed: float
     here: float
     unit: str
+    window: tuple
 
 
 class Settings(NamedTuple):
@@ -68,7 +70,7 @@ class RoughnessReport:
     notes: sentences about the file and what was done to it; tip: the stylus against the valleys, or None; printed:
     tuple of Reread; abbott: (ratio, height) of the roughness, of the primary without one, of the scan, and its core. Of
     traces only: primary, the trace without form; waviness, roughness, None without a cut-off; spectrum of the primary.
-    scan: the areal scan that the parameters are read from.
+    scan: the areal scan that the parameters are read from. measured: heights of a trace before it was resampled.
     """
 
     source: str
@@ -92,6 +94,7 @@ class RoughnessReport:
     core: tuple | None = None
     spectrum: object | None = None
     scan: Areal | None = None
+    measured: int | None = None
 
     def __getitem__(self, name: str) -> Quantity:
         """The parameter of this name."""
@@ -128,16 +131,17 @@ def report_of(surface: Profile | Areal, cutoff: float | None = None, window: tup
         values += [_value(row, _ends(trace) if row.of is None else row.of(heights), found) for row in rows.WINDOW]
     shown, radius = rough or heights, surface.tip_radius if tip is None else tip
     stylus = None if radius is None else tip_check(heights, radius)
-    notes = trace.notes + _spiky(cut) + (() if roughness is None else _short(roughness, cutoff))
+    notes = trace.notes + _resampled(cut, trace, primary, settings) + _spiky(cut)
+    notes += () if roughness is None else _short(roughness, cutoff)
     return RoughnessReport(
         trace.source, "profile", trace.length, (trace.x.size,), heights.step, tuple(values), notes, form, settings,
         cutoff, window, band, stylus, reread(surface), primary, waviness, roughness, abbott(shown), shown.core,
-        spectrum)
+        spectrum, measured=cut.x.size)
 
 
 def fitting_cutoff(length: float, step: float) -> float | None:
     """The longest standard cut-off [m] with five sections in a trace of this length [m] and step [m], or None."""
-    return max((one for one in CUTOFFS if SECTIONS * one <= length and one >= 4 * step), default=None)
+    return max((one for one in CUTOFFS if SECTIONS * one <= length * (1 + 1e-9) and one >= 4 * step), default=None)
 
 
 def windowed(surface: Profile | Areal, *ends: float) -> Profile | Areal:
@@ -202,13 +206,14 @@ def reread(profile: Profile) -> tuple:
                 continue
             parts[cursors] = part, Heights(level(part).z, part.length / (part.x.size - 1))
         part, heights = parts[cursors]
-        out.append(Reread(name, one.value, _ends(part) if row.of is None else row.of(heights), one.unit))
+        out.append(Reread(name, one.value, _ends(part) if row.of is None else row.of(heights), one.unit, cursors))
     return tuple(out)
 
 
 def _enough(trace: Profile) -> Profile:
     if trace.x.size < FEWEST:
-        raise PatchfemError(f"{trace.source}: {trace.x.size} samples; the parameters need at least {FEWEST}")
+        count = f"{trace.x.size} sample{'s' * (trace.x.size != 1)}"
+        raise PatchfemError(f"{trace.source}: {count}; the parameters need at least {FEWEST}")
     return trace
 
 
@@ -254,7 +259,7 @@ def _waves(row, source: str, found: Intervals) -> Quantity:
     low, high = found.band
     text = row.text.replace("the band", f"{say(low)} to {say(high)}")
     try:
-        refuse_band(source, low, high, found.heights.length, found.heights.step)
+        refuse_band(source, low, high, found.heights.length - found.heights.step, found.heights.step)
     except PatchfemError as error:
         return refused(row.unit, text, str(error))._replace(name=row.name)
     return _value(row._replace(text=text), amplitude_of(found.spectrum, low, high), found)
@@ -274,6 +279,27 @@ def _spiky(surface: Profile | Areal) -> tuple:
     what, counts = (f"is a spike (at {place}),", "which counts") if found.sum() == 1 else \
         (f"are spikes (the first at {place}),", "which count")
     return (f"{surface.source}: {found.sum()} of {found.size} heights {what} {counts} in every parameter",)
+
+
+def _resampled(cut: Profile, trace: Profile, primary: Profile, settings: Settings) -> tuple:
+    """By how much the mean heights hang on the resampling of an uneven trace, () of an even or S-filtered one.
+
+    Straight lines between samples cut tops and valleys off: beside them stand the file's own heights, each weighted by
+    the length that it stands for, about the same form.
+    """
+    if trace.x.size == cut.x.size or settings.short is not None:
+        return ()
+    there = ~cut.missing
+    x, z = cut.x[there], cut.z[there]
+    weight, z = np.gradient(x), z - np.interp(x, trace.x, trace.z - primary.z)
+    weight, z = weight / weight.sum(), z - weight @ z / weight.sum()
+    own = {"Pa": float(weight @ np.abs(z)), "Pq": float(np.sqrt(weight @ z**2))}
+    here = {"Pa": float(np.abs(primary.z).mean()), "Pq": float(np.sqrt(np.mean(primary.z**2)))}
+    if min(own.values()) <= 0:
+        return ()
+    told = " and ".join(f"{name} by {100 * abs(here[name] / own[name] - 1):.2g} %" for name in own)
+    return (f"{trace.source}: resampling changes {told}, compared with the heights of the file weighted by the length "
+            "that each stands for; no interval includes this error",)
 
 
 def _short(roughness: Profile, cutoff: float) -> tuple:

@@ -112,9 +112,11 @@ def test_exact_rounded_x_is_evened(tmp_path, step):
 
 
 GIVE = 'or state the units of x and z by --units "mm,um" (in Python, by units=("mm", "um"))'
+EMPTY = ("{path}: the profile is empty; export it again as text with two columns and write the header as "
+         "`x [um],z [um]`")
 REFUSED = {
-    "": "{path}: the profile is empty",
-    "\ufeff \n\n": "{path}: the profile is empty",
+    "": EMPTY,
+    "\ufeff \n\n": EMPTY,
     "# only words\n% more\n": "{path}: no data, only comments",
     "0,1\n1,2\n": "{path}:1: there is no header, and units are never guessed; write the header as `x [um],z [um]` "
                   f"above the first sample, {GIVE}",

@@ -1,5 +1,6 @@
 """The report of a surface: windows, flat and short traces, spikes, printed results, scans, refusals, its speed."""
 
+import re
 from dataclasses import replace
 from time import process_time
 
@@ -9,6 +10,7 @@ from ring_traces import traces
 from synthetic import sine
 
 from patchfem.core import PatchfemError
+from patchfem.export.surfaces.roughness import heading
 from patchfem.surface.areal import Areal
 from patchfem.surface.profile import Printed, Profile
 from patchfem.surface.roughness.report import NOTHING, fitting_cutoff, interval_of, report_of, windowed
@@ -73,7 +75,7 @@ def test_exact_a_trace_shorter_than_a_section_or_the_band_says_so():
     assert report["Rz"].value is None and report["Rz"].reason == "the trace is shorter than one cut-off"
     assert report["Ra"].value > 0
     short = report_of(made(200))["band_amplitude"]
-    assert short.value is None and ("can show waves of 2 um to 100 um, but not the whole band 60 um to 110 "
+    assert short.value is None and ("can show waves of 2 um to 99.5 um, but not the whole band 60 um to 110 "
                                     "um") in short.reason
 
 
@@ -198,7 +200,7 @@ def test_exact_a_form_and_a_short_wave_of_a_trace():
 
 
 @pytest.mark.parametrize("length, fits", [(4e-3, 250 * UM), (1.5e-3, 250 * UM), (1.49e-3, 80 * UM), (60e-3, 8e-3),
-                                          (0.1e-3, None)])
+                                          (9600 * (1.5e-3 / 9600 * (1 - 1e-16)), 250 * UM), (0.1e-3, None)])
 def test_exact_the_cutoff_that_fits(length, fits):
     """Standard cut-offs; the trace holds five sections and two halves."""
     assert fitting_cutoff(length, 0.5 * UM) == (None if fits is None else pytest.approx(fits))
@@ -207,3 +209,27 @@ def test_exact_the_cutoff_that_fits(length, fits):
 def test_always_no_value_or_interval_is_missing_without_a_reason():
     report = report_of(made(), 250 * UM, (100 * UM, 3900 * UM))
     assert all(one.reason for one in report.values if one.value is None or one.low is None)
+
+
+def test_exact_a_resampled_trace_says_how_many_heights_were_measured_and_what_resampling_changed():
+    """132 heights became 176 without a word, and the mean heights changed by 0.5 %."""
+    draw = np.random.default_rng(71000)
+    x = np.cumsum(draw.uniform(0.8, 2.5, 132)) * UM
+    z = np.sin(2 * np.pi * x / (9 * UM)) * UM
+    found = report_of(Profile(x, z, "uneven.csv"))
+    weight = np.gradient(x) / np.gradient(x).sum()
+    off = np.interp(x, found.primary.x, np.interp(found.primary.x, x, z) - found.primary.z)
+    own = np.sqrt(weight @ (z - off)**2)
+    note = next(text for text in found.notes if "resampling changes" in text)
+    said = float(re.search(r"Pq by ([\d.]+) %", note).group(1))
+    assert said == pytest.approx(100 * abs(found["Pq"].value / own - 1), rel=0.1) and said > 1
+    assert heading(found).startswith(f"132 heights, resampled to {found.shape[0]}, ") and found.shape[0] > 140
+    assert not any("resampling" in text for text in report_of(made()).notes)
+
+
+def test_exact_a_trace_of_six_cutoffs_but_for_round_off_is_told_of_the_longest():
+    """80 um were called the longest cut-off that fits five times into 1.5 mm: 250 um do, once both ends are trimmed."""
+    one = made(1500)
+    told = heading(report_of(one))
+    assert '--cutoff "250 um" is the longest standard cut-off of which five fit into the trace once half a' in told
+    assert report_of(one, cutoff=250 * UM).roughness.x.size == 1250
