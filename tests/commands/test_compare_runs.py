@@ -153,6 +153,10 @@ def test_refuses_what_belongs_to_traces_and_damaged_results(runs, tmp_path):
     for words in (("--shift", "1 mm"), ("--direction", "x"), ("--keep-spikes",), ("--units", "um,um")):
         answer = cli("compare", runs / "new", runs / "worn", *words, "-o", tmp_path / "out")
         assert answer.code == 2 and f"{words[0]} can only be used for measured surfaces" in answer.err
+        assert "leave it out" in answer.err
+    (runs / "file.csv").write_text("x [um],z [um]\n0,0\n1,1\n")
+    answer = cli("compare", runs / "file.csv", runs / "worn", "--direction", "x", "-o", tmp_path / "out")
+    assert answer.code == 2 and "file.csv: a file, while" in answer.err
     (tmp_path / "bad").mkdir()
     for name in ("summary.json", "scene.resolved.toml", "result.nc"):
         (tmp_path / "bad" / name).write_bytes((runs / "worn" / name).read_bytes())
