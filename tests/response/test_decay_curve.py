@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 import patchfem as pf
 from patchfem.campaigns.backbone import backbone
-from patchfem.response.decay_curve import curve_of, of_turns, turns
+from patchfem.response.decay_curve import _slope, _slopes, curve_of, of_turns, turns
 from patchfem.runs.rig.decays import decay_of
 
 RELEASED = DRIVE[:DRIVE.index('kind')] + 'kind = "free"\ndisplacement = "2 mm"\ncycles = 30\n'
@@ -24,6 +24,18 @@ def test_exact_a_viscous_decay_has_one_frequency_and_one_ratio(zeta):
     assert found.damping == pytest.approx(zeta, rel=1e-9)
     assert found.frequency == pytest.approx(own / (2 * np.pi), rel=1e-12)
     assert found.amplitude.size > 6 and (np.diff(found.amplitude) < 0).all()
+
+
+@pytest.mark.parametrize("count", [3, 4, 5, 7, 8, 40, 700])
+def test_exact_slopes_at_all_places_at_once_are_those_of_one_place_after_the_other(count):
+    """Straight at first, then bent, then with noise of which nobody tells: spans of all lengths, and both ends."""
+    k, r = np.arange(count), np.random.default_rng(count)
+    for values in (k / 4, np.where(k < count // 2, k / 4, k / 4 + (k - count // 2)**2 / 64), k + 0.1 * r.random(count)):
+        slope, error, span = _slopes(values)
+        one = [_slope(values, np.zeros(count), place) for place in range(1, count - 1)]
+        assert slope == pytest.approx(np.array([each[0] for each in one]), rel=1e-13)
+        assert error == pytest.approx(np.array([each[1] for each in one]), rel=1e-9, abs=1e-13)
+        assert (span == [each[2] for each in one]).all()
 
 
 def viscous(zeta: float, omega: float, samples: int):
