@@ -37,7 +37,7 @@ from ..runs.joint import held_patch
 from ..runs.patch import result as patch_result
 from ..runs.plan import plan
 from ..runs.rig import decays, numerics
-from ..runs.rig.engines import ENGINES
+from ..runs.rig.engines import ENGINES, PIECES
 from ..runs.rig.plan import held_by
 from ..structure import drives
 
@@ -645,7 +645,7 @@ def _come_down(joint: Joint, amplitudes) -> tuple:
         model = released(joint, begin)
         what = replace(model, rig=replace(model.rig, cycles=float(cycles)))
         how = numerics.choose(what)
-        if many or not _rigid(joint.model):  # a contact that holds on its spring has no events, and no other samples
+        if many or not (_rigid(joint.model) or how.engine == PIECES.name):  # these keep every turn of the output
             how = replace(how, window=int(cycles))
         found = ENGINES[how.engine].run(what, how, joint.patch, 0, None, None)
         read = _read(joint, found)
