@@ -178,14 +178,10 @@ def of_balance(curve, laws, rig) -> np.ndarray:
     splines = [CubicSpline(np.log(a), curve[name]) for name in ("frequency", "damping")]
     out = []
     for k in range(1, a.size - 1, 3):
-        f, ratio, told, start = curve["frequency"][k], curve["damping"][k], [], a[k]
-        damping = 2 * (zeta * omega - ratio * 2 * np.pi * f)
+        f, ratio = curve["frequency"][k], curve["damping"][k]
+        damping, told = 2 * (zeta * omega - ratio * 2 * np.pi * f), []
         for one, law in zip(HALVES, laws):
-            for _ in range(AIMS):
-                z = bent(law, start, STEPS) if law[0] == 2 else 0.0
-                turns = march(law, mass, omega, damping, start, WARM + 2, STEPS // one, 1 / f, z)
-                at, seen, net = (part[2 * WARM - 1] for part in ringing(*turns))
-                start *= a[k] / at
+            at, seen, net = aimed(law, (mass, omega, damping), a[k], STEPS // one, 1 / f)
             told.append((at, seen, ratio * f / seen + net))
         at = told[1][0]
         if not a[0] < at < a[-1]:
@@ -196,6 +192,22 @@ def of_balance(curve, laws, rig) -> np.ndarray:
             bar = curve[f"{name}_error"][k] + own[j] + abs(here - curve[name][k])
             out.append(abs(here - told[1][1 + j]) / bar)
     return np.array(out).reshape(-1, 2).T
+
+
+def aimed(law, rig, amplitude: float, steps: int, period: float) -> tuple:
+    """`ringing` after WARM of a motion that begins where it comes nearest to an amplitude [m] there. What leaves a
+    motion that is not stable, as where the damping falls with the amplitude, is not brought nearer by another start."""
+    start, best = amplitude, None
+    for _ in range(AIMS):
+        z = bent(law, start, STEPS) if law[0] == 2 else 0.0
+        found = ringing(*march(law, *rig, start, WARM + 2, steps, period, z))
+        if found[0].size < 2 * WARM:
+            break
+        one = tuple(part[2 * WARM - 1] for part in found)
+        if best is not None and abs(np.log(one[0] / amplitude)) >= abs(np.log(best[0] / amplitude)):
+            break
+        best, start = one, start * amplitude / one[0]
+    return best
 
 
 def of_decay(curve, laws, rig, last: float) -> np.ndarray:
