@@ -34,6 +34,7 @@ from ..runs.bench import bench
 from ..runs.bench.engine import steps_of
 from ..runs.bench.errors import errors_of
 from ..runs.joint import held_patch
+from ..runs.patch import faces
 from ..runs.patch import result as patch_result
 from ..runs.plan import plan
 from ..runs.rig import decays, numerics
@@ -74,7 +75,7 @@ UNKNOWN = ('the friction loop of bonds has a closed form only with reading = "st
 
 class Curve(NamedTuple):
     """One way: amplitude (k,) [m] at the output, frequency (k,) [Hz] and damping ratio (k,) [1] with their errors, loss
-    of the contact per cycle (k,) [J], NaN where it is not known."""
+    of the contact per cycle (k,) [J], NaN where it is not known; notes: sentences on its errors."""
 
     amplitude: np.ndarray
     frequency: np.ndarray
@@ -82,10 +83,11 @@ class Curve(NamedTuple):
     damping: np.ndarray
     damping_error: np.ndarray
     loss: np.ndarray
+    notes: tuple = ()
 
     def at(self, pick) -> "Curve":
         """Some of its points: bools (k,)."""
-        return Curve(*(part[pick] for part in self))
+        return Curve(*(part[pick] for part in self[:6]), self.notes)
 
 
 class Backbone(NamedTuple):
@@ -629,11 +631,14 @@ def _decayed(joint: Joint, amplitudes) -> Curve:
             break
         how = how.finer()
         found = engine.run(what, how, joint.patch, 0, None, None)
-    error = np.fmax(error, decays.left_by_mesh(joint.model, joint.patch, joint.coarse, amplitudes,
-                                               lambda laws: joint.mode)) + reading
     if not known.any():
         raise NotConverged("the free decay gave no frequency and damping at these amplitudes")
-    return Curve(amplitudes, best[0], error[0], best[1], error[1], np.full(amplitudes.size, np.nan)).at(known)
+    mesh, why = decays.left_by_mesh(joint.model, joint.patch, joint.coarse, amplitudes, lambda laws: joint.mode)
+    error = np.fmax(error, mesh) + reading
+    notes = decays.without_slip_between_nodes({"method decay": why}, lambda: engine.in_space(
+        what, how, joint.patch, joint.coarse, found))
+    return Curve(amplitudes, best[0], error[0], best[1], error[1], np.full(amplitudes.size, np.nan),
+                 tuple(notes)).at(known)
 
 
 def _come_down(joint: Joint, amplitudes) -> tuple:
@@ -745,7 +750,9 @@ def _put_together(joint: Joint, wanted, curves: dict, missing: dict) -> Backbone
     edge = next((found for one in curves.values() if (found := _edge(one)) is not None), None)
     return Backbone(name, own, stuck, curves, missing, micro, gross, edge,
                     (*_unrubbed(joint), *_gaps(wanted, curves), *([] if joint.linear else _differences(curves)),
-                     *_regimes(joint, wanted, micro), *_secant(joint, wanted, curves), *_unworn(joint.model)),
+                     *_regimes(joint, wanted, micro), *_unmeshed(joint),
+                     *(note for one in curves.values() for note in one.notes),
+                     *_secant(joint, wanted, curves), *_unworn(joint.model)),
                     None if joint.linear else _expected(joint), off)
 
 
@@ -832,6 +839,16 @@ def _unworn(model: Model) -> tuple:
     return () if model.wear is None else ("these curves are for unworn pieces: [wear] is ignored",)
 
 
+def _unmeshed(joint: Joint) -> tuple:
+    """That no coarser mesh tells the error of a contact which slips part by part; its grain alone tells too little."""
+    model = joint.model
+    if joint.linear or not model.soft or joint.coarse is not None:
+        return () if joint.linear or not model.rig.soft or faces.known(model) else (SPARSE + faces.UNKNOWN,)
+    cure = "split the elements of contact.mesh" if model.patch.mesh is not None else "leave out contact.element_size"
+    return (f"{SPARSE}the interface has too few elements for a coarser mesh; {cure}",)
+
+
+SPARSE = "the errors of the curves do not include the change on a coarser mesh: "
 LEFT_OUT = {"balance": "harmonic balance did not converge at these amplitudes; the curve may turn back to smaller "
                        "amplitudes, or the mode may stop oscillating",
             "quasi-static": "the static curve does not reach these amplitudes",

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scene_texts import IWAN, shaken
+from scene_texts import IWAN, JOINT_SHAKEN, shaken
 
 import patchfem as pf
 from patchfem.campaigns import backbone as backbone_module
@@ -370,6 +370,26 @@ def test_always_the_mesh_is_in_the_bars_of_micro_slip():
     assert fine.micro == pytest.approx(3, abs=0.3) and fine.expected == 3 and coarse.micro is None
     assert any("the exponent of micro-slip cannot be determined" in note for note in coarse.notes)
     assert any("higher than the frequencies by balance" in note for note in fine.notes)
+
+
+BEHIND_BONDS = JOINT_SHAKEN.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "100 um"').replace(
+    "kinetic = 0.2\n", "").replace("damping = 0.01", "damping = 0.05")
+FEW = "[contact.shear]", 'element_size = "6 mm"\n[contact.shear]'
+
+
+def test_errors_say_what_they_leave_out_of_the_mesh():
+    """Bonds behind pieces that give way have no steady loop: their errors hold the change on a coarser mesh, and where
+    there is none, no error of the mesh."""
+    a = [1e-6, 2e-6]
+    found, few = (backbone(pf.build(one), "", a, ("decay",)) for one in (BEHIND_BONDS, BEHIND_BONDS.replace(*FEW)))
+    (said,), (unmeshed, bare) = ([note for note in one.notes if "the errors of" in note] for one in (found, few))
+    assert said.startswith("the errors of method decay include the change on a coarser mesh, but no estimate of the")
+    assert said.endswith("because the hysteresis loop of this friction law is not known without a computation in time")
+    assert unmeshed.endswith("too few elements for a coarser mesh; leave out contact.element_size")
+    assert bare.startswith("the errors of method decay include no error of the mesh, because the hysteresis loop of")
+    assert (found.curves["decay"].frequency_error > few.curves["decay"].frequency_error).all()
+    plain = backbone(pf.build(JOINT_SHAKEN.replace("kinetic = 0.2\n", "")), "", a, ("balance",))
+    assert plain.curves and not any("the errors of" in note for note in plain.notes)
 
 
 def test_the_held_frequency_is_that_of_the_stiffness_which_a_run_prints():

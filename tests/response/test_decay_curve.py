@@ -5,14 +5,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scene_texts import CROWNED_JOINT, DRIVE, KILOGRAM, POINT, friction_of
+from scene_texts import CROWNED_JOINT, DRIVE, JOINT_SHAKEN, KILOGRAM, POINT, friction_of
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 import patchfem as pf
 from patchfem.campaigns.backbone import backbone
 from patchfem.response.decay_curve import _slope, _slopes, curve_of, of_turns, turns
-from patchfem.runs.rig.decays import decay_of
+from patchfem.runs.patch.result import solve_all
+from patchfem.runs.rig import decays
+from patchfem.runs.rig.decays import decay_of, left_by_mesh
 
 RELEASED = DRIVE[:DRIVE.index('kind')] + 'kind = "free"\ndisplacement = "2 mm"\ncycles = 30\n'
 
@@ -201,3 +203,51 @@ def test_a_release_and_what_rings_hold_mindlins_damping():
     assert (np.abs(decay.damping[known] - law) <= decay.damping_error[known]).all()
     beside = mindlins(result.measures["relative_displacement_amplitude"].value, stuck, 1.0)[0]
     assert abs(ring.value - beside) <= ring.error and beside > 1.5 * ring.value
+
+
+BEHIND_BONDS = JOINT_SHAKEN.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "100 um"').replace(
+    "kinetic = 0.2\n", "").replace(JOINT_SHAKEN[JOINT_SHAKEN.index("[drive]"):], """\
+[drive]
+kind = "free"
+displacement = "3 um"
+cycles = 12
+""")
+
+
+def test_a_release_says_what_its_errors_leave_out_of_the_mesh():
+    result, said = pf.run(BEHIND_BONDS), "the errors of ring_frequency and ring_damping and of the decay curve include "
+    (note,) = [one for one in result.notes if one.startswith("the errors of")]
+    assert note.startswith(said + "the change on a coarser mesh, but no estimate of the energy that is lost in slip")
+    assert note.endswith("because the hysteresis loop of this friction law is not known without a computation in time")
+    assert np.isfinite(result.extra["decay"].damping_error).any()
+    assert not [one for one in pf.run(CROWNED, **{"drive.cycles": 10}).notes if one.startswith("the errors of")]
+
+
+@pytest.mark.parametrize("old, new, why", [
+    ("[contact.shear]", '[contact.shear]\n[contact.grooves]\nwavelength = "80 um"\namplitude = "2 um"',
+     "the contact slides on grooves"),
+    ("slide = 1.0", "slide = 1.0\nnormal = 0.1", "the normal load changes")])
+def test_where_no_static_loop_tells_the_error_of_the_mesh_there_is_a_reason(old, new, why):
+    scene = CROWNED.replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"').replace(old, new, 1)
+    error, said = left_by_mesh(pf.build(scene), None, None, np.array([1e-7, 1e-6]), int)
+    assert said == why and not error.any()
+
+
+def test_exact_errors_of_the_mesh_are_interpolated_where_no_static_motion_is_found(monkeypatch):
+    model, a = pf.build(CROWNED), np.geomspace(1e-8, 1e-6, 5)
+    patch, coarse, *_ = solve_all(model.patch, 1e-2)
+    best, _ = left_by_mesh(model, patch, coarse, a, lambda laws: 0)
+    rows, lost = decays.static_rows, np.array([2])
+
+    def gappy(*given):
+        found = rows(*given)
+        found[:, lost] = np.nan
+        return found
+
+    monkeypatch.setattr(decays, "static_rows", gappy)
+    found, said = left_by_mesh(model, patch, coarse, a, lambda laws: 0)
+    assert found == pytest.approx(np.where(np.arange(5) == 2, best[:, [1]] / 2 + best[:, [3]] / 2, best), rel=1e-9)
+    assert not said and best.all()
+    lost = np.arange(5)
+    found, said = left_by_mesh(model, patch, coarse, a, lambda laws: 0)
+    assert not found.any() and said == "no static curve of the mode was found at these amplitudes"
