@@ -463,17 +463,28 @@ def _motions(group: Group, joint: Joint, amplitudes, harmonics: int) -> list:
 
 def _sized(equations: FreeBalance, joint: Joint, x, here: float, amplitude: float) -> tuple:
     """(Free, unknowns (N,), reach) of the motion that is as large at the output as `amplitude` [m], from x at an
-    amplitude `here` [m] of the coordinate."""
-    slope, before = 1.0, None
+    amplitude `here` [m] of the coordinate: to ROUND, where the steps lead no further to CLOSE."""
+    slope, before, near = 1.0, None, None
     for _ in range(SIZED):
-        x, free = equations.solve(x, here)
+        try:
+            x, free = equations.solve(x, here)
+        except NotConverged:
+            if near is None:
+                raise
+            break
         off = float(np.log(_largest(free.modal @ joint.modes.output) / amplitude))
+        if near is not None and abs(off) >= near[0]:
+            break
         if abs(off) < CLOSE:
-            return free, x, amplitude / here
+            near = abs(off), (free, x, amplitude / here)
+        if abs(off) < ROUND:
+            break
         if before is not None:
             slope = (off - before[1]) / np.log(here / before[0])
         slope, before = slope if slope > SLOW else 1.0, (here, off)
         here *= np.exp(-off / slope)
+    if near is not None:
+        return near[1]
     raise NotConverged(f"no free motion has an amplitude of {say(amplitude, 3)} at the output")
 
 
@@ -488,8 +499,15 @@ def _begun(equations: FreeBalance, first, small: float, here: float) -> np.ndarr
 
 
 def _largest(harmonics) -> float:
-    """(max - min)/2 of a motion with harmonics (H + 1,)."""
-    return float(np.ptp(synthesis(harmonics, SAMPLES))) / 2
+    """(max - min)/2 of a motion with harmonics (H + 1,), by parabolas through three samples, as an extreme between two
+    samples exceeds both by up to (pi/SAMPLES)^2/2 = 3e-7 of a sine."""
+    motion = synthesis(harmonics, SAMPLES)
+    ends = []
+    for k in (int(np.argmax(motion)), int(np.argmin(motion))):
+        before, here, after = motion[[k - 1, k, (k + 1) % SAMPLES]]
+        bend = 2 * here - before - after
+        ends.append(here + (after - before)**2 / (8 * bend) if bend else here)
+    return float(ends[0] - ends[1]) / 2
 
 
 def _turned(joint: Joint, amplitudes) -> Curve:

@@ -50,13 +50,19 @@ class DecayCurve(NamedTuple):
         return DecayCurve(*(part[pick] for part in self))
 
     def over(self, amplitudes) -> "DecayCurve":
-        """The curve at other amplitudes (k,) [m], straight over their logarithms; NaN outside it."""
+        """The curve at other amplitudes (k,) [m], by cubics over their logarithms, with what straight lines change in
+        its errors; NaN outside it."""
         if not self.amplitude.size:
             return DecayCurve(*np.full((6, len(amplitudes)), np.nan))._replace(amplitude=np.asarray(amplitudes))
-        order, x = np.argsort(self.amplitude), np.log(amplitudes)
-        own = np.log(self.amplitude[order])
+        own, first = np.unique(np.log(self.amplitude), return_index=True)
+        x = np.log(amplitudes)
+        found = self.at(first)
         inside = (x > own[0] - CLOSE) & (x < own[-1] + CLOSE)
-        return DecayCurve(*(np.where(inside, np.interp(x, own, part[order]), np.nan) for part in self))._replace(
+        out = {name: np.interp(x, own, getattr(found, name)) for name in DecayCurve._fields}
+        for name in ("frequency", "damping"):
+            straight, out[name] = out[name], _by_cubics(x, own, getattr(found, name))
+            out[f"{name}_error"] = out[f"{name}_error"] + np.abs(out[name] - straight)
+        return DecayCurve(**{name: np.where(inside, part, np.nan) for name, part in out.items()})._replace(
             amplitude=np.asarray(amplitudes))
 
     def widened(self, one: "DecayCurve", other: "DecayCurve") -> "DecayCurve":
@@ -227,6 +233,16 @@ def _parabola(m: int) -> np.ndarray:
     x = np.arange(-m, m + 1)
     x2, n = x**2, x.size
     return (np.sum(x2**2) - np.sum(x2) * x2) / (n * np.sum(x2**2) - np.sum(x2)**2) if m > 1 else (x == 0) * 1.0
+
+
+def _by_cubics(x, own, values) -> np.ndarray:
+    """Values (n,) at rising places own (n,) read at others x (k,) by cubics whose slopes are those of parabolas."""
+    if own.size < 2:
+        return np.interp(x, own, values)
+    k = np.clip(np.searchsorted(own, x) - 1, 0, own.size - 2)
+    span, slope = own[k + 1] - own[k], np.gradient(values, own)
+    share = np.clip((x - own[k]) / span, 0, 1)
+    return _cubic((values[k], values[k + 1]), (slope[k] * span, slope[k + 1] * span), share)
 
 
 def _cubic(place, speed, share):

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from scene_texts import IWAN, JOINT_SHAKEN, shaken
+from scipy.integrate import solve_ivp
 
 import patchfem as pf
 from patchfem.campaigns import backbone as backbone_module
@@ -57,6 +58,23 @@ def test_the_balance_of_an_iwan_joint_keeps_its_bars_and_the_decay_follows_it():
     off = np.abs(decay.damping - balance.damping[inside])
     assert inside.sum() >= 4 and (off < decay.damping_error + 2 * change).all()
     assert np.abs(decay.frequency - balance.frequency[inside]).max() < 0.1
+
+
+def test_exact_an_amplitude_lies_between_samples():
+    for turned in (0.0, 0.3, 0.5):
+        motion = np.array([0.0, 1e-6, 0.0, 1e-9]) * np.exp(2j * np.pi * turned / 4096 * np.arange(4))
+        assert backbone_module._largest(motion) / 1.001e-6 == pytest.approx(1, rel=1e-11)
+
+
+def test_exact_a_motion_of_the_amplitude_asked_for_comes_back_after_a_cycle():
+    """The largest of 4096 samples was taken for the amplitude, 3e-7 of it too small: the motion fell within a cycle."""
+    found = backbone(model('law = "tanh"\nreference_speed = "0.5 m/s"'), "", a := [6e-4, 8e-4, 1.2e-3], ("balance",))
+    one = found.curves["balance"]
+    for start, f, zeta in zip(a, one.frequency, one.damping):
+        damping = 2 * (0.002 * OMEGA - zeta * 2 * np.pi * f)
+        end = solve_ivp(lambda t, y, c=damping: (y[1], -OMEGA**2 * y[0] - c * y[1] - 60 * np.tanh(y[1] / 0.5)),
+                        (0, 1 / f), [start, 0.0], rtol=1e-12, atol=1e-18).y[:, -1]
+        assert end[0] / start == pytest.approx(1, abs=1e-9)
 
 
 def test_exact_rigid_friction_by_balance_and_by_decay():

@@ -56,7 +56,21 @@ def test_order_turns_lie_between_samples_to_the_fourth():
     assert off[0] < 1e-4 and 50 < off[0] / off[1] < 500
 
 
-def test_exact_between_its_points_a_curve_is_straight_and_outside_there_is_none():
+def test_always_between_its_points_a_curve_holds_a_damping_that_rises_with_the_amplitude():
+    """Of half swings 1/(1 + b k) the decrement of half a cycle over a whole one at any size a is artanh(a b), whatever
+    the places of the half swings."""
+    b, k = 0.1, np.arange(41)
+    found = curve_of(of_turns(np.append(np.pi * k, 41 * np.pi), np.cumsum(np.append(0, (-1.0)**k / (1 + b * k)))))
+    a = np.sqrt(found.amplitude[1:] * found.amplitude[:-1])
+    read, fall = found.over(a), np.arctanh(2 * a * b)
+    law, straight = fall / np.hypot(np.pi, fall), (found.damping[1:] + found.damping[:-1]) / 2
+    assert found.damping == pytest.approx(np.arctanh(2 * found.amplitude * b) / np.hypot(
+        np.pi, np.arctanh(2 * found.amplitude * b)), rel=1e-12)
+    assert (np.abs(read.damping - law) <= read.damping_error).all()
+    assert np.abs(read.damping / law - 1)[1:-1].max() < 0.1 * np.abs(straight / law - 1)[1:-1].max()
+
+
+def test_exact_at_its_points_a_curve_is_itself_and_outside_there_is_none():
     found = curve_of(of_turns(np.pi * np.arange(9), (-0.9)**np.arange(9.0)))
     there = found.over(found.amplitude[2:5])
     assert there.damping == pytest.approx(found.damping[2:5], rel=1e-12)
