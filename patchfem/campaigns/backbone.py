@@ -22,13 +22,13 @@ from ..dynamics.harmonic.backbone import FreeBalance
 from ..dynamics.harmonic.forces import Group
 from ..dynamics.harmonic.harmonic import pack as harmonics_packed
 from ..dynamics.harmonic.laws import synthesis
-from ..dynamics.harmonic.point import balance_of
+from ..dynamics.harmonic.point import balance_of, top
 from ..effects import has, unbuilt
 from ..friction.record import loop_from
 from ..model.model import Model
 from ..model.slide import SlidePath
 from ..model.source import placed
-from ..response.decay_curve import DecayCurve, curve_of, of_turns, turns
+from ..response.decay_curve import DecayCurve, curve_of, of_turns, turns, turns_from_outside
 from ..response.errors import OF_MODES, with_errors
 from ..runs.bench import bench
 from ..runs.bench.engine import steps_of
@@ -38,7 +38,7 @@ from ..runs.patch import faces
 from ..runs.patch import result as patch_result
 from ..runs.plan import plan
 from ..runs.rig import decays, numerics
-from ..runs.rig.engines import ENGINES, PIECES
+from ..runs.rig.engines import ENGINES, PIECES, SMOOTH
 from ..runs.rig.plan import held_by
 from ..structure import drives
 
@@ -350,7 +350,7 @@ def _balanced(joint: Joint, amplitudes) -> Curve:
         if not count:
             raise NotConverged("no free motion of these amplitudes was found")
         better = _free(group, joint, amplitudes, harmonics, count)
-        error, found = LEFT * np.abs(better - found) + ROUND * np.abs(better), better
+        error, found = _undipped(LEFT * np.abs(better - found)) + ROUND * np.abs(better), better
         known = np.isfinite(error[0])
         if (error[:2] <= model.accuracy.tolerance * np.abs(found[:2]))[:, known].all():
             break
@@ -362,6 +362,13 @@ def _balanced(joint: Joint, amplitudes) -> Curve:
     if not swings.any():
         raise NotConverged("the mode does not oscillate at these amplitudes: its damping ratio is above 1")
     return Curve(amplitudes, found[0], error[0], found[1], error[1], found[2]).at(swings)
+
+
+def _undipped(error) -> np.ndarray:
+    """Errors (3, k) at rising amplitudes, none below those of both its neighbours: a change of sign tells no error."""
+    beside = np.minimum(error[:, :-2], error[:, 2:])
+    return np.concatenate([error[:, :1], np.fmax(error[:, 1:-1], beside), error[:, -1:]], axis=1) \
+        if error.shape[1] > 2 else error
 
 
 def _refuse(joint: Joint, way: str) -> None:
@@ -499,15 +506,9 @@ def _begun(equations: FreeBalance, first, small: float, here: float) -> np.ndarr
 
 
 def _largest(harmonics) -> float:
-    """(max - min)/2 of a motion with harmonics (H + 1,), by parabolas through three samples, as an extreme between two
-    samples exceeds both by up to (pi/SAMPLES)^2/2 = 3e-7 of a sine."""
+    """(max - min)/2 of a motion with harmonics (H + 1,)."""
     motion = synthesis(harmonics, SAMPLES)
-    ends = []
-    for k in (int(np.argmax(motion)), int(np.argmin(motion))):
-        before, here, after = motion[[k - 1, k, (k + 1) % SAMPLES]]
-        bend = 2 * here - before - after
-        ends.append(here + (after - before)**2 / (8 * bend) if bend else here)
-    return float(ends[0] - ends[1]) / 2
+    return (top(motion) + top(-motion)) / 2
 
 
 def _turned(joint: Joint, amplitudes) -> Curve:
@@ -716,9 +717,9 @@ def _start(joint: Joint, amplitude: float) -> Start:
     return Start(joint.held[1] * amplitude / joint.reach, still)
 
 
-def _read(joint: Joint, found) -> DecayCurve:
-    """The curve of a Solution; beside other modes it turns when the part of the motion along the held shape does, which
-    rings least."""
+def _read(joint: Joint, found, turns=turns) -> DecayCurve:
+    """The curve of a Solution, by its `turns`; beside other modes it turns when the part of the motion along the held
+    shape does, which rings least."""
     motion, shape = found.response, joint.held[1]
     if shape.size == 1:
         return curve_of(of_turns(*turns(motion.time, motion.output, motion.output_rate)))
@@ -731,7 +732,10 @@ def _read(joint: Joint, found) -> DecayCurve:
 def _with_errors(joint: Joint, what: Model, how, found, amplitudes) -> tuple:
     """((2, k) frequency [Hz] and damping at amplitudes (k,) of a release, (2, k) what reading them leaves open, (2, k)
     what coarser runs change)."""
-    engine, read, made = ENGINES[how.engine], _read(joint, found).over(amplitudes), {}
+    engine, read, made = ENGINES[how.engine], _read(joint, found), {}
+    if how.engine == SMOOTH.name:
+        read = read.unsampled(_read(joint, found, turns_from_outside))
+    read = read.over(amplitudes)
     best = np.array([read.frequency, read.damping])
     reading, error = np.array([read.frequency_error, read.damping_error]), ROUND * np.abs(best)
 

@@ -17,6 +17,8 @@ SPANS = (1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64, 96, 128, 192, 256)  # half sw
 APART = 2.0  # standard deviations by which the values of two spans may differ
 SURE = 2.5  # standard deviations of an interval of 95 %, with what choosing the span adds
 BESIDE = 8  # half swings on both sides whose third differences show noise
+NEAR = 4  # points on both sides that show what samples leave open
+NEWTON = 3  # steps to a turn
 ROUND = 1e-12  # of a value, what round-off leaves
 REST = 1e-12  # of the largest speed, one below which a sample is a turn itself
 FAINT = 1e-9  # of the largest half swing, one below which is round-off
@@ -65,6 +67,16 @@ class DecayCurve(NamedTuple):
         return DecayCurve(**{name: np.where(inside, part, np.nan) for name, part in out.items()})._replace(
             amplitude=np.asarray(amplitudes))
 
+    def unsampled(self, other: "DecayCurve") -> "DecayCurve":
+        """The curve with what its samples leave open in its errors, where coarser runs have as many: what the curve of
+        `turns_from_outside` differs by, at most, at the points around."""
+        beside, out = other.over(self.amplitude), {}
+        for name in ("frequency", "damping"):
+            change = np.nan_to_num(np.abs(getattr(self, name) - getattr(beside, name)))
+            out[f"{name}_error"] = getattr(self, f"{name}_error") + (sliding_window_view(
+                np.pad(change, NEAR), 2 * NEAR + 1).max(axis=1) if change.size else 0.0)
+        return self._replace(**out)
+
     def widened(self, one: "DecayCurve", other: "DecayCurve") -> "DecayCurve":
         """The curve with what two curves at its amplitudes differ by in its errors; infinite where one has no value."""
         def wider(name: str) -> np.ndarray:
@@ -89,6 +101,28 @@ def turns(time, place, speed) -> tuple:
     order = np.lexsort((found, times))
     order = order[np.diff(times[order], prepend=-np.inf) > 0]
     return times[order], found[order]
+
+
+def turns_from_outside(time, place, speed) -> tuple:
+    """`turns`, those between samples by the cubics of the steps before and after, continued, in the middle of both.
+
+    A law that turns its force with the speed in less than a step does so at the turn: both cubics know the force
+    beside it, where the cubic between both samples is bent by its jump.
+    """
+    times, places = turns(time, place, speed)
+    k = np.flatnonzero(speed[1:-2] * speed[2:-1] < 0) + 1
+    share = speed[k] / (speed[k] - speed[k + 1])
+
+    def found(step, near):
+        span = time[step + 1] - time[step]
+        a, b, c, d = place[step], place[step + 1], speed[step] * span, speed[step + 1] * span
+        two, three = 2 * (3 * (b - a) - 2 * c - d), 3 * (2 * (a - b) + c + d)
+        for _ in range(NEWTON):
+            near = near - (c + near * (two + near * three)) / (two + 2 * near * three)
+        return time[step] + near * span
+
+    times[np.searchsorted(times, time[k], "right")] = (found(k - 1, 1 + share) + found(k + 1, share - 1)) / 2
+    return times, places
 
 
 def of_turns(times, places) -> HalfSwings:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from scene_texts import IWAN, JOINT_SHAKEN, shaken
 from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
 
 import patchfem as pf
 from patchfem.campaigns import backbone as backbone_module
@@ -75,6 +76,31 @@ def test_exact_a_motion_of_the_amplitude_asked_for_comes_back_after_a_cycle():
         end = solve_ivp(lambda t, y, c=damping: (y[1], -OMEGA**2 * y[0] - c * y[1] - 60 * np.tanh(y[1] / 0.5)),
                         (0, 1 / f), [start, 0.0], rtol=1e-12, atol=1e-18).y[:, -1]
         assert end[0] / start == pytest.approx(1, abs=1e-9)
+
+
+def test_exact_an_error_between_two_larger_ones_is_no_smaller_than_the_smaller():
+    error = np.array([[3.0, 0.1, 2.0, 5.0, 4.0, 1.0], [1.0, 2.0, np.nan, 3.0, 0.0, np.nan]])
+    assert backbone_module._undipped(error) == pytest.approx(
+        np.array([[3.0, 2.0, 2.0, 5.0, 4.0, 1.0], [1.0, 2.0, 2.0, 3.0, 0.0, np.nan]]), nan_ok=True)
+    assert (backbone_module._undipped(error[:, :2]) == error[:, :2]).all()
+
+
+def test_a_decay_whose_force_turns_between_two_samples_keeps_its_bars():
+    """The coarser run has as many samples, so what they leave open of the frequency was no part of its error."""
+    found = backbone(model('law = "tanh"\nreference_speed = "3 mm/s"'), "", np.geomspace(3e-3, 6e-3, 9), ("decay",))
+    one, damping = found.curves["decay"], 2 * 0.002 * OMEGA
+
+    def turning(t, y):
+        return y[1]
+
+    own = solve_ivp(lambda t, y: (y[1], -OMEGA**2 * y[0] - damping * y[1] - 60 * np.tanh(y[1] / 3e-3)), (0, 0.3),
+                    [8e-3, 0.0], "LSODA", events=turning, rtol=1e-11, atol=1e-14)
+    time, swing = own.t_events[0], np.abs(np.diff(own.y_events[0][:, 0]))
+    middle = (time[1:] + time[:-1]) / 2
+    order = slice(-2, 0, -1)
+    law = CubicSpline(np.log(swing[order] / 2), 1 / (middle[2:] - middle[:-2])[::-1])(np.log(one.amplitude))
+    assert one.amplitude.size == 9 and (np.abs(one.frequency - law) <= one.frequency_error).all()
+    assert np.abs(one.frequency / law - 1).max() > 3e-9 and (one.frequency_error < 2e-5 * law).all()
 
 
 def test_exact_rigid_friction_by_balance_and_by_decay():
