@@ -63,10 +63,12 @@ CLOSE = 1e-7  # of an amplitude, within which a free motion is at it
 PLAIN, BALANCED = (1e-6, 1e-3, 4), 8  # amplitudes [m] of a linear rig; steps to the damping that keeps it swinging
 SIZED, SLOW = 8, 0.1  # steps to a motion that has the amplitude asked for; least slope of both amplitudes that is taken
 SHORT, LONGEST = 50, (12800, 3200)  # cycles of a first decay; of the longest, of one mode and where several ring
+TURNED = 102400  # of the longest of one mode behind elements, of which the turns alone are kept
 STARTS = 12  # amplitudes on the way to the free motion that a release begins in
 BESIDE = 1.15  # the release over the largest amplitude: the first swings still show how it began
 HIGHER, BELOW = 3, 0.8  # releases from higher up; share of the smallest amplitude down to which coarser runs come, too
 FINER = 3  # doublings of the steps of a decay
+TOLD, WITH_COARSER = 20.0, 2.0  # seconds, from which a decay is told beforehand; times its own, with its coarser runs
 
 
 UNKNOWN = ('the friction loop of bonds has a closed form only with reading = "stretch", order = 1, a constant bond '
@@ -151,8 +153,9 @@ def backbone(model: Model, mode: str = "", amplitudes=None, methods=WAYS, progre
     """Curves of a rig's mode, of its first where none is named.
 
     amplitudes (k,) [m] at the output, rising; None: from a hundredth of the slide at which all of the contact slips to
-    15 times it, or to where the mode slides as if it were free. progress: called with a way that begins. Where no
-    friction acts and no spring bends the curves are level. PatchfemError for a scene that has no rig or no such mode.
+    15 times it, or to where the mode slides as if it were free. progress: called with a way that begins, and with what
+    a decay will take where that is more than TOLD. Where no friction acts and no spring bends the curves are level.
+    PatchfemError for a scene that has no rig or no such mode.
     """
     with placed(model.source):
         joint = _joint(model, mode)
@@ -166,15 +169,17 @@ def backbone(model: Model, mode: str = "", amplitudes=None, methods=WAYS, progre
             if progress is not None:
                 progress(way)
             try:
-                curve = _curve(joint, wanted, way)
-                curves[way] = curve if other is None else _beside(curve, _curve(other, wanted, way))
+                curve = _curve(joint, wanted, way, progress)
+                curves[way] = curve if other is None else _beside(curve, _curve(other, wanted, way, progress))
             except (NotConverged, PatchfemError) as reason:
                 missing[way] = str(reason).removeprefix("backbone: ")
     return _put_together(joint, wanted, curves, missing)
 
 
-def _curve(joint: Joint, amplitudes, way: str) -> Curve:
-    return _level(joint, amplitudes, way) if joint.linear else FIND[way](joint, amplitudes)
+def _curve(joint: Joint, amplitudes, way: str, progress=None) -> Curve:
+    if joint.linear:
+        return _level(joint, amplitudes, way)
+    return _decayed(joint, amplitudes, progress) if way == "decay" else FIND[way](joint, amplitudes)
 
 
 def _beside(curve: Curve, other: Curve) -> Curve:
@@ -637,9 +642,9 @@ def _loop(joint: Joint, slide: float, frequency: float, cycles: float) -> tuple:
     return bench.run(alone, joint.patch, steps), alone, steps
 
 
-def _decayed(joint: Joint, amplitudes) -> Curve:
+def _decayed(joint: Joint, amplitudes, progress=None) -> Curve:
     """Curve of a release from the largest amplitude, read from turn to turn, as far as it comes down."""
-    what, how, found = _come_down(joint, amplitudes)
+    what, how, found = _come_down(joint, amplitudes, progress)
     engine, tolerance = ENGINES[how.engine], joint.model.accuracy.tolerance
     for tried in range(FINER + 1):
         best, reading, error = _with_errors(joint, what, how, found, amplitudes)
@@ -660,30 +665,35 @@ def _decayed(joint: Joint, amplitudes) -> Curve:
                  tuple(notes)).at(known)
 
 
-def _come_down(joint: Joint, amplitudes) -> tuple:
+def _come_down(joint: Joint, amplitudes, progress=None) -> tuple:
     """(Model, numerics, Solution) of a release that is long enough to come down from the largest amplitude to the
-    smallest, as far as it swings on. It begins so high that its first reading lies above the largest."""
+    smallest, as far as it swings on. It begins so high that its first reading lies above the largest. progress: told
+    what a longer one and its coarser ones will take, by the seconds a cycle of the one before."""
     travel, many = joint.model.rig.travel, joint.modes.omega.size > 1
-    begin, cycles, tries = min(BESIDE * float(amplitudes[-1]), travel), SHORT, 0
+    begin, cycles, tries, each = min(BESIDE * float(amplitudes[-1]), travel), SHORT, 0, 0.0
     while True:
         model = released(joint, begin)
         what = replace(model, rig=replace(model.rig, cycles=float(cycles)))
         how = numerics.choose(what)
+        most = TURNED if how.engine == PIECES.name and not many else LONGEST[many]
         if many or not (_rigid(joint.model) or how.engine == PIECES.name):  # these keep every turn of the output
             how = replace(how, window=int(cycles))
+        if progress is not None and WITH_COARSER * each * cycles > TOLD:
+            progress(f"decay over {cycles} cycles: about {WITH_COARSER * each * cycles:.2g} s of computing time")
         found = ENGINES[how.engine].run(what, how, joint.patch, 0, None, None)
+        each = found.seconds / cycles
         read = _read(joint, found)
         if not read.time.size:
             return what, how, found
         high, low, zeta = read.amplitude[0], read.amplitude[-1], read.damping[-1]
         if high < amplitudes[-1] and begin < travel and tries < HIGHER:
             begin, tries = min(begin * BESIDE * amplitudes[-1] / high, travel), tries + 1
-        elif low <= BELOW * amplitudes[0] or cycles >= LONGEST[many] or \
+        elif low <= BELOW * amplitudes[0] or cycles >= most or \
                 read.time[-1] < found.response.time[-1] - 3 / read.frequency[-1]:  # it has come to rest
             return what, how, found
         else:
             further = np.log(low / (BELOW * amplitudes[0])) / (2 * np.pi * zeta) if zeta > 0 else np.inf
-            cycles = int(min(np.clip(cycles + further, 2 * cycles, 8 * cycles), LONGEST[many]))
+            cycles = int(min(np.clip(cycles + further, 2 * cycles, 8 * cycles), most))
 
 
 def released(joint: Joint, amplitude: float) -> Model:
@@ -756,7 +766,7 @@ def _with_errors(joint: Joint, what: Model, how, found, amplitudes) -> tuple:
     return best, reading, error
 
 
-FIND = {"balance": _balanced, "decay": _decayed, "quasi-static": _static}
+FIND = {"balance": _balanced, "quasi-static": _static}
 
 
 def _put_together(joint: Joint, wanted, curves: dict, missing: dict) -> Backbone:

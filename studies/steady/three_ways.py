@@ -1,6 +1,19 @@
 """Do the three ways to a backbone keep their bars on joints that nobody chose?
 
-The numbers of this recipe are not yet known: it was changed before it was run on joints that it had not seen.
+Inside the sum of both bars, of the 30 joints of a seed:
+
+| seed | balance | decay | quasi-static |
+| --- | --- | --- | --- |
+| 7303 | 494 of 498 | 1477 of 1478 | 1246 of 1246 |
+| 7304 | 497 of 498 | 1498 of 1502 | 1256 of 1256 |
+| 7305 | 498 of 498 | 1496 of 1496 | 1250 of 1250 |
+| 7306 | 498 of 498 | 1508 of 1508 | 1262 of 1262 |
+
+Seed 7303 was run before its misses were mended, and 7304 before its own were: in all ten this loop was right. The
+amplitude of a balance was read from samples (tanh and Bouc-Wen), its error was small by chance at one amplitude (tanh),
+a decay was read by straight lines (elastic-plastic), and its samples were too few for a force that turns within one of
+them (tanh). 7303 then gave 498, 1478 and 1246. The joints of 7305 and 7306 were new to every change; 7305 was run
+before the last one, of the error of samples, and 7306 after it.
 
 The recipe: 30 rigs of one mode, 50 to 300 Hz, .1 to 10 kg, damping 5e-4 to 1e-2; the joint holds with .03 to 2 times
 the mode's stiffness and slips as a whole at 1 to 30 um. Laws by turns: elastic-plastic, Iwan, Bouc-Wen, tanh.
@@ -17,7 +30,7 @@ step, run at STEPS and half as many a cycle, whose change is its error:
   an error of this loop.
 - quasi-static: tip and area of a loop of the law alone.
 
-Run: python studies/steady/three_ways.py [COUNT] [SEED]      (long: some four minutes; 30 joints of seed 41)
+Run: python studies/steady/three_ways.py [COUNT] [SEED]      (100 to 130 CPU s; 30 joints, of seed 41)
 """
 
 import sys
@@ -170,7 +183,7 @@ def missed(found, beside, error) -> np.ndarray:
     return np.abs(np.array(found[0::2]) - beside) / (np.array(found[1::2]) + error)
 
 
-def of_balance(curve, laws, rig) -> np.ndarray:
+def of_balance(curve, laws, rig, _) -> np.ndarray:
     mass, omega, zeta = rig
     a = curve["amplitude"]
     if a.size < 4:
@@ -263,7 +276,7 @@ def tips(law, slides, steps: int) -> tuple:
     return tip, area + 4 * single * last * (slides - a)
 
 
-def of_static(curve, laws, rig) -> np.ndarray:
+def of_static(curve, laws, rig, _) -> np.ndarray:
     mass, omega, zeta = rig
     told = []
     for one, law in zip(HALVES, laws):
@@ -282,25 +295,28 @@ def curves_of(found) -> dict:
 
 
 def main(count: int = 30, seed: int = 41) -> dict:
-    """way -> (inside, numbers), printed with the joints that miss."""
+    """(way, law) -> (inside, numbers), printed with the joints that miss."""
     rng, sums = np.random.default_rng(seed), {}
     for number in range(count):
         kind = LAWS[number % len(LAWS)]
         text, laws, rig = joint(rng, kind)
         found = curves_of(pf.backbone(text))
         for way, curve in found.items():
-            off = of_decay(curve, laws, rig, longest(found)) if way == "decay" else BESIDE[way](curve, laws, rig)
-            inside, total = sums.get(way, (0, 0))
-            sums[way] = inside + int((off <= 1).sum()), total + off.size
+            off = BESIDE[way](curve, laws, rig, longest(found))
+            inside, total = sums.get((way, kind), (0, 0))
+            sums[way, kind] = inside + int((off <= 1).sum()), total + off.size
             if (off > 1).any():
                 print(f"{number} {kind} {way}: {int((off > 1).sum())} of {off.size} outside, by {off.max():.2g} bars "
                       "at most", flush=True)
-    for way, (inside, total) in sums.items():
-        print(f"{way}: {inside} of {total} inside both bars")
+    for way in BESIDE:
+        parts = {kind: found for (one, kind), found in sums.items() if one == way}
+        inside, total = map(sum, zip(*parts.values()))
+        print(f"{way}: {inside} of {total} inside both bars;", ", ".join(
+            f"{kind} {one} of {count}" for kind, (one, count) in parts.items()))
     return sums
 
 
-BESIDE = {"balance": of_balance, "quasi_static": of_static}
+BESIDE = {"balance": of_balance, "decay": of_decay, "quasi_static": of_static}
 
 
 def longest(found: dict) -> float:

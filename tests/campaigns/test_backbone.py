@@ -1,5 +1,7 @@
 """Backbones of scenes: three ways beside each other and beside closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scene_texts import IWAN, JOINT_SHAKEN, shaken
@@ -209,6 +211,21 @@ coefficient = "40 N s/m"
     s = 2j * np.pi * one["decay"].frequency[0]
     s -= s.imag * one["decay"].damping[0] / np.sqrt(1 - one["decay"].damping[0]**2)
     assert abs(np.linalg.det(k + c * s + m * s**2)) < 1e-9 * np.linalg.det(k)
+
+
+def test_a_long_decay_is_told_before_it_begins(monkeypatch):
+    """50 cycles that take a second tell 40 s of the further ones; nothing is told of a short one."""
+    told, run = [], backbone_module.ENGINES["piecewise"].run
+    backbone(model(PLASTIC, **{"structure.mode.axial.damping": 1e-3}), "", [1e-5, 1e-3], ("decay",), told.append)
+    assert told == ["decay"]
+    monkeypatch.setattr(type(backbone_module.ENGINES["piecewise"]), "run", property(lambda engine: lambda *given: (
+        replace(run(*given), seconds=given[0].rig.cycles / 50))))
+    told.clear()
+    backbone(model(PLASTIC, **{"structure.mode.axial.damping": 1e-3}), "", [1e-5, 1e-3], ("decay",), told.append)
+    assert told[0] == "decay" and len(told) > 1
+    for said in told[1:]:
+        cycles = int(said.split()[2])
+        assert cycles >= 500 and said == f"decay over {cycles} cycles: about {cycles / 25:.2g} s of computing time"
 
 
 def test_amplitudes_stay_within_the_stop():
