@@ -67,6 +67,7 @@ TURNED = 102400  # of the longest of one mode behind elements, of which the turn
 STARTS = 12  # amplitudes on the way to the free motion that a release begins in
 BESIDE = 1.15  # the release over the largest amplitude: the first swings still show how it began
 HIGHER, BELOW = 3, 0.8  # releases from higher up; share of the smallest amplitude down to which coarser runs come, too
+FARTHEST, SWINGS = 8.0, 3.0  # of a start, a higher one at most; free swings within which a decay shows itself
 FINER = 3  # doublings of the steps of a decay
 TOLD, WITH_COARSER = 20.0, 2.0  # seconds, from which a decay is told beforehand; times its own, with its coarser runs
 
@@ -671,6 +672,8 @@ def _come_down(joint: Joint, amplitudes, progress=None) -> tuple:
     what a longer one and its coarser ones will take, by the seconds a cycle of the one before."""
     travel, many = joint.model.rig.travel, joint.modes.omega.size > 1
     begin, cycles, tries, each = min(BESIDE * float(amplitudes[-1]), travel), SHORT, 0, 0.0
+    rest = _amplitude_of(joint, _deflected(joint)) if _limit(joint) else 0.0
+    swing = SWINGS * 2 * np.pi / joint.modes.omega[joint.mode] if joint.modes.omega[joint.mode] else np.inf
     while True:
         model = released(joint, begin)
         what = replace(model, rig=replace(model.rig, cycles=float(cycles)))
@@ -683,11 +686,15 @@ def _come_down(joint: Joint, amplitudes, progress=None) -> tuple:
         found = ENGINES[how.engine].run(what, how, joint.patch, 0, None, None)
         each = found.seconds / cycles
         read = _read(joint, found)
-        if not read.time.size:
+        if not read.time.size and (cycles >= most or found.response.time[-1] >= swing):
             return what, how, found
+        if not read.time.size:  # cycles are those of the held mode, of which a swing in slip can last hundreds
+            cycles = min(8 * cycles, most)
+            continue
         high, low, zeta = read.amplitude[0], read.amplitude[-1], read.damping[-1]
         if high < amplitudes[-1] and begin < travel and tries < HIGHER:
-            begin, tries = min(begin * BESIDE * amplitudes[-1] / high, travel), tries + 1
+            raised = max(FARTHEST * begin, BESIDE * (begin + 2 * rest))  # friction takes two deflections a half swing
+            begin, tries = min(begin * BESIDE * amplitudes[-1] / high, raised, travel), tries + 1
         elif low <= BELOW * amplitudes[0] or cycles >= most or \
                 read.time[-1] < found.response.time[-1] - 3 / read.frequency[-1]:  # it has come to rest
             return what, how, found

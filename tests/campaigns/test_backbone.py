@@ -213,6 +213,14 @@ coefficient = "40 N s/m"
     assert abs(np.linalg.det(k + c * s + m * s**2)) < 1e-9 * np.linalg.det(k)
 
 
+def test_a_decay_behind_a_stiff_contact_lasts_some_swings_in_slip():
+    """50 cycles of the held mode, 76 times as fast as the free one, were no swing in slip: the curve had no value."""
+    found = backbone(pf.build(CROWNED), "", [2e-2, 3e-2], ("decay",)).curves["decay"]
+    assert found.amplitude.tolist() == [2e-2, 3e-2] and (found.frequency_error < 1e-3 * found.frequency).all()
+    lost = 4 * 0.3 * 2e3 * 3e-2 / (2 * np.pi * 0.5 * OMEGA**2 * 3e-2**2)  # of Coulomb friction in gross slip
+    assert found.damping[-1] == pytest.approx(0.002 + lost, rel=0.02)
+
+
 def test_a_long_decay_is_told_before_it_begins(monkeypatch):
     """50 cycles that take a second tell 40 s of the further ones; nothing is told of a short one."""
     told, run = [], backbone_module.ENGINES["piecewise"].run

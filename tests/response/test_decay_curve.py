@@ -11,7 +11,7 @@ from scipy.optimize import brentq
 
 import patchfem as pf
 from patchfem.campaigns.backbone import backbone
-from patchfem.response.decay_curve import _slope, _slopes, curve_of, of_turns, turns
+from patchfem.response.decay_curve import DecayCurve, _slope, _slopes, curve_of, of_turns, turns
 from patchfem.runs.patch.result import solve_all
 from patchfem.runs.rig import decays
 from patchfem.runs.rig.decays import decay_of, left_by_mesh
@@ -68,6 +68,13 @@ def test_always_between_its_points_a_curve_holds_a_damping_that_rises_with_the_a
         np.pi, np.arctanh(2 * found.amplitude * b)), rel=1e-12)
     assert (np.abs(read.damping - law) <= read.damping_error).all()
     assert np.abs(read.damping / law - 1)[1:-1].max() < 0.1 * np.abs(straight / law - 1)[1:-1].max()
+
+
+def test_always_a_curve_between_far_points_stays_between_their_values():
+    """Behind a stiff contact a decay jumps from slip to stick: cubics of any slope gave a frequency of -2 kHz there."""
+    a, f = np.array([3e-2, 2e-2, 3e-7, 2e-7, 1e-7]), np.array([100.0, 99.0, 6600.0, 6640.0, 6650.0])
+    found = DecayCurve(np.arange(5.0), a, f, 0 * f, f / 1e5, 0 * f).over(np.geomspace(1e-7, 3e-2, 50))
+    assert found.frequency.min() >= 99 and found.frequency.max() <= 6650 and found.frequency_error.max() > 500
 
 
 def test_exact_at_its_points_a_curve_is_itself_and_outside_there_is_none():
