@@ -127,7 +127,8 @@ def _of_matrices(data, pairs, pushed, forced, where) -> ModalBasis:
         faces = faces.reshape(-1, n) if faces.size % n == 0 else faces
     output = data.get("output", faces[0] if faces is not None and len(faces) else None)
     if output is None:
-        _lacks(data, "output (n,), what the accelerometer measures (or slide)", where)
+        _lacks(data, "output (n,), what the accelerometer measures; slide (n,) serves as output if output is missing",
+               where)
     force = None
     if forced:
         force = np.eye(n)[pushed - 1] if pushed else data.get("force", output)
