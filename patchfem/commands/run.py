@@ -46,6 +46,14 @@ def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False
         compiles = plan.compile_words(what.compile_seconds)
         talk(f"about {what.seconds:.1f} s of computing time{compiles}, {what.steps} steps, engine {what.engine}")
     target = placed(out, what.model.source.path.stem)
+    if resume and folder.is_complete(what, target):
+        talk(f"{target}: this run is already complete, nothing is left to resume; to run it again, leave out --resume")
+        answer = summary.read_summary(target / "summary.json")
+        if json_:
+            print(json.dumps(answer, ensure_ascii=False), flush=True)
+        if answer["outcome"] == "not_converged":
+            raise NotReached
+        return
     with progress_bar(quiet or json_) as progress:
         written = folder.run_into(what, target, talk, progress, fresh, resume)
     answer = written.summary
