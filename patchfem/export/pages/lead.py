@@ -25,7 +25,7 @@ class Lead(NamedTuple):
     say. ranks, spread, peaks: as `ranked.ranks_of`, `ranked.quantiles` and `peaks.found` give them; rank, scatter,
     peak: what matters most, where nine in ten drawn cases lie, where a swept frequency has its peak, in sentences;
     left: how many cases have no answer yet, and that none has settled; least: where the motion is least; asked: the
-    measure that the sweep was asked about, "" unless it was."""
+    measure that the sweep was asked about, "" unless it was; passed: what is beyond its limit in the second case."""
 
     missed: dict
     misses: str
@@ -42,12 +42,14 @@ class Lead(NamedTuple):
     left: str = ""
     least: str = ""
     asked: str = ""
+    passed: str = ""
 
     def sentences(self) -> list:
         """What people read, the answer first, then whether all cases meet the tolerance, then what else is known."""
         rank = self.rank if self.scatter or not (self.limit or self.peak) else ""  # of a grid they say more
-        said = (self.limit, self.peak, self.least, rank, self.scatter, self.span, self.turns) if not self.asked else \
-            (self.rank, self.scatter, self.span, self.limit, self.peak, self.least, self.turns)
+        said = (self.limit, self.passed, self.peak, self.least, rank, self.scatter, self.span, self.turns) \
+            if not self.asked else \
+            (self.rank, self.scatter, self.span, self.limit, self.passed, self.peak, self.least, self.turns)
         used = self._first()
         return [one for one in (self.answer(), "" if self.missed or not used else self.misses,
                                 *(one for one in said if one not in used)) if one]
@@ -96,7 +98,7 @@ def lead_of(table: dict) -> Lead:
                 span(columns(table), trusted, settled, ranked.asked_first(FIRST, table)),
                 changes(keys, columns(table), outcome, table["grid"]), *ranks,
                 tops, joined([one for one in (peaks.sentence(tops), edge) if one]), left,
-                least(keys, columns(table), trusted, shown), table.get("first", ""))
+                least(keys, columns(table), trusted, shown), table.get("first", ""), allowed.passed(limits))
 
 
 def _left(table: dict, outcome: np.ndarray, known: bool) -> str:
