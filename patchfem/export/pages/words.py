@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Sequence
 from html import escape
-from math import ceil, inf, isfinite, log10, pi
+from math import ceil, floor, inf, isfinite, log10, pi
 from types import MappingProxyType
 
 from ... import scales
@@ -184,13 +184,39 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str, str], s
             said("friction_ratio_peak", "friction ratio peaks at {}")
         if whole and not released:
             of_each("loop_area", "{} dissipated per cycle")
-        of_each("contact_fraction", "{} of the length in contact")
+        of_each("contact_fraction", "{} of the length in contact" + placed(summary.get("contact")))
         if summary["kind"] == "patch":
             said("pressure_peak", "peak pressure {}")
     text = "; ".join(parts)
     if text and not whole and not released:
         text = f"in {cycles:.2g} of a cycle {text}"
     return f"{text[0].upper() + text[1:]}." if text else ""
+
+
+def placed(contact: dict | None) -> str:
+    """Where along x the contact is, as words behind its share of the length, such as `, from x = -6.35 to -3.56 mm
+    (left end)`; "" where all of the length is in contact or this is not known. contact: as `summary.contact_of` has
+    it."""
+    if not contact or not contact["stretches"]:
+        return ""
+    first, last, stretches = contact["from"], contact["to"], contact["stretches"]
+    left, right = stretches[0][0] <= first, stretches[-1][1] >= last
+    if left and right and len(stretches) == 1:
+        return ""
+    unit, scale = scales.step_of(scales.LADDERS["m"], max(abs(first), abs(last)))
+    least = min(1e-3 * (last - first), *(1e-2 * (end - begin) for begin, end in stretches if end > begin))
+    digits = max(0, -floor(log10(least * scale)))  # what tells apart both ends of the shortest part
+
+    def number(place: float) -> str:
+        return f"{round(place * scale, digits) + 0.0:.{digits}f}".rstrip("0").rstrip(".") if digits else \
+            f"{place * scale:.0f}"
+
+    count = len(stretches)
+    parts = stretches if count <= FEW else [[stretches[0][0], stretches[-1][1]]]
+    told = " and from ".join(
+        f"{number(begin)} to {number(end)} {unit}{' (left end)' * (begin <= first)}{' (right end)' * (end >= last)}"
+        for begin, end in parts)
+    return f", from x = {told}" if count <= FEW else f", in {count} stretches from x = {told}"
 
 
 def least_known(result: Result) -> str:
