@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..disk import whole
 from ..export import folder, summary
-from ..export.pages import released, words
+from ..export.pages import driven, released, words
 from ..runs import plan
 from .shared import (
     Ended,
@@ -90,7 +90,8 @@ def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
     """The verdict first, then what is known least well, every measure in its group, and where all of it is."""
     answer = written.summary
     if answer["title"]:
-        print(answer["title"])
+        sets = written.result.plan.model.source.sets
+        print(f"{answer['title']}{f'; changed: {driven.changed(sets)}' if sets else ''}")
     print(f"{answer['outcome']}: {words.verdict(answer)}")
     if text := words.headline(answer, summary.cycles_of(written.result), released=released.released(written.result)):
         print(text)

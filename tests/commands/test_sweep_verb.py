@@ -372,6 +372,8 @@ def test_exact_pages_of_cases_that_are_there_are_drawn(scene, tmp_path):
     assert cli("sweep", scene, *over, "-o", out, "--keep", "results").code == 0
     assert cli("sweep", scene, *over, "-o", out, "--resume", "--keep", "pages").code == 0
     pages = sorted((out / "cases").glob("*/report.html"))
+    heads = {re.search("<h1>(.*?)</h1>", page.read_text("utf-8"))[1] for page in pages}  # not that of the scene
+    assert heads == {"friction.static = 0.1", "friction.static = 0.2"}
     before = [page.stat().st_mtime_ns for page in pages]
     assert len(pages) == 2
     assert cli("sweep", scene, *over, "-o", out, "--resume", "--keep", "pages").code == 0

@@ -14,11 +14,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...scales import LADDERS, plain, short, step_of
+from ...scales import LADDERS, plain, step_of
 from ..written import NUMBER, bare, label
 from . import document
 from .changes import lines_of, shown_of
-from .words import linked, zero_below
+from .words import linked, short, zero_below
 
 WITHIN = 0.05  # of its value in the first case, in which a measure is said to stay
 MOVES = ("relative_displacement_amplitude", "absolute_acceleration_peak", "slip_amplitude", "loop_area",
@@ -319,7 +319,7 @@ def table(limits: Limits, measures: dict) -> str:
             far = "in no case" if one.whole else \
                 f"not up to {at(one.inside)}; no case with a larger value shows the limit"
         by = f"{100 * WITHIN:g} %" if abs(one.change) < 1 else "double"
-        first = short(one.first, measures[one.name][2], 4, zero_below(one.name))
+        first = short(one.name, one.first, measures[one.name][2], 4)
         rows.append([linked(label(one.name), one.name), escape(first), _change(one.changed), by, escape(far)])
     several = int(np.sum(np.asarray(key["values"], float) == np.min(np.asarray(key["values"], float)))) > 1
     least = (" If other keys change too, each limit is for the values of these keys that give the smallest limit."

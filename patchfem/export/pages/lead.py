@@ -7,12 +7,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ...runs.many.answers import FAILED
-from ...scales import LADDERS, plain, short, step_of
+from ...scales import LADDERS, plain, step_of
 from .. import missed
 from ..written import NUMBER, bare, label
 from . import allowed, peaks, ranked
 from .changes import changes, shown_of, varies
-from .words import joined, zero_below
+from .words import joined, short, zero_below
 
 EXACT = 1e-6  # of a value, up to which no error is told: the values are shown to four digits
 AWAY = 0.01  # of the length of the patch, from which on it is said that the centre of its pressure moves
@@ -136,7 +136,7 @@ def span(measures: dict, trusted: dict, settled: np.ndarray, names: Sequence = F
             return ""
         values, errors, unit = (part if isinstance(part, str) else np.asarray(part, float)[there]
                                 for part in measures[name])
-        low, high = (short(one, unit, 4, zero_below(name)) for one in (values.min(), values.max()))
+        low, high = (short(name, one, unit, 4) for one in (values.min(), values.max()))
         alike = there.sum() > 1  # of one case nothing runs
         ran = f"ranges from {low} to {high}" if low != high else f"is {high} throughout" if alike else f"is {high}"
         known = np.isfinite(errors) & (errors > 0) & (np.abs(values) > zero_below(name))  # 0 is known absolutely
@@ -209,7 +209,7 @@ def least(keys: list, measures: dict, trusted: dict, shown: dict) -> str:
     names, best = [one["name"] for one in swept], int(order[low])
     at = ", ".join(f"{key} {shown[key](best)}" for key in names)
     before, after = (" with ".join(shown[key](int(case)) for key in names) for case in (order[low - 1], order[low + 1]))
-    told = f"{label(name).capitalize()} is least at {at}: {short(height[low], unit, 4, zero_below(name))}"
+    told = f"{label(name).capitalize()} is least at {at}: {short(name, height[low], unit, 4)}"
     peak = measures.get("peak_frequency")
     if peak is not None and np.isfinite(peak[0][best]):
         told += f", at its peak frequency of {plain(peak[0][best], 4)} Hz"

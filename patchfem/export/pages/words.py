@@ -48,10 +48,9 @@ def units(name: str, value: float, unit: str, error: float | None = None) -> lis
 
     value, error and unit: in SI; value times scale is in the unit.
     """
-    kind = re.sub(r"_\d+$", "", name)  # of an interface after the first
-    if kind.endswith("fraction"):
+    if is_share(name):
         return [("%", 100.0)]
-    if kind.endswith("phase"):
+    if re.sub(r"_\d+$", "", name).endswith("phase"):  # of an interface after the first too
         return [DEG]
     if unit == "m s-2":
         return [("g", 1 / G)]
@@ -67,6 +66,17 @@ def texts(name: str, measure: dict, scale: float | None = None) -> tuple:
     scale = units(name, value, unit, error)[0][1] if scale is None else scale
     return scales.rounded(value * scale, None if error is None else error * scale, zero_below(name, measure) * scale,
                           unit == "1")
+
+
+def is_share(name: str) -> bool:
+    """Whether a measure is a fraction, which people read in %."""
+    return re.sub(r"_\d+$", "", name).endswith("fraction")
+
+
+def short(name: str, value: float, unit: str, digits: int) -> str:
+    """The value [SI] of a measure with so many digits in the unit that people read, 0 below its floor: `46.68 mJ`."""
+    value, unit = (100 * value, "%") if is_share(name) else (value, unit)
+    return scales.short(value, unit, digits, zero_below(name))
 
 
 def pair(name: str, measure: dict) -> str:
