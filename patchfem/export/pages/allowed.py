@@ -320,7 +320,8 @@ def table(limits: Limits, measures: dict) -> str:
                 f"not up to {at(one.inside)}; no case with a larger value shows the limit"
         by = f"{100 * WITHIN:g} %" if abs(one.change) < 1 else "double"
         first = short(one.name, one.first, measures[one.name][2], 4)
-        rows.append([linked(label(one.name), one.name), escape(first), _change(one.changed), by, escape(far)])
+        rows.append([linked(label(one.name), one.name), escape(first), _change(one.changed), by,
+                     f"<td class=soft>{escape(far)}</td>"])
     several = int(np.sum(np.asarray(key["values"], float) == np.min(np.asarray(key["values"], float)))) > 1
     least = (" If other keys change too, each limit is for the values of these keys that give the smallest limit."
              if several else "")

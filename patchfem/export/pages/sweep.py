@@ -15,7 +15,7 @@ from .drawn import BAR, SHORT, digits, drawn
 from .lead import FIRST, SETTLED, Lead, columns, lead_of
 from .words import is_share, linked, zero_below
 
-LISTED = 400  # cases in the table; sweep.csv has them all
+LISTED, TALL = 400, 24  # cases in the table, sweep.csv has them all; rows from which on it scrolls within its frame
 
 
 def page(table: dict, told: Lead | None = None) -> str:
@@ -156,7 +156,7 @@ def _cases(table: dict) -> str:
     named = "<a href=sweep.csv>sweep.csv</a>, <a href=sweep.nc>sweep.nc</a>" if table.get("tabled", True) else \
         "sweep.csv and sweep.nc (run the same command with --collect to write them)"
     files = f"<p class=soft>Every case with every measure and its error: {named}.</p>" if table.get("own", True) else ""
-    return f"{files}{document.table(heads, rows, 'wide')}{more}"
+    return f"{files}{document.table(heads, rows, 'wide long' if len(rows) > TALL else 'wide')}{more}"
 
 
 def _changes(values) -> bool:
