@@ -22,22 +22,23 @@ from ..dynamics.harmonic.backbone import FreeBalance
 from ..dynamics.harmonic.forces import Group
 from ..dynamics.harmonic.harmonic import pack as harmonics_packed
 from ..dynamics.harmonic.laws import synthesis
-from ..dynamics.harmonic.point import balance_of
+from ..dynamics.harmonic.point import balance_of, top
 from ..effects import has, unbuilt
 from ..friction.record import loop_from
 from ..model.model import Model
 from ..model.slide import SlidePath
 from ..model.source import placed
-from ..response.decay_curve import DecayCurve, curve_of, of_turns, turns
+from ..response.decay_curve import DecayCurve, curve_of, of_turns, turns, turns_from_outside
 from ..response.errors import OF_MODES, with_errors
 from ..runs.bench import bench
 from ..runs.bench.engine import steps_of
 from ..runs.bench.errors import errors_of
 from ..runs.joint import held_patch
+from ..runs.patch import faces
 from ..runs.patch import result as patch_result
 from ..runs.plan import plan
 from ..runs.rig import decays, numerics
-from ..runs.rig.engines import ENGINES
+from ..runs.rig.engines import ENGINES, PIECES, SMOOTH
 from ..runs.rig.plan import held_by
 from ..structure import drives
 
@@ -62,10 +63,13 @@ CLOSE = 1e-7  # of an amplitude, within which a free motion is at it
 PLAIN, BALANCED = (1e-6, 1e-3, 4), 8  # amplitudes [m] of a linear rig; steps to the damping that keeps it swinging
 SIZED, SLOW = 8, 0.1  # steps to a motion that has the amplitude asked for; least slope of both amplitudes that is taken
 SHORT, LONGEST = 50, (12800, 3200)  # cycles of a first decay; of the longest, of one mode and where several ring
+TURNED = 102400  # of the longest of one mode behind elements, of which the turns alone are kept
 STARTS = 12  # amplitudes on the way to the free motion that a release begins in
 BESIDE = 1.15  # the release over the largest amplitude: the first swings still show how it began
 HIGHER, BELOW = 3, 0.8  # releases from higher up; share of the smallest amplitude down to which coarser runs come, too
+FARTHEST, SWINGS = 8.0, 3.0  # of a start, a higher one at most; free swings within which a decay shows itself
 FINER = 3  # doublings of the steps of a decay
+TOLD, WITH_COARSER = 20.0, 2.0  # seconds, from which a decay is told beforehand; times its own, with its coarser runs
 
 
 UNKNOWN = ('the friction loop of bonds has a closed form only with reading = "stretch", order = 1, a constant bond '
@@ -74,7 +78,7 @@ UNKNOWN = ('the friction loop of bonds has a closed form only with reading = "st
 
 class Curve(NamedTuple):
     """One way: amplitude (k,) [m] at the output, frequency (k,) [Hz] and damping ratio (k,) [1] with their errors, loss
-    of the contact per cycle (k,) [J], NaN where it is not known."""
+    of the contact per cycle (k,) [J], NaN where it is not known; notes: sentences on its errors."""
 
     amplitude: np.ndarray
     frequency: np.ndarray
@@ -82,10 +86,11 @@ class Curve(NamedTuple):
     damping: np.ndarray
     damping_error: np.ndarray
     loss: np.ndarray
+    notes: tuple = ()
 
     def at(self, pick) -> "Curve":
         """Some of its points: bools (k,)."""
-        return Curve(*(part[pick] for part in self))
+        return Curve(*(part[pick] for part in self[:6]), self.notes)
 
 
 class Backbone(NamedTuple):
@@ -149,8 +154,9 @@ def backbone(model: Model, mode: str = "", amplitudes=None, methods=WAYS, progre
     """Curves of a rig's mode, of its first where none is named.
 
     amplitudes (k,) [m] at the output, rising; None: from a hundredth of the slide at which all of the contact slips to
-    15 times it, or to where the mode slides as if it were free. progress: called with a way that begins. Where no
-    friction acts and no spring bends the curves are level. PatchfemError for a scene that has no rig or no such mode.
+    15 times it, or to where the mode slides as if it were free. progress: called with a way that begins, and with what
+    a decay will take where that is more than TOLD. Where no friction acts and no spring bends the curves are level.
+    PatchfemError for a scene that has no rig or no such mode.
     """
     with placed(model.source):
         joint = _joint(model, mode)
@@ -164,15 +170,17 @@ def backbone(model: Model, mode: str = "", amplitudes=None, methods=WAYS, progre
             if progress is not None:
                 progress(way)
             try:
-                curve = _curve(joint, wanted, way)
-                curves[way] = curve if other is None else _beside(curve, _curve(other, wanted, way))
+                curve = _curve(joint, wanted, way, progress)
+                curves[way] = curve if other is None else _beside(curve, _curve(other, wanted, way, progress))
             except (NotConverged, PatchfemError) as reason:
                 missing[way] = str(reason).removeprefix("backbone: ")
     return _put_together(joint, wanted, curves, missing)
 
 
-def _curve(joint: Joint, amplitudes, way: str) -> Curve:
-    return _level(joint, amplitudes, way) if joint.linear else FIND[way](joint, amplitudes)
+def _curve(joint: Joint, amplitudes, way: str, progress=None) -> Curve:
+    if joint.linear:
+        return _level(joint, amplitudes, way)
+    return _decayed(joint, amplitudes, progress) if way == "decay" else FIND[way](joint, amplitudes)
 
 
 def _beside(curve: Curve, other: Curve) -> Curve:
@@ -348,7 +356,7 @@ def _balanced(joint: Joint, amplitudes) -> Curve:
         if not count:
             raise NotConverged("no free motion of these amplitudes was found")
         better = _free(group, joint, amplitudes, harmonics, count)
-        error, found = LEFT * np.abs(better - found) + ROUND * np.abs(better), better
+        error, found = _undipped(LEFT * np.abs(better - found)) + ROUND * np.abs(better), better
         known = np.isfinite(error[0])
         if (error[:2] <= model.accuracy.tolerance * np.abs(found[:2]))[:, known].all():
             break
@@ -360,6 +368,13 @@ def _balanced(joint: Joint, amplitudes) -> Curve:
     if not swings.any():
         raise NotConverged("the mode does not oscillate at these amplitudes: its damping ratio is above 1")
     return Curve(amplitudes, found[0], error[0], found[1], error[1], found[2]).at(swings)
+
+
+def _undipped(error) -> np.ndarray:
+    """Errors (3, k) at rising amplitudes, none below those of both its neighbours: a change of sign tells no error."""
+    beside = np.minimum(error[:, :-2], error[:, 2:])
+    return np.concatenate([error[:, :1], np.fmax(error[:, 1:-1], beside), error[:, -1:]], axis=1) \
+        if error.shape[1] > 2 else error
 
 
 def _refuse(joint: Joint, way: str) -> None:
@@ -461,17 +476,28 @@ def _motions(group: Group, joint: Joint, amplitudes, harmonics: int) -> list:
 
 def _sized(equations: FreeBalance, joint: Joint, x, here: float, amplitude: float) -> tuple:
     """(Free, unknowns (N,), reach) of the motion that is as large at the output as `amplitude` [m], from x at an
-    amplitude `here` [m] of the coordinate."""
-    slope, before = 1.0, None
+    amplitude `here` [m] of the coordinate: to ROUND, where the steps lead no further to CLOSE."""
+    slope, before, near = 1.0, None, None
     for _ in range(SIZED):
-        x, free = equations.solve(x, here)
+        try:
+            x, free = equations.solve(x, here)
+        except NotConverged:
+            if near is None:
+                raise
+            break
         off = float(np.log(_largest(free.modal @ joint.modes.output) / amplitude))
+        if near is not None and abs(off) >= near[0]:
+            break
         if abs(off) < CLOSE:
-            return free, x, amplitude / here
+            near = abs(off), (free, x, amplitude / here)
+        if abs(off) < ROUND:
+            break
         if before is not None:
             slope = (off - before[1]) / np.log(here / before[0])
         slope, before = slope if slope > SLOW else 1.0, (here, off)
         here *= np.exp(-off / slope)
+    if near is not None:
+        return near[1]
     raise NotConverged(f"no free motion has an amplitude of {say(amplitude, 3)} at the output")
 
 
@@ -487,7 +513,8 @@ def _begun(equations: FreeBalance, first, small: float, here: float) -> np.ndarr
 
 def _largest(harmonics) -> float:
     """(max - min)/2 of a motion with harmonics (H + 1,)."""
-    return float(np.ptp(synthesis(harmonics, SAMPLES))) / 2
+    motion = synthesis(harmonics, SAMPLES)
+    return (top(motion) + top(-motion)) / 2
 
 
 def _turned(joint: Joint, amplitudes) -> Curve:
@@ -616,9 +643,9 @@ def _loop(joint: Joint, slide: float, frequency: float, cycles: float) -> tuple:
     return bench.run(alone, joint.patch, steps), alone, steps
 
 
-def _decayed(joint: Joint, amplitudes) -> Curve:
+def _decayed(joint: Joint, amplitudes, progress=None) -> Curve:
     """Curve of a release from the largest amplitude, read from turn to turn, as far as it comes down."""
-    what, how, found = _come_down(joint, amplitudes)
+    what, how, found = _come_down(joint, amplitudes, progress)
     engine, tolerance = ENGINES[how.engine], joint.model.accuracy.tolerance
     for tried in range(FINER + 1):
         best, reading, error = _with_errors(joint, what, how, found, amplitudes)
@@ -629,37 +656,51 @@ def _decayed(joint: Joint, amplitudes) -> Curve:
             break
         how = how.finer()
         found = engine.run(what, how, joint.patch, 0, None, None)
-    error = np.fmax(error, decays.left_by_mesh(joint.model, joint.patch, joint.coarse, amplitudes,
-                                               lambda laws: joint.mode)) + reading
     if not known.any():
         raise NotConverged("the free decay gave no frequency and damping at these amplitudes")
-    return Curve(amplitudes, best[0], error[0], best[1], error[1], np.full(amplitudes.size, np.nan)).at(known)
+    mesh, why = decays.left_by_mesh(joint.model, joint.patch, joint.coarse, amplitudes, lambda laws: joint.mode)
+    error = np.fmax(error, mesh) + reading
+    notes = decays.without_slip_between_nodes({"method decay": why}, lambda: engine.in_space(
+        what, how, joint.patch, joint.coarse, found))
+    return Curve(amplitudes, best[0], error[0], best[1], error[1], np.full(amplitudes.size, np.nan),
+                 tuple(notes)).at(known)
 
 
-def _come_down(joint: Joint, amplitudes) -> tuple:
+def _come_down(joint: Joint, amplitudes, progress=None) -> tuple:
     """(Model, numerics, Solution) of a release that is long enough to come down from the largest amplitude to the
-    smallest, as far as it swings on. It begins so high that its first reading lies above the largest."""
+    smallest, as far as it swings on. It begins so high that its first reading lies above the largest. progress: told
+    what a longer one and its coarser ones will take, by the seconds a cycle of the one before."""
     travel, many = joint.model.rig.travel, joint.modes.omega.size > 1
-    begin, cycles, tries = min(BESIDE * float(amplitudes[-1]), travel), SHORT, 0
+    begin, cycles, tries, each = min(BESIDE * float(amplitudes[-1]), travel), SHORT, 0, 0.0
+    rest = _amplitude_of(joint, _deflected(joint)) if _limit(joint) else 0.0
+    swing = SWINGS * 2 * np.pi / joint.modes.omega[joint.mode] if joint.modes.omega[joint.mode] else np.inf
     while True:
         model = released(joint, begin)
         what = replace(model, rig=replace(model.rig, cycles=float(cycles)))
         how = numerics.choose(what)
-        if many or not _rigid(joint.model):  # a contact that holds on its spring has no events, and no other samples
+        most = TURNED if how.engine == PIECES.name and not many else LONGEST[many]
+        if many or not (_rigid(joint.model) or how.engine == PIECES.name):  # these keep every turn of the output
             how = replace(how, window=int(cycles))
+        if progress is not None and WITH_COARSER * each * cycles > TOLD:
+            progress(f"decay over {cycles} cycles: about {WITH_COARSER * each * cycles:.2g} s of computing time")
         found = ENGINES[how.engine].run(what, how, joint.patch, 0, None, None)
+        each = found.seconds / cycles
         read = _read(joint, found)
-        if not read.time.size:
+        if not read.time.size and (cycles >= most or found.response.time[-1] >= swing):
             return what, how, found
+        if not read.time.size:  # cycles are those of the held mode, of which a swing in slip can last hundreds
+            cycles = min(8 * cycles, most)
+            continue
         high, low, zeta = read.amplitude[0], read.amplitude[-1], read.damping[-1]
         if high < amplitudes[-1] and begin < travel and tries < HIGHER:
-            begin, tries = min(begin * BESIDE * amplitudes[-1] / high, travel), tries + 1
-        elif low <= BELOW * amplitudes[0] or cycles >= LONGEST[many] or \
+            raised = max(FARTHEST * begin, BESIDE * (begin + 2 * rest))  # friction takes two deflections a half swing
+            begin, tries = min(begin * BESIDE * amplitudes[-1] / high, raised, travel), tries + 1
+        elif low <= BELOW * amplitudes[0] or cycles >= most or \
                 read.time[-1] < found.response.time[-1] - 3 / read.frequency[-1]:  # it has come to rest
             return what, how, found
         else:
             further = np.log(low / (BELOW * amplitudes[0])) / (2 * np.pi * zeta) if zeta > 0 else np.inf
-            cycles = int(min(np.clip(cycles + further, 2 * cycles, 8 * cycles), LONGEST[many]))
+            cycles = int(min(np.clip(cycles + further, 2 * cycles, 8 * cycles), most))
 
 
 def released(joint: Joint, amplitude: float) -> Model:
@@ -693,9 +734,9 @@ def _start(joint: Joint, amplitude: float) -> Start:
     return Start(joint.held[1] * amplitude / joint.reach, still)
 
 
-def _read(joint: Joint, found) -> DecayCurve:
-    """The curve of a Solution; beside other modes it turns when the part of the motion along the held shape does, which
-    rings least."""
+def _read(joint: Joint, found, turns=turns) -> DecayCurve:
+    """The curve of a Solution, by its `turns`; beside other modes it turns when the part of the motion along the held
+    shape does, which rings least."""
     motion, shape = found.response, joint.held[1]
     if shape.size == 1:
         return curve_of(of_turns(*turns(motion.time, motion.output, motion.output_rate)))
@@ -708,7 +749,10 @@ def _read(joint: Joint, found) -> DecayCurve:
 def _with_errors(joint: Joint, what: Model, how, found, amplitudes) -> tuple:
     """((2, k) frequency [Hz] and damping at amplitudes (k,) of a release, (2, k) what reading them leaves open, (2, k)
     what coarser runs change)."""
-    engine, read, made = ENGINES[how.engine], _read(joint, found).over(amplitudes), {}
+    engine, read, made = ENGINES[how.engine], _read(joint, found), {}
+    if how.engine == SMOOTH.name:
+        read = read.unsampled(_read(joint, found, turns_from_outside))
+    read = read.over(amplitudes)
     best = np.array([read.frequency, read.damping])
     reading, error = np.array([read.frequency_error, read.damping_error]), ROUND * np.abs(best)
 
@@ -729,7 +773,7 @@ def _with_errors(joint: Joint, what: Model, how, found, amplitudes) -> tuple:
     return best, reading, error
 
 
-FIND = {"balance": _balanced, "decay": _decayed, "quasi-static": _static}
+FIND = {"balance": _balanced, "quasi-static": _static}
 
 
 def _put_together(joint: Joint, wanted, curves: dict, missing: dict) -> Backbone:
@@ -745,7 +789,9 @@ def _put_together(joint: Joint, wanted, curves: dict, missing: dict) -> Backbone
     edge = next((found for one in curves.values() if (found := _edge(one)) is not None), None)
     return Backbone(name, own, stuck, curves, missing, micro, gross, edge,
                     (*_unrubbed(joint), *_gaps(wanted, curves), *([] if joint.linear else _differences(curves)),
-                     *_regimes(joint, wanted, micro), *_secant(joint, wanted, curves), *_unworn(joint.model)),
+                     *_regimes(joint, wanted, micro), *_unmeshed(joint),
+                     *(note for one in curves.values() for note in one.notes),
+                     *_secant(joint, wanted, curves), *_unworn(joint.model)),
                     None if joint.linear else _expected(joint), off)
 
 
@@ -832,6 +878,16 @@ def _unworn(model: Model) -> tuple:
     return () if model.wear is None else ("these curves are for unworn pieces: [wear] is ignored",)
 
 
+def _unmeshed(joint: Joint) -> tuple:
+    """That no coarser mesh tells the error of a contact which slips part by part; its grain alone tells too little."""
+    model = joint.model
+    if joint.linear or not model.soft or joint.coarse is not None:
+        return () if joint.linear or not model.rig.soft or faces.known(model) else (SPARSE + faces.UNKNOWN,)
+    cure = "split the elements of contact.mesh" if model.patch.mesh is not None else "leave out contact.element_size"
+    return (f"{SPARSE}the interface has too few elements for a coarser mesh; {cure}",)
+
+
+SPARSE = "the errors of the curves do not include the change on a coarser mesh: "
 LEFT_OUT = {"balance": "harmonic balance did not converge at these amplitudes; the curve may turn back to smaller "
                        "amplitudes, or the mode may stop oscillating",
             "quasi-static": "the static curve does not reach these amplitudes",

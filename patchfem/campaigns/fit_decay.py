@@ -82,8 +82,8 @@ def read_curve(path) -> tuple:
     spread = np.array([columns[f"{name}_error"] / 2 if f"{name}_error" in columns else half * np.abs(one) for
                        name, half, one in zip(("frequency", "damping"), HALVES, value)])
     if (spread < 0).any():
-        raise PatchfemError(f"{path}: errors must be 0 or more; give half the width of each interval as its error, or "
-                            "leave out the column of errors")
+        raise PatchfemError(f"{path}: errors must be 0 or more; of a value with a confidence interval, give half the "
+                            "width of this interval as the error, or leave out the column of errors")
     if not (columns["amplitude"] > 0).all() or not (value[0] > 0).all():
         raise PatchfemError(f"{path}: amplitudes and frequencies must be above 0")
     order = np.argsort(columns["amplitude"], kind="stable")
@@ -162,9 +162,9 @@ def fit_decay(scene: Scene, to: Path, free, say=None, starts: int = 3) -> Fitted
     start = start if settled else min(tried)[2]
     found = fitted(model, "series")
     best, lost = model(found.values), amplitude[np.isnan(curve(found.values, ways[0])[0])]
-    warned = [f"harmonic balance found no oscillation at the amplitudes {_listed(lost)}; the values used at these "
-              "amplitudes are those of the static curve, multiplied by the ratio of harmonic balance to the static "
-              "curve at the nearest amplitude with both results"] if lost.size else []
+    warned = [f"harmonic balance found no oscillation at the amplitudes {_listed(lost)}; there, the values of the "
+              "static curve are used, multiplied by the ratio of the two methods at the nearest amplitude at which "
+              "both have a value"] if lost.size else []
     sets = [one.assigned(value) for one, value in zip(wanted, found.values)]
     return FittedDecay(scene, Path(to), wanted, found, amplitude, measured, error, best, ways[0], sets,
                        [*scene.remarks, *warned, *remarks(found, [one.key for one in wanted])], perf_counter() - begin)

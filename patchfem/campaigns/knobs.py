@@ -56,7 +56,7 @@ def settings(model: Model, knob: str) -> list:
 
 
 def _split_words(level: int) -> str:
-    return f"contact.mesh with its edges halved {level} times" if level else "contact.mesh as it is"
+    return f"contact.mesh with every element edge halved {level} times" if level else "contact.mesh as it is"
 
 
 def _by_tolerance(model: Model) -> list:

@@ -17,8 +17,8 @@ class Estimate:
 
     segment: word('length of the averaged segments, such as "2 s"; default: the whole record if it begins and ends '
                   "at rest, otherwise an eighth of the record") = ""
-    window: word("window function of the segments, hann or none, such as none; default: hann if the record is cut "
-                 "into several segments, otherwise none") = ""
+    window: word("window function of the segments, such as hann; possible values: hann, none; default: hann if the "
+                 "record is cut into several segments, otherwise none") = ""
     band: word('frequency band in which to find modes, such as "20 Hz..400 Hz"') = ""
     decay: flag("treat the record as a free decay; frequency and damping are then computed without a record of the "
                 "input") = False

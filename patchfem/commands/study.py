@@ -110,8 +110,9 @@ class Rows:
              "curve of frequency and damping against amplitude")] = None
     seed: Annotated[int, Parameter(help="seed of the random starts, such as 1")] = 0
     unstable: Annotated[Literal["bound", "out", "read"], Parameter(
-        help="how the fit uses rows with the flag U (unstable in the test), such as out: bound uses their readings as "
-             "lower bounds, out leaves these rows out, read uses them like all other rows")] = "bound"
+        help="how the fit uses rows with the flag U (unstable in the test), such as out; possible values: bound (the "
+             "readings are lower bounds), out (the rows are left out), read (the rows are used like all other "
+             "rows)")] = "bound"
     placebo: texts('repeat the fit with each of these values, such as "structure.mode.yaw.frequency=110 Hz,138 Hz", to '
                    "check whether the value in the scene fits the measured rows best") = ()
     resume: flag("continue an interrupted fit; starts already finished are not repeated") = False

@@ -93,9 +93,9 @@ class By:
 def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out: Out = None, set_: Sets = (),
           resume: flag("continue an interrupted sweep in this folder") = False,
           keep: Annotated[Literal["none", "summaries", "results", "pages"] | None, Parameter(
-              help="files to keep of each case besides its row in the tables: none, summaries, results, or pages "
-                   "(results with report.html), such as results; default: summaries for up to 1000 cases, none for "
-                   "more")] = None,
+              help="files to keep of each case in addition to its row in the tables, such as results; possible values: "
+                   "none, summaries, results, pages (results and report.html); default: summaries for up to 1000 "
+                   "cases, none for more cases")] = None,
           no_page: NoPage = False, json_: Json = False, quiet: Quiet = False):
     """Run SCENE for all combinations of the values in --over, or of the values in its table [sweep]. Write sweep.csv,
     sweep.nc and report.html; the default folder is out/<scene name>-sweep.

@@ -229,8 +229,8 @@ def undetermined(c, turns: bool, spring: float) -> str:
     except np.linalg.LinAlgError:
         return INDEFINITE
     if not turns:
-        return ("contact: the equations of the contact set overflowed; check that load, gap and stiffnesses have "
-                "ordinary sizes")
+        return ("contact: numbers in the contact equations became too large to compute; check the units and magnitudes "
+                "of load, gap and stiffnesses")
     holder = "raise" if spring > 0 else "name"
     return ("contact: the nodes that touch do not determine the rotation; lower contact.load_line.offset (with "
             f"contact.load_line.moment: raise contact.load) or {holder} contact.holder.rotational_stiffness")

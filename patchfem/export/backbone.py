@@ -9,7 +9,7 @@ from ..campaigns.backbone import Backbone, Curve
 from ..disk.whole import write_rows, write_text
 from .drawing import charts, pictures
 from .netcdf import Contents, write
-from .pages.document import Section, document, table
+from .pages.document import Section, document, prose, table
 from .results import Folder
 from .summary import write_json
 
@@ -43,7 +43,7 @@ def contents(found: Backbone, title: str = "") -> Contents:
     for way, one in found.curves.items():
         name = way.replace("-", "_")
         coordinates[f"{name}_amplitude"] = (f"{name}_amplitude", one.amplitude, {
-            "units": "m", "long_name": "half peak-to-peak at the output"})
+            "units": "m", "long_name": "half the peak-to-peak motion at the output"})
         for of, unit, words in (("frequency", "Hz", "frequency"), ("frequency_error", "Hz", "error of the frequency"),
                                 ("damping", "1", "damping ratio, structure and friction together"),
                                 ("damping_error", "1", "error of the damping ratio")):
@@ -105,16 +105,16 @@ def page(found: Backbone, title: str) -> str:
     cells = "".join(f'<div id="{one["anchor"]}" class=chart role=img aria-label="{escape(one["title"])}"></div>'
                     for one in made)
     first, *more = sentences(found)
-    told = f"<div class=verdict><b>{escape(first)}</b>{''.join(f'<p>{escape(text)}</p>' for text in more)}</div>"
+    told = f"<div class=verdict><b>{prose(first)}</b>{''.join(f'<p>{prose(text)}</p>' for text in more)}</div>"
     sections = [Section("curves", "Frequency and damping against amplitude",
                         f"<figure><div class=row>{cells}</div><figcaption>The bars show the numerical "
                         f"errors.{LEFT_OUT * (not all(_bounded(one).all() for one in found.curves.values()))}"
                         "</figcaption>"
                         "</figure>" if made else "<p>No curve was found.</p>"),
                 Section("ways", "How the curves were computed", table(("", ""), [
-                    [escape(way), escape(text if way in found.curves else f"not known: {found.missing[way]}")]
+                    [escape(way), prose(text if way in found.curves else f"not known: {found.missing[way]}")]
                     for way, text in WAYS.items() if way in found.curves or way in found.missing]) + "".join(
-                        f"<p>{escape(text[0].upper() + text[1:])}.</p>" for text in found.notes)),
+                        f"<p>{prose(text[0].upper() + text[1:])}.</p>" for text in found.notes)),
                 Section("values", "Values", _values(found))]
     title = f"Mode {found.mode}: frequency and damping against amplitude" + f": {title}" * bool(title)
     return document(title, told, sections, {"charts": made} if made else None,

@@ -5,11 +5,12 @@ from html import escape
 from pathlib import Path
 
 from .fit import told_of
-from .pages.document import Section, document, figure, table, warned
+from .pages.document import Section, document, figure, prose, table, warned
 
 PICTURE, FITTED = "fit.svg", "scene.fitted.toml"
-FILES = {"fit.json": "the answer, all digits, in SI", "fit.csv": "measured and fitted, row by row",
-         FITTED: "the scene with the fitted values, which runs"}
+FILES = {"fit.json": "the result of the fit in SI units, with all digits",
+         "fit.csv": "measured and fitted values, row by row",
+         FITTED: "the scene with the fitted values, ready to run"}
 
 
 def page(answer: dict, lines: Sequence, folder: Path) -> str:
@@ -20,7 +21,7 @@ def page(answer: dict, lines: Sequence, folder: Path) -> str:
     law = f"{answer['law']}: " if "law" in answer else ""
     told = [lines[0], *(lines[1 + len(values):] if isinstance(answer.get("rms"), dict) or "offsets" in answer else ())]
     bars = " Brackets enclose 95 % intervals." if any(one.get("interval") for one in values.values()) else ""
-    lead = (f"<div class=verdict><b>{law}{short}</b><p>{escape('; '.join(' '.join(one.split()) for one in told))}."
+    lead = (f"<div class=verdict><b>{law}{short}</b><p>{prose('; '.join(' '.join(one.split()) for one in told))}."
             f"{bars}</p></div>{warned(answer['warnings'])}")
     sections = [Section("values", "Fitted values", _values(values))]
     if (folder / PICTURE).is_file():

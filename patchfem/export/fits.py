@@ -114,7 +114,8 @@ def _refuse(kind: str, options: Options, named: Callable) -> None:
     others = [name for name in options.given() if name not in here]
     if others:
         belong = "; ".join(f"{named(name)} applies only to {BELONG[name]}" for name in others)
-        raise PatchfemError(f"{belong}; this scene is {is_}, leave {'it' if len(others) == 1 else 'them'} out")
+        raise PatchfemError(f"{belong}; this scene is {is_}; leave "
+                            f"{'this option' if len(others) == 1 else 'these options'} out")
     for name, least in (("starts", 1), ("seed", 0)):
         value = getattr(options, name)
         if value is not None and (not isinstance(value, int) or value < least):

@@ -103,9 +103,10 @@ def _held(answer: dict) -> str:
 def lines_of(answer: dict) -> list:
     """The answer as lines of text; answer: the object of fit.json."""
     low, high = (short(one, "m", 3) for one in answer["amplitudes"])
-    out = [f"{answer['outcome']}: lumped laws fitted to a patch under {short(answer['load'], 'N', 4)} that slips "
-           f"as a whole at {short(answer['slip_force'], 'N', 4)} and has {_held(answer)} while the whole patch sticks; "
-           f"{answer['rows']} amplitudes of the slide, {low} to {high}",
+    out = [f"{answer['outcome']}: laws of a single point fitted to a patch under a load of "
+           f"{short(answer['load'], 'N', 4)}; the patch slips as a whole at {short(answer['slip_force'], 'N', 4)} and "
+           f"has {_held(answer)} while the whole patch sticks; "
+           f"{answer['rows']} amplitudes of the slide from {low} to {high}",
            f"  {'law':<16}{'error of stiffness':>22}{'error of loss':>22}   values"]
     for law, one in answer["laws"].items():
         parts = (f"{_percent(one[part]['largest'])} (rms {_percent(one[part]['rms'])})" for part in PARTS)

@@ -157,7 +157,7 @@ def with_events(data: Contents, time, interface, kind, slide, count: int, meanin
                                                                     "change of the drive"})})
 
 
-READ = {"amplitude": ("m", "half peak-to-peak at the output"),
+READ = {"amplitude": ("m", "half the peak-to-peak motion at the output"),
         "acceleration_peak": ("m s-2", "largest absolute acceleration"),
         "acceleration_fundamental": ("m s-2", "first harmonic of the absolute acceleration"),
         "acceleration_distortion": ("1", "third harmonic of the absolute acceleration divided by its first "
@@ -189,7 +189,7 @@ def with_curve(data: Contents, curve: dict) -> Contents:
     return data.also(out)
 
 
-DECAY = {"amplitude": ("m", "half peak-to-peak of the output during the decay"),
+DECAY = {"amplitude": ("m", "half the peak-to-peak motion of the output during the decay"),
          "frequency": ("Hz", "frequency of the decay"), "damping": ("1", "damping ratio of the decay")}
 
 

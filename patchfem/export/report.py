@@ -10,7 +10,7 @@ from .. import scales
 from ..effects import shown_absent
 from .drawing import charts
 from .pages import player
-from .pages.document import Section, document, table, warned
+from .pages.document import Section, document, prose, table, warned
 from .pages.driven import changed
 from .pages.words import SHARP, G, headline, in_order, linked, of_records, others, pair, texts, units
 from .results import MOST
@@ -22,7 +22,7 @@ FILES = (("fields.vtkhdf", "fields of both pieces and their interface, frame by 
          ("interfaces", "fields, in the same format, of every interface that has a patch of its own"),
          ("summary.json", "measures, outcome, warnings, effects and numerics"),
          ("result.nc", "histories and fields along the interface (xarray, MATLAB, ncdump)"),
-         ("scene.resolved.toml", "the scene in SI with every default"))
+         ("scene.resolved.toml", "the scene in SI units, with all default values"))
 
 
 def part_of_cycle(data: dict) -> bool:
@@ -38,7 +38,7 @@ def pressed(data: dict) -> bool:
 
 def verdict(data: dict) -> str:
     """The answer of a run in a few sentences of HTML, with the error of each number."""
-    answer = f"<b>{escape(data['summary']['outcome'])}</b>: {escape(data['sentence'])}"
+    answer = f"<b>{escape(data['summary']['outcome'])}</b>: {prose(data['sentence'])}"
     text = headline(data["summary"], data.get("cycles"), lambda number, name: linked(number, name, " class=v"),
                     data.get("released", ""))
     return f"{answer}{escape(charts.regime(data.get('steady')))} {text}".strip()
@@ -57,7 +57,7 @@ def page(data: dict) -> str:
             f"<p class=verdict>{verdict(data)}</p>"]
     warnings = [w for w in summary["warnings"] if w != data["sentence"]]
     lead.append(warned(warnings, "Warnings"))
-    lead += [f"<p class=soft>Note: {escape(text)}</p>" for text in summary["notes"]]
+    lead += [f"<p class=soft>Note: {prose(text)}</p>" for text in summary["notes"]]
     drawn, shown = figures(data)
     drawn = charts.within(drawn, ROOM)
     sections = [Section("pictures", "Pictures", shown)] if drawn else []
@@ -84,7 +84,7 @@ def figures(data: dict) -> tuple:
                 enumerate(found.charts(*found.values))]
         cells = "".join(f'<div id="{one["anchor"]}" class=chart role=img aria-label="{escape(one["title"])}"></div>'
                         for one in made)
-        places.append(f"<figure><div class=row>{cells}</div><figcaption>{escape(found.caption)}</figcaption></figure>")
+        places.append(f"<figure><div class=row>{cells}</div><figcaption>{prose(found.caption)}</figcaption></figure>")
         drawn += made
     return drawn, "\n".join(places)
 
@@ -115,12 +115,12 @@ def _spectra(data: dict) -> Picture | None:
     found = data["summary"]["measures"]
     at = found.get("response_frequency", {}).get("value")
     told = "" if at is None else (
-        " The peak of H1, marked by a ring, belongs to a mode at {} ({}) with a damping ratio of {} ({}), friction "
-        "included.".format(
+        " The peak of H1 is marked by a ring. It is the peak of a mode at {} ({}) with a damping ratio of {} ({}), "
+        "friction included.".format(
             *of_records("response_frequency", found), *of_records("response_damping", found)))
-    return Picture(charts.spectra, (data["spectra"], at), "One-sided spectral densities of output and drive, and H1, "
-                                                          "the displacement of the output divided by the acceleration "
-                                                          "of the base; H1 is drawn "
+    return Picture(charts.spectra, (data["spectra"], at), "One-sided spectral densities of output and drive, and the "
+                                                          "frequency response H1 (displacement of the output divided "
+                                                          "by acceleration of the base). H1 is drawn "
                    f"faint where the coherence is below {charts.COHERENT:g}.{told}")
 
 
@@ -166,8 +166,8 @@ def _interface(data: dict) -> Picture | None:
     fields, caption = data["fields"], "Normal stress of the pressed pieces"
     if np.any(fields.get("shear_stress", 0.0)):
         span = "the last cycle" if data["summary"]["kind"] == "rig" and not part_of_cycle(data) else "the run"
-        caption += (f"; shear stress in {len(fields['time']) - 1} frames of {span}, with the largest resultant force "
-                    "in colour")
+        caption += (f"; shear stress at {len(fields['time']) - 1} instants of {span}; the instant with the largest "
+                    "resultant force is in colour")
     if charts.part_in_contact(data["x"], fields["normal_stress"][0]):
         length, scale = scales.axis_unit(data["x"], "m")
         caption += (". Only the part in contact is drawn; the whole length is "
@@ -179,8 +179,9 @@ def _faces(data: dict) -> Picture | None:
     found = [one for one in data.get("faces", ()) if np.any(one[1]["normal_stress"][0] > 0)]
     part = any(charts.part_in_contact(x, fields["normal_stress"][0]) for x, fields, _ in found)
     shear = any(np.any(fields.get("shear_stress", 0.0)) for _, fields, _ in found)
-    return Picture(charts.faces, (found[:MOST],), "Normal stress of the pressed patch of each interface"
-                   f"{'; shear stress in frames of the last cycle, the largest resultant force in colour' * shear}."
+    moved = "; shear stress at several instants of the last cycle; the instant with the largest resultant force is " \
+        "in colour" if shear else ""
+    return Picture(charts.faces, (found[:MOST],), f"Normal stress of the pressed patch of each interface{moved}."
                    f"{' Only the part in contact is drawn.' * part}{_first(found)}") if found else None
 
 
@@ -303,7 +304,8 @@ def _factors(measured: dict) -> tuple:
 
 def _unsettled(data: dict) -> str:
     outcome = data["summary"]["outcome"]
-    return "" if outcome in SETTLED else f" The run ended as {outcome}: the computed values are not of a steady motion."
+    return "" if outcome in SETTLED else (f" The run ended with the outcome '{outcome}': the computed values are not "
+                                          "those of a steady motion.")
 
 
 def _table_one(data: dict) -> list:
@@ -350,7 +352,7 @@ def _table_of_levels(levels: list) -> Section:
         rows.append([str(number), drive, *cells, *([escape(one["outcome"])] if judged else []),
                      "stuck" if one["stuck"] else "slips"])
     sized = "force" if any(one.get("unit") == "N" for one in levels) else "base acceleration"
-    texts = ("half peak-to-peak", "peak acceleration", "its first harmonic", "third / first harmonic")
+    texts = ("half the peak-to-peak motion", "peak acceleration", "its first harmonic", "third / first harmonic")
     heads = [">level", f">{sized}", *(f">{linked(text, name)}" for text, (name, _) in zip(texts, OF_LEVELS)),
              *(["outcome"] if judged else []), "interface"]
     return Section("levels", "Levels", table(heads, rows))
@@ -369,14 +371,14 @@ def _measures(data: dict) -> Section:
         value, error = texts(name, m)
         cells = [f"<td id='measure-{escape(name)}'>{escape(name)}</td>", value]
         if m["value"] is None:
-            cells.append(f"<td class=soft colspan=3>{escape(m.get('reason', ''))}</td>")
+            cells.append(f"<td class=soft colspan=3>{prose(m.get('reason', ''))}</td>")
         else:
             unit = units(name, m["value"], m["unit"], m["error"])[0][0]
             error = error or ("unknown" if m["error"] is None else DASH)
             cells += [error, f"<td class=v>{escape(unit)}</td>", escape(others(name, m))]
         others_lie = of_records(name, found)[1]
         text = means.get(name, "") + (f"; {others_lie} for other records of the random drive" if others_lie else "")
-        rows.append([*cells, f"<td class=soft>{escape(text)}</td>"])
+        rows.append([*cells, f"<td class=soft>{prose(text)}</td>"])
     note = (f"<p class=soft>The run covers only {data['cycles']:.2g} of a cycle, so measures per cycle do not cover a "
             "whole cycle.</p>") if part_of_cycle(data) else ""
     heads = ("measure", ">value", ">error (±)", "unit", "in customary units", "what it is")
@@ -390,13 +392,14 @@ def _cost(data: dict) -> Section:
     summary = data["summary"]
     rows = [[escape(e["effect"]), escape(e["equations"]), f"{e['seconds']:.3f}"] for e in summary["effects"]]
     parts = ", ".join(f"{k} {v:.3f} s" for k, v in summary["seconds"].items())
-    shared = " The time of the loop over law and modes is listed under the law." if summary["kind"] == "rig" else ""
+    shared = " The friction law and the modes are computed in one loop; the row of the law gives the time of this " \
+        "loop." if summary["kind"] == "rig" else ""
     absent = shown_absent(summary["not_in_scene"], summary.get("numerics", {}).get("engine"))
     text = (table(("effect", "equations", ">seconds"), rows)
             + f"<p class=soft>Wall-clock seconds: {escape(parts)}.{shared}</p>"
             "<details><summary>Effects not in the scene, which are neither imported nor computed</summary>"
             f"<p class=soft>{escape(', '.join(absent))}.</p></details>")
-    return Section("cost", "What ran and what it cost", text)
+    return Section("cost", "What was computed, and the computing time", text)
 
 
 def _origin(data: dict) -> Section:

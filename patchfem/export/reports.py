@@ -39,7 +39,8 @@ def report_of(folders: list, out: Path | None = None, measured: Path | None = No
 def _read(path: Path, runs: list) -> beside.FinishedRun:
     found = laboratory.read_records(path, records.wanted(())).values
     if not found.keys() & beside.KNOWN.keys() - {"time"}:
-        raise PatchfemError(f"--measured {path}: none of {', '.join(beside.KNOWN)} in it (there: {', '.join(found)})")
+        raise PatchfemError(f"--measured {path}: the file contains none of {', '.join(beside.KNOWN)}, only "
+                            f"{', '.join(found)}")
     return beside.measured(path.name, found, runs[0])
 
 

@@ -118,7 +118,7 @@ def refuse_others(place: Path, shown, known, kind: str, dots: bool = False) -> N
     if not place.exists():
         return
     if not place.is_dir():
-        raise PatchfemError(f"{shown}: {place.name} is a file, a folder is needed; choose another -o")
+        raise PatchfemError(f"{shown}: {place.name} is a file, but a folder is needed; choose another -o")
     others = sorted(one.name for one in place.iterdir() if one.name.removesuffix(".partial") not in known
                     and not (unfinished(one.name) or is_state(one.name)) and not (dots and one.name.startswith(".")))
     if others:

@@ -164,7 +164,7 @@ def _unpacked(path, body, total: int) -> bytes:
     unpack = zlib.decompressobj()
     data = unpack.decompress(body, 8 + total + 1)[8:]
     if not unpack.eof:  # there its checksum has been compared
-        raise ValueError("its data are longer or shorter than announced")
+        raise ValueError("the data are longer or shorter than the header announces")
     return data
 
 

@@ -32,7 +32,7 @@ class _Strings:
 
     def __init__(self, path, rows: int, columns: int, told):
         if not 0 <= rows <= SIDE or not 0 <= columns <= SIDE:
-            raise ValueError(f"it announces {rows} rows and {columns} columns")
+            raise ValueError(f"the header announces {rows} rows and {columns} columns")
         self.path, self.shape, self.told, self.places, self.parts = path, (rows, columns), told, [], []
 
     def cards(self) -> Cards:
@@ -42,7 +42,8 @@ class _Strings:
             column, row = np.array(self.places, int).reshape(-1, 2).T
             out = (row < 1) | (row + sizes - 1 > self.shape[0])
             if out.any():
-                raise ValueError(f"it uses row {(row + sizes - 1)[out][0]}, but the matrix has {self.shape[0]} rows")
+                raise ValueError(f"the matrix uses row {(row + sizes - 1)[out][0]}, but the matrix has "
+                                 f"{self.shape[0]} rows")
             rows = np.arange(numbers.size) + np.repeat(row - 1 - np.cumsum(sizes) + sizes, sizes)
             return Cards(sparse.coo_array((numbers, (rows, np.repeat(column - 1, sizes))), self.shape).tocsr())
         except ValueError as error:
@@ -69,7 +70,7 @@ def _unreadable(path, error) -> PatchfemError:
 def _kind(number: int) -> int:
     """Words of a number of a type of OUTPUT4."""
     if number in (3, 4):
-        raise ValueError("a matrix is complex; write only its real part")
+        raise ValueError("a matrix is complex; write only the real part")
     return {1: 1, 2: 2}[number]
 
 
@@ -109,7 +110,7 @@ def _binary(path, data: bytes) -> dict:
             begin = place + (2 if big else 1) * wide
             place = begin + (long - 1) * wide
             if place < begin:
-                raise ValueError("one of its strings has no rows")
+                raise ValueError("a string of the matrix has no rows")
             entries.places.append((column, first))
             entries.parts.append(record[begin:place])
     return found
@@ -151,7 +152,7 @@ def _text(path, text: str) -> dict:
 def _fixed(text: str, width: int) -> np.ndarray:
     """Numbers in columns of a width; ValueError where one is none."""
     if len(text) % width:
-        raise ValueError(f"its numbers are not {width} characters wide")
+        raise ValueError(f"the numbers of the matrix are not {width} characters wide")
     return np.frombuffer(text.upper().replace("D", "E").encode("ascii"), f"S{width}").astype(float)
 
 
@@ -243,7 +244,7 @@ def _begun(path, found: dict, line: int, fields: list) -> tuple:
     name = fields[0].upper()
     if fields[1] == "0" and name not in found:
         if int(fields[3]) > 2:
-            raise ValueError("it is complex; write only its real part")
+            raise ValueError("the matrix is complex; write only the real part")
         found[name] = _Deck(path, int(fields[2]))
         return None, []
     found[name].columns.append([line, int(fields[1]), int(fields[2] or 0), 0])

@@ -182,8 +182,8 @@ def _shared_time(path, picked: list, channels: list, asked: bool) -> dict:
         for one in picked:
             if one.time is None or one.time.size != times[0].size or not np.array_equal(one.time, times[0]):
                 raise PatchfemError(f"{path}: '{one.name[:40]}' is sampled at other times than "
-                                    f"'{picked[0].name[:40]}'; choose channels with the same times by --map, among "
-                                    f"{listed(channels)}")
+                                    f"'{picked[0].name[:40]}'; use --map to choose channels that have the same "
+                                    f"times; the channels are {listed(channels)}")
         return {"time": times[0]}
     columns = [one for one in channels if one.quantity == "time"] if asked else []
     return {"time": _in_si(path, "time", columns[0], "")} if len(columns) == 1 else {}

@@ -7,6 +7,7 @@ import numpy as np
 
 from ..core import ModalBasis, PatchfemError
 from ..inputs import matrices
+from ..scales import plain
 from ..structure import masses, reduced
 from ..structure.places import AXES
 
@@ -94,7 +95,7 @@ def _rounded(files: tuple, every: list, stiffness, unit: float, shape) -> list:
         share = matrices.scatter(one.values, told[1], shape) / unit / scale  # two deviations, of half a square
         if share > TOLD:
             out.append(f"{path.name} stores the {key} in {told[0]}, which leaves the lowest frequency of the structure "
-                       f"uncertain by {100 * share:.2g} %; write the file in double precision")
+                       f"uncertain by {plain(100 * share, 2)} %; write the file in double precision")
     return out
 
 

@@ -254,7 +254,8 @@ ROWS = (
         "interface slides in a plane, half the largest distance between two points of the path of irreversible slide",
         lambda s: s.slip.get("slip_amplitude"), group="friction"),
     Row("stick_fraction", "1", 1e-3,
-        "share of the time of the last cycles during which the interface as a whole sticks; the interface sticks as a "
+        "fraction of the time of the last cycles during which the interface as a whole sticks; the interface sticks "
+        "as a "
         "whole while more than half of the change of the slide (weighted as in `slip_amplitude`) is elastic; part of a "
         "patch, or some sliders of law 'iwan', may slip during this time",
         lambda s: s.slip.get("stick_fraction"), 0.35, group="friction", term=("1", lambda _: 1.0),
@@ -264,16 +265,16 @@ ROWS = (
         "defined under `slip_amplitude`; the phase is printed in degrees",
         lambda s: s.slip.get("slip_start_phase"), 1.0, group="friction", term=("pi", lambda _: np.pi),
         halves=(2.5, 1.0)),
-    Row("normal_load", "N", 0.0, "normal load on the interface, sum over all pairs", lambda s: s.load,
-        group="friction"),
+    Row("normal_load", "N", 0.0, "normal load on the interface, summed over all equal patches (key `pairs`)",
+        lambda s: s.load, group="friction"),
     Row("loop_area", "J", 1e-10,
         "energy dissipated per cycle in this interface alone, in both directions if the interface slides in a plane; "
         "null if the drive is not a sine and the friction loop does not close, because the interface then stores or "
         "returns more energy than it dissipates",
         lambda s: s.cycle.get("loop_area"), group="energy"),
     Row("equivalent_stiffness", "N m-1", 1.0,
-        "first harmonic of the friction force (only the part in phase with the slide) divided by the first harmonic of "
-        "the slide; negative if friction holds the spring deflected during stick",
+        "part of the first harmonic of the friction force that is in phase with the slide, divided by the first "
+        "harmonic of the slide; negative if friction keeps the spring of the structure deflected during stick",
         lambda s: s.cycle.get("equivalent_stiffness"), group="friction",
         term=("magnitude of the complex ratio of the two first harmonics", first_harmonic)),
     Row("secant_stiffness", "N m-1", 1.0,
@@ -295,19 +296,20 @@ ROWS = (
     Row("energy_dissipated", "J", 1e-10, "energy dissipated by friction in all interfaces over the whole run",
         lambda s: s.energies.get("energy_dissipated"), group="energy"),
     Row("energy_created", "J", 1e-10,
-        "energy created over the whole run by a law that is not passive, such as eq. 2.17 as printed in the report",
+        "energy created over the whole run by a law that is not passive, such as equation 2.17 as printed in the "
+        "report",
         lambda s: s.energies.get("energy_created"), group="energy"),
     Row("normal_load_least", "N", 1e-6, "smallest normal load in the last cycles", lambda s: s.of_load(np.min),
         group="friction"),
     Row("normal_load_peak", "N", 1e-6, "largest normal load in the last cycles", lambda s: s.of_load(np.max),
         group="friction"),
-    Row("open_fraction", "1", 1e-3, "share of the time of the last cycles in which the surfaces are not in contact",
+    Row("open_fraction", "1", 1e-3, "fraction of the time of the last cycles in which the surfaces are not in contact",
         lambda s: s.of_load(lambda load: np.mean(load <= 0)), 4.0, group="friction", term=("1", lambda _: 1.0)),
     Row("relative_displacement_amplitude_steady", "m", 1e-10,
         "steady amplitude; extrapolated if the motion has not settled or may still change by more than 0.02 tolerance "
         "× amplitude"),
     Row("peak_frequency", "Hz", 0.0, "drive frequency at which the curve of steady amplitudes has its maximum"),
-    Row("friction_ratio_end", "1", 1e-9, "friction force divided by normal load at the end of the slide",
+    Row("friction_ratio_end", "1", 1e-9, "friction force divided by normal load, both at the end of the slide",
         group="friction"),
     Row("friction_ratio_peak", "1", 1e-9, "largest value of friction force divided by normal load during the run",
         group="friction"),
@@ -330,10 +332,10 @@ ROWS = (
     Row("ring_damping", "1", 1e-6, "damping ratio of the free vibration (ringing) during stick"),
     Row("onset_level", "m s-2", 0.0,
         "drive level at the onset of slip, found by bisection between two levels; the key `drive.onset` defines what "
-        "counts as the onset; in N for a force drive", group="friction"),
+        "counts as the onset; for a force drive the level is in N", group="friction"),
     Row("jump_level", "m s-2", 0.0,
         "drive level just after the largest jump of the amplitude; a jump is a step between two levels at which the "
-        "ratio of the amplitudes is at least 1.5 times the ratio of the levels; in N for a force drive"),
+        "ratio of the amplitudes is at least 1.5 times the ratio of the levels; for a force drive the level is in N"),
     Row("level_hysteresis", "m", 0.0,
         "hysteresis: largest difference between the amplitudes reached at the same level with rising and with falling "
         "levels"),

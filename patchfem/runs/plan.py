@@ -168,7 +168,7 @@ def _verdict(model: Model, groups: dict, parts: tuple, said: list) -> list:
                    "[contact.shear] to include this shear")
     if model.kind == "rig" and model.soft and model.rig.load_varies:
         out.append(f"the normal load changes with the motion, so {model.soft} is computed with the tangential modes of "
-                   "all nodes; a second run with half as many modes gives the error")
+                   "all nodes; the numerical error is estimated from a second run with half as many modes")
     return out
 
 

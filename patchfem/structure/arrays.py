@@ -70,7 +70,7 @@ def _refuse_long(path) -> None:
     end = tail.rfind(b"PK\x05\x06")
     size = int.from_bytes(tail[end + 12:end + 16], "little") if end >= 0 else 0
     if size > DIRECTORY:
-        raise PatchfemError(f"its list of members takes {size} bytes; {DIRECTORY} is the limit")
+        raise PatchfemError(f"the list of members takes {size} bytes; {DIRECTORY} is the limit")
 
 
 def _refuse_large(key: str, shape: tuple) -> None:
@@ -113,7 +113,8 @@ def _of_matrices(data, pairs, pushed, forced, where) -> ModalBasis:
     M, K, C = (_square(data, key, where) for key in ("M", "K", "C"))
     n = len(M)
     if n == 0:
-        raise PatchfemError(f"{where}: M has no coordinate; a square matrix [kg] of at least one coordinate is needed")
+        raise PatchfemError(f"{where}: M has no coordinate (the matrix is empty); a square matrix [kg] with at least "
+                            "one row is needed")
     if pairs and "slide" in data:
         raise PatchfemError(f"{where}: contains `slide`, but [[structure.interface]] also defines where sliding "
                             "occurs: keep only one of these two descriptions")
@@ -126,7 +127,8 @@ def _of_matrices(data, pairs, pushed, forced, where) -> ModalBasis:
         faces = faces.reshape(-1, n) if faces.size % n == 0 else faces
     output = data.get("output", faces[0] if faces is not None and len(faces) else None)
     if output is None:
-        _lacks(data, "output (n,), what the accelerometer measures (or slide)", where)
+        _lacks(data, "output (n,), what the accelerometer measures; slide (n,) serves as output if output is missing",
+               where)
     force = None
     if forced:
         force = np.eye(n)[pushed - 1] if pushed else data.get("force", output)

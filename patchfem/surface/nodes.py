@@ -31,8 +31,9 @@ def placed(profile: Profile, x: np.ndarray, how: str = "auto") -> Profile:
             notes += (f"{profile.source}: {FITS}, {say(np.ptp(x))}, and is centred on it, which adds {say(shift)} to "
                       "x",)
         elif how == "auto":
-            notes += (f"{profile.source}: x from {say(there[0])} to {say(there[-1])} does not cover the patch, "
-                      f"{say(x[0])} to {say(x[-1])}: the trace is centred on the patch, which adds {say(shift)} to x",)
+            notes += (f"{profile.source}: the trace, from x = {say(there[0])} to {say(there[-1])} in the file, does "
+                      f"not cover the patch, from {say(x[0])} to {say(x[-1])}; the trace is centred on the patch, "
+                      f"which adds {say(shift)} to x",)
     there = there + shift
     _demand(profile.source, there, x)
     first = max(int(np.searchsorted(there, x[0], "right")) - 1, 0)

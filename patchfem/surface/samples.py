@@ -9,7 +9,8 @@ LONGEST = 10.0  # [m] beyond which a unit must be wrong
 SHORTEST = 1e-9  # [m]
 ATOM = 1e-10  # [m], the width of one: heights that span less were not measured
 TRIMMED = 10, 100  # heights from which on, and of how many, the highest and the lowest may stand out
-METRES, GIVEN = "the file gives both in metres", "taken in the units that were given"  # who says the units
+METRES = "in the file, heights and length are in metres"  # who says the units
+GIVEN = "heights and length were read in the given units"
 
 
 def checked(path, x, z, at, factors: tuple, stated: str = "") -> Profile:

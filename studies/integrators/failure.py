@@ -1,8 +1,8 @@
-"""Why did mass 2 of Figs 17 to 20 move before its friction was overcome, and what prevents this?
+"""Why did mass 2 of Figures 17 to 20 move before its friction was overcome, and what prevents this?
 
-The method accepted steps that violate the friction law: the force was wrong by up to 5.4, where the friction limit is
-3. A friction law that can stick prevents this: a law with a static branch, or elastic-plastic friction that unloads on
-reversal.
+The method of the report accepted time steps that violate the friction law: the error of the friction force reached 5.4,
+although the friction limit is only 3. A friction law that can stick prevents this error: a law with a static branch, or
+elastic-plastic friction that unloads on reversal.
 
 The report solves each step of (3.10) by iteration and accepts it when the displacement, later the speed, stops
 changing. In a step of h the end force moves the mass by F h^2/6 and its speed by F h/2 only, so with h = .05 a

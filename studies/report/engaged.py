@@ -1,10 +1,10 @@
-"""What suppressed yaw and rocking in Fig. 27, and would the coherence have distinguished friction from a damper?
+"""What suppressed yaw and rocking in Figure 27, and would the coherence have distinguished friction from a damper?
 
 The normal stiffness of the flat pieces suppressed rocking: no test was strong enough to overcome it. Friction away from
-the axis suppressed yaw, completely before slip. While the block slides, the yaw peak keeps nearly its full height with
-a single contact point, 0.20 of this height with a patch of 12.7 mm, and 0.10 with two patches 20 mm apart. The
-coherence would have distinguished friction from a damper: its mean is 0.75 to 0.76 if friction gives critical damping,
-and 0.99 if a damper does.
+the axis suppressed yaw, completely before slip. While the block slides, the height of the yaw peak, divided by the
+height without friction, is nearly 1 with a single contact point, 0.20 with a patch of 12.7 mm, and 0.10 with two
+patches 20 mm apart. The coherence would have distinguished friction from a damper: its mean is 0.75 to 0.76 if friction
+gives critical damping, and 0.99 if a damper does.
 
 Random base of 20 to 400 Hz for 8 s, H1 of the turn of each mode over the base, in windows of 1 s. Held is 1 g rms,
 sliding 5 g rms; three records of the latter leave yaw 0.16 to 0.20 and 0.08 to 0.10 of its peak. A point on the axis

@@ -1,9 +1,9 @@
-"""What does Fig. 13 of the report show?
+"""What does Figure 13 of the report show?
 
-The figure shows the weight of a bond along the path, phi(R/eps) of eq. 2.14, for several orders p. The area under each
-curve is 1, so p changes where along the path the force builds up, but not the friction in steady sliding. For p = 0 the
-weight falls from 1. For p = 1 and 2 the weight first rises from 0 to 0.3679 and 0.2707 at R = p eps: it is largest
-after a path of p bond lengths.
+The figure shows the weight of a bond along the path, phi(R/eps) of equation 2.14, for several orders p. The area under
+each curve is 1, so p changes where along the path the force builds up, but not the friction in steady sliding. For p =
+0 the weight falls from 1. For p = 1 and p = 2 the weight first rises from 0. The weight has its maximum after a path of
+p bond lengths, at R = p eps: 0.3679 for p = 1 and 0.2707 for p = 2.
 
 p = -0.5 is infinite at the start. Nine tenths of the force are gone after R/eps = 1.35, 2.30, 3.89 and 5.32. Of the
 print only the caption could be read, neither axes nor the values of p: these p span the kinds of curve that 2.14 has.

@@ -1,8 +1,8 @@
-"""What does Fig. 14 of the report show?
+"""What does Figure 14 of the report show?
 
-The figure shows the weight of a bond across the path, W(eta/rho) of eq. 2.15. The weight is a normal density: 0.3989 on
-the path, 0.2420 at a distance rho from the path and 0.0540 at 2 rho. 68.3 and 95.4 % of a bond's total weight lie
-within the distances rho and 2 rho of the path.
+The figure shows the weight of a bond across the path, W(eta/rho) of equation 2.15. The weight is a normal density:
+0.3989 on the path, 0.2420 at a distance rho from the path and 0.0540 at 2 rho. 68.3 and 95.4 % of a bond's total weight
+lie within the distances rho and 2 rho of the path.
 
 Over eta its area is rho, which 2.16 divides out, so where the pressure does not change across the path rho drops out
 of the law: only a pad narrower than a few rho or roughness finer than rho can show it. Of the print only the caption

@@ -1,8 +1,9 @@
-"""Does a released block come to rest after the time pi N0/w0, about 11 units, as eq. 3.11 and Fig. 15 say?
+"""Does a released block come to rest after the time pi N0/w0, about 11 units, as equation 3.11 and Figure 15 say?
 
-Partly. If N0 is rounded up to a whole number, eq. 3.11 is exact to 3e-16 of x0. The 11 units then follow from N0 = 7
-and w0 = 2 (10.996), or from N0 = 5 and w0 = 1.414 (11.107). The report prints N0 without rounding: w0 = 1 and k x0/F =
-8 then give N0 = 3.5 and a time of 10.996. At that time the block still moves; it rests at 12.566.
+Partly. If N0 is rounded up to a whole number, equation 3.11 is exact to 3e-16 of x0. The 11 units then follow from N0 =
+7 and w0 = 2 (10.996), or from N0 = 5 and w0 = 1.414 (11.107). The report prints N0 without rounding: w0 = 1 and k x0/F
+= 8 then give N0 = 3.5 and a time of 10.996. At the time 10.996 such a block still moves; it comes to rest at the time
+12.566.
 
 The report prints N0 = (k x0/F - 1)/2 without a word of rounding. (-1)^N0 is no real number then, and the size that goes
 with it is F/k whatever the start: every block would rest where friction just holds it. In truth the block stops at the
@@ -37,8 +38,8 @@ from patchfem.structure.drives import Piecewise
 
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
-REPRODUCED = ("in part: eq. 3.11 holds with N0 rounded up. As printed, it predicts rest too early for a block with w0 "
-              "= 1")
+REPRODUCED = ("in part: equation 3.11 holds with N0 rounded up. The equation as printed predicts rest too early for a "
+              "block with w0 = 1")
 READINGS = ((1.0, 8.0), (2.0, 14.5), (np.sqrt(2), 10.5))  # w0, k x0/F: three that give about 11
 END = 18.0
 

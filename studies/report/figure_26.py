@@ -1,4 +1,4 @@
-"""Does the rig without friction have the frequency response of Fig. 26, and would a random modal test find this
+"""Does the rig without friction have the frequency response of Figure 26, and would a random modal test find this
 response?
 
 Yes. The response has one dominant peak, that of the axial mode at 143.00 Hz, with 165 times the base acceleration. From

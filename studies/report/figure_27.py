@@ -1,4 +1,4 @@
-"""What does "nearly critically damped in the vicinity of 148 Hz" (Fig. 27) say about the rig?
+"""What does "nearly critically damped in the vicinity of 148 Hz" (Figure 27) say about the rig?
 
 The block slid during the whole modal test. A block that does not slip moves with the base, and its response has no
 peak. With a random base motion of 4.2 to 5.1 g rms the block slides by 0.5 to 1.9 mil rms, and one fitted mode is
@@ -35,7 +35,8 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
-REPRODUCED = ("in part: a mode is critically damped, but not at 148 Hz (with grooves its damping ratio there is 1.3). "
+REPRODUCED = ("in part: a mode is critically damped, but not at 148 Hz (in the model with grooves the damping ratio "
+              "at 148 Hz is 1.3). "
               "With a single contact point yaw is not suppressed")
 MIL, ONSET = 25.4e-6, 4.14  # of block.toml [g]
 POINT = '[normal]\nload = "26 lbf"\n\n[friction]\nlaw = "elastic-plastic"\nbond_length = "0.243 um"\n'

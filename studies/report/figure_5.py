@@ -1,10 +1,10 @@
-"""A slowly moving frame rubs a block. Does the block ring as in Fig. 5, or is the ringing an artefact of Euler's
+"""A slowly moving frame rubs a block. Does the block ring as in Figure 5, or is the ringing an artefact of Euler's
 method?
 
 The block rings in the exact solution too, at its own natural frequency, which is ten times that of the frame. The first
-swing has an amplitude of 0.137 a0, where a0 is the amplitude of the frame; the amplitude of each further swing is 0.939
-of the amplitude of the swing before. Euler's method exaggerates the first amplitude to 0.156 a0 with a step of 0.1/w0,
-and to 0.190 a0 with 0.2/w0.
+swing has an amplitude of 0.137 a0, where a0 is the amplitude of the frame; each further swing has 0.939 times the
+amplitude of the swing before. With Euler's method the first swing is too large: its amplitude is 0.156 a0 with a time
+step of 0.1/w0, and 0.190 a0 with a time step of 0.2/w0.
 
 Equations 2.4 and 2.5 with the report's numbers: friction 0.1 K a0 tanh of the relative velocity over 0.01 a0 w0, the
 frame at 0.1 w0, 2 % of damping. Twice a cycle the frame turns and carries the block along, for 22 % of the time, until

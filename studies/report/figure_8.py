@@ -1,11 +1,11 @@
-"""Does a slightly flexible fixture explain the ringing in the measured friction loops of Fig. 8, and which measured
+"""Does a slightly flexible fixture explain the ringing in the measured friction loops of Figure 8, and which measured
 values does the fixture distort?
 
 Yes. The fixture distorts the bond length, but not the friction coefficient. After each reversal of the slider the piece
 breaks away at the speed of the slider and swings at the natural frequency of the fixture. The load cell then shows up
 to 1.14 times the friction force at 10 Hz and 1.28 times at 20 Hz (frequency of the slider). A fit that assumes a rigid
-fixture finds the right coefficient (0.300 for 0.3). The same fit finds a bond length of 3.5 um, which comes from the
-compliance of the fixture alone.
+fixture finds the right friction coefficient (0.300; the true value is 0.3). The same fit finds a bond length of 3.5 um,
+but this length is only the compliance of the fixture.
 
 The report's set-up for these loops (Figs 6 to 8) is described without a number, so this is a made example: a piece of 1
 kg in a fixture of 9.87 MN/m and 1 % of critical damping, 500 Hz, rubbed under 26 lbf by a slider that moves 50 um at 2

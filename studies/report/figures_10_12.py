@@ -1,4 +1,5 @@
-"""Do two rubbing masses ring below resonance, as in Fig. 10, but not near or above resonance, as in Figs 11 and 12?
+"""Do two rubbing masses ring below resonance, as in Figure 10, but not near or above resonance, as in Figures 11 and
+12?
 
 Yes. At a drive frequency of 0.1 w0, the rubbed mass reverses its motion about 14 times a cycle; the motion of the
 driven mass stays within 5 % of a sine. From 0.5 w0 on, each mass reverses about twice a cycle. At w0 the motion of the

@@ -1,10 +1,11 @@
-"""Does a rig whose surfaces ride up the flanks of grooves move as in Figs 28 and 29: distorted at 5 g, and stable or
+"""Does a rig whose surfaces ride up the flanks of grooves move as in Figures 28 and 29: distorted at 5 g, and stable or
 unstable at 8 g?
 
-Partly. At 143 Hz the block stays at 0.83 mil at 7.9 g and runs away at 8.0 g after 9 cycles. With 2 % more friction the
-block stays at 0.82 mil at 8 g. The real rig was unstable at 8 g in one series and stable in a later series. Computed
-peaks of acceleration and displacement (readings in brackets): 6.9 g and 0.39 mil (8.4 and 0.44) at 135 Hz and 5 g; 8.4
-g and 0.49 mil (9.5 and 0.30) at 135 Hz and 6 g; 7.2 g and 0.29 mil (6.0 and 0.23) at 143 Hz and 5 g.
+Partly. At 143 Hz and 7.9 g the amplitude of the block stays at 0.83 mil; at 8.0 g the block runs away after 9 cycles.
+With 2 % more friction the amplitude stays at 0.82 mil at 8 g. The real rig was unstable at 8 g in one series and stable
+in a later series. Computed peaks of acceleration and displacement (readings in brackets): 6.9 g and 0.39 mil (8.4 g and
+0.44 mil) at 135 Hz and 5 g; 8.4 g and 0.49 mil (9.5 g and 0.30 mil) at 135 Hz and 6 g; 7.2 g and 0.29 mil (6.0 g and
+0.23 mil) at 143 Hz and 5 g.
 
 The scene is grooved.toml: 80 um grooves, 13 um from peak to valley, that lift the block; two numbers were fitted at 143
 Hz, none to a runaway. The onset read at 143 Hz was 3.9 g in one series and 4.0 g in the other, 2.6 % apart, so the two

@@ -1,9 +1,9 @@
-"""The report reads from Figs 30 and 31 that the waves of 80 um are isotropic before the tests, that they are much lower
-after the tests, and that after the tests the waves along x are the lowest. Do the figures show this?
+"""The report reads from Figures 30 and 31 that the waves of 80 um are isotropic before the tests, that they are much
+lower after the tests, and that after the tests the waves along x are the lowest. Do the figures show this?
 
 Partly. The study cuts sets of four traces from a synthetic surface, on which wear multiplies the height of the waves by
-0.55 along x and 0.67 along y. In 7 of 20 such sets `compare` finds that the waves along x became lower, and in 5 sets
-that the waves along y became lower. In 3 sets `compare` finds the waves along x to be lower than those along y. A
+0.55 along x and 0.67 along y. In 7 of 20 such sets `compare` finds that the waves along x became lower; in 5 sets it
+finds the same for the waves along y. In 3 sets `compare` finds that the waves along x are lower than those along y. A
 single trace in each direction is too short to decide whether the report is right.
 
 The surface is made, so that its larger swings are the report's 13 to 18 um, and worn as in studies/wear/bands.py: 6 um

@@ -2,8 +2,8 @@
 differences?
 
 No. Wear changes an acceleration by 0.7 % (root mean square), often in the wrong direction; the repeated readings differ
-by 12 %. If the model also changes the friction coefficient to follow the onset of slip that the table gives, the
-acceleration changes by 2.7 %, and a difference of 10 % remains unexplained.
+by 12 %. In a second computation the friction coefficient also changes, so that the onset of slip is that given in the
+table. The acceleration then changes by 2.7 %, and a difference of 10 % remains unexplained.
 
 The model that comes nearest to Table 1 is run through the test series in the order of the print, 135, 143, 150 and
 155 Hz and then 135 and 143 Hz again, each run on the pieces as the one before wore them (`wear.start`). Assumed: 10

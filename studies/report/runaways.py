@@ -1,12 +1,12 @@
 """Which load path makes the rig run away at a lower level at 135 Hz than at 143 Hz, and not at all at 150 and 155 Hz,
 as in Table 1?
 
-A load path with friction far off the axis; this friction rotates the block in yaw. If this friction acts 0.25 to 0.30
+A load path with friction far off the axis: this friction rotates the block in yaw. If this friction acts 0.25 to 0.30
 radii of gyration off the axis, a block in grooves runs away at 7.0 to 6.0 g at 135 Hz, at 7.75 to 8.0 g at 143 Hz, and
-at 8.0 g at 150 and 155 Hz. The real rig ran away at 6 g at 135 Hz, at 8 g at 143 Hz, and not up to 8 g at 150 and 155
-Hz. But just below its runaway at 135 Hz the flexure of the computed rig moves by 2.4 to 3.3 mil; the reading was 0.3
-mil. In the repeated series the rig was stable at 135 Hz up to 8 g; no load path explains both series with the same
-parameters.
+at 8.0 g at 150 and 155 Hz. The real rig ran away at 6 g at 135 Hz and at 8 g at 143 Hz; at 150 and 155 Hz it did not
+run away at any level up to 8 g. But at 135 Hz, just below the level of runaway, the flexure moves by 2.4 to 3.3 mil in
+the computation and by 0.3 mil in the test. In the repeated series the rig was stable at 135 Hz up to 8 g; no load path
+explains both series with the same parameters.
 
 Everything else has the wrong order or too flat a one. Grooves leave at 8.25, 8.0, 7.75, 7.75 g. With nothing lifted,
 with kinetic friction 10 % lower, a damping of -0.02, bonds that grow, a weight whose load swings by 30 %, or the 0.09

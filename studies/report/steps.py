@@ -1,11 +1,11 @@
 """What would the recorder of the rig show while the level is raised step by step, and would another gauge factor
 explain the readings?
 
-The computed gauge signal is close to the readings of the gauge; the computed acceleration is lower than the readings.
-In a model with the second load path and a gauge factor of 1, the gauge readings of stable motions are 1.04 times the
-computed values on average. Another gauge factor does not explain the readings. For a model with spring and yaw, a fit
-at 143 Hz finds the gauge factor 0.55 (0.36 to 0.77). Compared with a factor of 1, this fit has a better score at 143 Hz
-(0.060 instead of 0.074), but a worse score at the other frequencies (0.193 instead of 0.166).
+The computed gauge signal is close to the readings of the gauge; the computed acceleration is lower than the readings of
+the accelerometer. In a model with the second load path and a gauge factor of 1, the gauge readings of stable motions
+are 1.04 times the computed values on average. Another gauge factor does not explain the readings. For a model with
+spring and yaw, a fit at 143 Hz finds the gauge factor 0.55 (0.36 to 0.77). Compared with a factor of 1, this fit has a
+better score at 143 Hz (0.060 instead of 0.074), but a worse score at the other frequencies (0.193 instead of 0.166).
 
 The series of Table 1 at 135 and 143 Hz, 200 cycles a level (assumed), the state carried over, drawn as the recorder had
 them: input, acceleration of the block, gauge at 1 V per mil (report, 4.C: "approximately"). At 143 Hz the gauge shows

@@ -1,10 +1,10 @@
 """Would frequency sweeps from 130 to 160 Hz, at levels below 5 g, have shown that slip begins at the same level at all
 frequencies, as the report says?
 
-Yes. In each of three models the acceleration becomes distorted at nearly the same level at all frequencies, as in the
-report. In the report this level is 4 g. In the models this level is 4.39 to 4.40 g for a rigid block that begins to
-slip at 4.14 g. From 136 Hz on this level is 4.19 to 4.38 g for a block in grooves (slip from 4.20 g), and 4.24 to 4.37
-g with a second load path (slip from 3.95 g).
+Yes. In each of three models the acceleration becomes distorted at nearly the same level at all frequencies. The report
+says the same of the rig and gives the level 4 g. The level is 4.39 to 4.40 g in the model of a rigid block, which
+begins to slip at 4.14 g. From 136 Hz on, the level is 4.19 to 4.38 g in the model with grooves (slip from 4.20 g), and
+4.24 to 4.37 g in the model with a second load path (slip from 3.95 g).
 
 The level of slip is that of the friction over the mass, whatever the frequency, because the friction rides with the
 base; what changes with frequency is how much the block moves then. Sweeps of 15 Hz/s (assumed), in stretches of ten

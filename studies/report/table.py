@@ -92,9 +92,10 @@ def table(found: list, seconds: dict) -> str:
         f"{sum(known):.0f} s. A dash means that the time was not measured yet, or that the study needs a file or "
         "another program. "
         f"Studies that take more than {LONG} s are marked \"long\".", "",
-        f"{len(figures)} of the studies compute figures of the report. {yes} of these studies reproduce their figure "
-        "completely, the others only a part of their figure. [The ten conclusions of the report](conclusions.md) have "
-        "their own table.", "", "Table 1 of the report lists measured accelerations and displacements of the rig. "
+        f"{len(figures)} of the studies try to reproduce a figure (a diagram) of the report. {yes} of these studies "
+        "reproduce the whole figure; the other studies reproduce a part of the figure. [The ten conclusions of the "
+        "report](conclusions.md) have their own table.", "",
+        "Table 1 of the report lists measured accelerations and displacements of the rig. "
         "The score of a model is the root mean square of ln(computed/measured) for Table 1. Three scores separated "
         "by slashes are those of all readings, of the accelerations and of the displacements.", "",
         "| study | question | answer | computing time [s] | is the figure of the report reproduced? |",

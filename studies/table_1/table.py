@@ -22,8 +22,10 @@ from patchfem.campaigns.rows.nulls import NULLS, predicted
 UNITS = {"static": "", "stiffness": "MN/m", "damping": "kN s/m", "slide": "", "accelerometer": "", "load": "N",
          "amplitude": "um", "acceleration_gain": "", "share": "", "mass": "", "factor": ""}
 SIZES = {"stiffness": 1e-6, "damping": 1e-3, "amplitude": 1e6}
-SHORT = {"static": "μ", "stiffness": "k", "damping": "c", "slide": "yaw", "accelerometer": "seen", "load": "N",
-         "amplitude": "A", "acceleration_gain": "gain", "share": "rods", "mass": "tips", "factor": "worn"}
+SHORT = {"static": "μ", "stiffness": "k", "damping": "c", "slide": "yaw arm", "accelerometer": "yaw in accelerometer",
+         "load": "N", "amplitude": "A", "acceleration_gain": "gain", "share": "rods", "mass": "tips", "factor": "worn"}
+TITLES = {"damper, yaw seen": "damper, yaw in the accelerometer",
+          "path of Fig. 27, yaw not seen": "path of Fig. 27, yaw not in the accelerometer"}  # of models, as printed
 BEFORE = (  # (rung, reading), its scores in the ladder before this one: at 143 Hz, 135 to 155 Hz, left out; its starts
     ("spring and yaw", ROOT2, ".074 / .082 / .051", ".166 / .138 / .255", ".179 / .132 / .287", 8),
     ("second path", STUCK, ".063 / .065 / .058", ".186 / .156 / .284", ".298 / .140 / .569", 8),
@@ -94,10 +96,15 @@ def numbers(row: dict) -> str:
     for key, value, end in zip(row["keys"], row["values"], row["at_bound"]):
         name = key.rpartition(".")[2]
         shown = 0.0 if end == "low" and abs(value * SIZES.get(name, 1)) < 1e-3 else value * SIZES.get(name, 1)
-        parts.append(f"{SHORT[name]} {shown:.3g} {UNITS[name]}".strip() + (f" ({end} end)" if end else ""))
-    if row["reading"] == STUCK:
-        parts.append(f"[gain {row['gain']:.4g}]")
-    return ", ".join(parts)
+        parts.append(f"{SHORT[name]} = {shown:.3g} {UNITS[name]}".strip() +
+                     (f" ({end} end of its range)" if end else ""))
+    given = f"; not fitted: gain = {row['gain']:.4g}" if row["reading"] == STUCK else ""
+    return ", ".join(parts) + given
+
+
+def titled(rung: str) -> str:
+    """The name of a model as it is printed."""
+    return TITLES.get(rung, rung)
 
 
 def found(row: dict) -> str:
@@ -123,21 +130,23 @@ def tables(rows: dict) -> list:
 
 
 def _rungs(rows: dict) -> list:
-    out = ["| model | accelerometer shows | fitted numbers | starts that end in the best minimum | score at 143 Hz | "
-           "score at 135, 150, 155 Hz | score with each frequency left out | score if fitted to all rows | computing "
-           "time [s] |", "|---|---|---|---|---|---|---|---|---|"]
+    out = ["| model | accelerometer shows | number of fitted parameters: their values | starts that end in the best "
+           "minimum | score at 143 Hz | score at 135, 150, 155 Hz | score with each frequency left out | score if "
+           "fitted to all rows | computing time [s] |", "|---|---|---|---|---|---|---|---|---|"]
     for name, factor, fitted, held, left, whole in nulls():
-        said = {"constant": "constant x input", "power_input": "power of input",
-                "power_input_frequency": f"input^{factor['input']:.2f} frequency^{factor['frequency']:.2f}"}[name]
-        out.append(f"| none: {said} | | | | {three(fitted)} | {three(held)} | {three(left)} | {three(whole)} | |")
+        said = {"constant": "constant x input", "power_input": "constant x a power of the input",
+                "power_input_frequency": f"constant x input^{factor['input']:.2f} x "
+                f"frequency^{factor['frequency']:.2f}"}[name]
+        out.append(f"| without mechanics: {said} "
+                   f"| | | | {three(fitted)} | {three(held)} | {three(left)} | {three(whole)} | |")
     for rung, one in RUNGS.items():
         for reading in one.readings:
             row = rows.get((rung, reading, "143", ""))
             if row is None:
-                out.append(f"| {rung} | {reading} | not run | | | | | | |")
+                out.append(f"| {titled(rung)} | {reading} | not run | | | | | | |")
                 continue
             every = rows.get((rung, reading, "all", ""))
-            out.append(f"| {rung} | {reading} | {len(row['values'])}: {numbers(row)} | {found(row)} | "
+            out.append(f"| {titled(rung)} | {reading} | {len(row['values'])}: {numbers(row)} | {found(row)} | "
                        f"{three(row['fitted'])} | {three(row['others'])} | {_marked(rows, rung, reading)} | "
                        f"{three(every and every['fitted'])} | {row['seconds']:.0f} |")
     return out
@@ -161,12 +170,13 @@ def _left(rows: dict) -> list:
     cells = cells_of(TABLE)
     every = np.ones(cells.row.size, bool)
     out = ["| model | accelerometer shows | score of all readings | score of accelerations | score of displacements | "
-           "samples better than the constant: all, accelerations, displacements | samples better than the power of "
-           "input and frequency: accelerations | fits whose best minimum was found twice | parameters at an end of "
-           "their range |", "|---|---|---|---|---|---|---|---|---|"]
+           "fraction of samples in which the model is better than the constant: all, accelerations, displacements | "
+           "fraction of samples in which its accelerations are better than those of the power law | "
+           "fits whose best minimum was found twice | parameters at an end of their range |",
+           "|---|---|---|---|---|---|---|---|---|"]
     null = {name: null_left(one) for name, one in RIVALS.items()}
-    told = {"constant": "constant x input", "strong": "power of input and frequency"}
-    listed = [(f"none: {told[name]}", "", None, logs) for name, logs in null.items()] + shared(rows)
+    told = {"constant": "constant x input", "strong": "power law in input and frequency"}
+    listed = [(f"without mechanics: {told[name]}", "", None, logs) for name, logs in null.items()] + shared(rows)
     for rung, reading, folds, logs in listed:
         own, drawn = scores(cells, logs, every), intervals(cells, logs, every)
         cellular = [f"{short(own[kind])} ({short(drawn[kind][0])} to {short(drawn[kind][1])})" for kind in KIND]
@@ -174,16 +184,19 @@ def _left(rows: dict) -> list:
         of_constant = " / ".join(f"{beats['constant'][kind]:.2f}" for kind in KIND) if folds else ""
         of_strong = f"{beats['strong']['acceleration']:.2f}" if folds else ""
         twice = f"{sum(fold['valleys']['best'] > 1 for fold in folds)} of 4" if folds else ""
-        out.append(f"| {rung} | {reading} | {' | '.join(cellular)} | {of_constant} | {of_strong} | {twice} | "
+        out.append(f"| {titled(rung)} | {reading} | {' | '.join(cellular)} | {of_constant} | {of_strong} | {twice} | "
                    f"{_ends(folds) if folds else ''} |")
     return out
 
 
 def _ends(folds) -> str:
     """Which numbers lie at an end of their range in which folds."""
-    parts = [f"{SHORT[key.rpartition('.')[2]]} {end} without {fold['protocol'].split()[1]}" for fold in folds
-             for key, end in zip(fold["keys"], fold["at_bound"]) if end]
-    return ", ".join(parts) or "none"
+    parts = []
+    for fold in folds:
+        ends = [f"{SHORT[key.rpartition('.')[2]]} at the {end} end of its range"
+                for key, end in zip(fold["keys"], fold["at_bound"]) if end]
+        parts += [f"fit without {fold['protocol'].split()[1]} Hz: {', '.join(ends)}"] if ends else []
+    return "; ".join(parts) or "none"
 
 
 def _before(rows: dict) -> list:
@@ -194,7 +207,7 @@ def _before(rows: dict) -> list:
         row = rows.get((rung, reading, "143", ""))
         if row is None:
             continue
-        out += [f"| {rung} | {reading} | before | {' | '.join(before)} | {starts} |",
+        out += [f"| {titled(rung)} | {reading} | before | {' | '.join(before)} | {starts} |",
                 f"| | | after | {three(row['fitted'])} | {three(row['others'])} | {_marked(rows, rung, reading)} | "
                 f"{row['valleys']['starts']} |"]
     return out
@@ -207,8 +220,10 @@ def _placebos(rows: dict) -> list:
         row, real = rows.get((rung, reading, protocol, placebo)), rows.get((rung, reading, protocol, ""))
         if not placebo or row is None:
             continue
+        kind, _, value = placebo.rpartition(".")[2].partition("=")
+        kind = "frequency of the yaw mode" if kind == "frequency" else kind
         instead = f"{three(real and real['fitted'])}, {three(real and real['others'])}"
-        out.append(f"| {rung}: {placebo.rpartition('.')[2].replace('=', ' ')} | {instead} | {three(row['fitted'])} | "
+        out.append(f"| {titled(rung)}: {kind} = {value} | {instead} | {three(row['fitted'])} | "
                    f"{three(row['others'])} |")
     return out
 
@@ -229,29 +244,32 @@ def head(rows: dict) -> list:
         "weight on a cable acts as a second spring, but the fit sets the stiffness of this spring to 0; the scores of "
         f"this model are {three(one['weight']['fitted'])} at 143 Hz.",
         "**Models fitted to 143 Hz alone.** The scores at 135, 150 and 155 Hz are "
-        f"{none['constant'][0]} for a constant times the input; {none['power_input_frequency'][0]} for a power of "
-        f"input and frequency; {three(one['spring']['others'])} for \"spring and yaw\" with √2 x fundamental (three "
-        f"fitted numbers); {three(one['path']['others'])} for \"path of Fig. 27\" with peak x stuck (three fitted "
-        f"numbers; the path itself is not fitted); and {three(one['root']['others'])} for \"path of Fig. 27\" with "
-        "√2 x fundamental.",
+        f"{none['constant'][0]} for a constant times the input; {none['power_input_frequency'][0]} for a power "
+        f"law in input and frequency; {three(one['spring']['others'])} for \"spring and yaw\" with √2 x fundamental "
+        f"(three fitted parameters); {three(one['path']['others'])} for \"path of Fig. 27\" with peak x stuck (three "
+        f"fitted parameters; the path itself is not fitted); and {three(one['root']['others'])} for \"path of Fig. "
+        "27\" with √2 x fundamental.",
         "Compared with a constant times the input, \"spring and yaw\" predicts the displacements better and the "
         "accelerations worse. \"Path of Fig. 27\" predicts displacements and accelerations better than the constant "
-        "does. Its advantage in the accelerations is small: if the rows of Table 1 are resampled (bootstrap), \"path "
+        "does. The advantage of \"path of Fig. 27\" in the accelerations is small: if the rows of Table 1 are "
+        "resampled (bootstrap), \"path "
         f"of Fig. 27\" predicts the accelerations better than the constant in {draws[0]:.0f} % (peak x stuck) and "
         f"{draws[1]:.0f} % (√2 x fundamental) of the samples. \"Path of Fig. 27\" predicts the displacements worse "
-        "than \"spring and yaw\" does. At 143 Hz all scores of \"path of Fig. 27\" are worse: "
+        "than \"spring and yaw\" does. At 143 Hz all scores of \"path of Fig. 27\" are worse than those of \"spring "
+        "and yaw\": "
         f"{three(one['path']['fitted'])}, compared with {three(one['spring']['fitted'])} for \"spring and yaw\"."]
     if "-" not in left.values():
         said.append(
             "**Each frequency left out in turn.** The scores are "
-            f"{none['constant'][1]} for a constant times the input; {none['power_input_frequency'][1]} for a power of "
-            f"input and frequency; {left['spring']} for \"spring and yaw\" with √2 x fundamental; and {left['path']} "
-            "for \"path of Fig. 27\" with peak x stuck. The last two "
-            "models predict the displacements better than the constant and the power do. The scores of \"second path\" "
-            f"(a spring and a damper) with peak x stuck are {left['damped']}. They are no better than the scores of "
-            "the constant, because the fit without 143 Hz sets \"yaw\" to 0. If the accelerometer also measures the "
-            f"yaw mode, the scores of this model are {left['seen']}. For the accelerations no model is better than the "
-            "power of input and frequency, although this power law explains nothing.")
+            f"{none['constant'][1]} for a constant times the input; {none['power_input_frequency'][1]} for a power "
+            f"law in input and frequency; {left['spring']} for \"spring and yaw\" with √2 x fundamental; and "
+            f"{left['path']} for \"path of Fig. 27\" with peak x stuck. The last two models predict the displacements "
+            "better than the constant and the power law do. The scores of \"second path\" (a spring and a damper) with "
+            f"peak x stuck are {left['damped']}. These scores are no better than the scores of the constant, because "
+            "the fit without 143 Hz sets \"yaw arm\" to 0. If the accelerometer also measures the yaw mode, the "
+            "scores of "
+            f"this model are {left['seen']}. No model predicts the accelerations better "
+            "than the power law in input and frequency, although this power law contains no mechanics.")
     said.append(
         "**What the data leave open.** The second path may be a spring or the flank of a groove, with or without a "
         "damper: at the other frequencies the scores of the model with grooves, lift and yaw are "

@@ -1,8 +1,12 @@
 """Backbones of scenes: three ways beside each other and beside closed forms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from scene_texts import IWAN, shaken
+from scene_texts import IWAN, JOINT_SHAKEN, shaken
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
 
 import patchfem as pf
 from patchfem.campaigns import backbone as backbone_module
@@ -57,6 +61,48 @@ def test_the_balance_of_an_iwan_joint_keeps_its_bars_and_the_decay_follows_it():
     off = np.abs(decay.damping - balance.damping[inside])
     assert inside.sum() >= 4 and (off < decay.damping_error + 2 * change).all()
     assert np.abs(decay.frequency - balance.frequency[inside]).max() < 0.1
+
+
+def test_exact_an_amplitude_lies_between_samples():
+    for turned in (0.0, 0.3, 0.5):
+        motion = np.array([0.0, 1e-6, 0.0, 1e-9]) * np.exp(2j * np.pi * turned / 4096 * np.arange(4))
+        assert backbone_module._largest(motion) / 1.001e-6 == pytest.approx(1, rel=1e-11)
+
+
+def test_exact_a_motion_of_the_amplitude_asked_for_comes_back_after_a_cycle():
+    """The largest of 4096 samples was taken for the amplitude, 3e-7 of it too small: the motion fell within a cycle."""
+    found = backbone(model('law = "tanh"\nreference_speed = "0.5 m/s"'), "", a := [6e-4, 8e-4, 1.2e-3], ("balance",))
+    one = found.curves["balance"]
+    for start, f, zeta in zip(a, one.frequency, one.damping):
+        damping = 2 * (0.002 * OMEGA - zeta * 2 * np.pi * f)
+        end = solve_ivp(lambda t, y, c=damping: (y[1], -OMEGA**2 * y[0] - c * y[1] - 60 * np.tanh(y[1] / 0.5)),
+                        (0, 1 / f), [start, 0.0], rtol=1e-12, atol=1e-18).y[:, -1]
+        assert end[0] / start == pytest.approx(1, abs=1e-9)
+
+
+def test_exact_an_error_between_two_larger_ones_is_no_smaller_than_the_smaller():
+    error = np.array([[3.0, 0.1, 2.0, 5.0, 4.0, 1.0], [1.0, 2.0, np.nan, 3.0, 0.0, np.nan]])
+    assert backbone_module._undipped(error) == pytest.approx(
+        np.array([[3.0, 2.0, 2.0, 5.0, 4.0, 1.0], [1.0, 2.0, 2.0, 3.0, 0.0, np.nan]]), nan_ok=True)
+    assert (backbone_module._undipped(error[:, :2]) == error[:, :2]).all()
+
+
+def test_a_decay_whose_force_turns_between_two_samples_keeps_its_bars():
+    """The coarser run has as many samples, so what they leave open of the frequency was no part of its error."""
+    found = backbone(model('law = "tanh"\nreference_speed = "3 mm/s"'), "", np.geomspace(3e-3, 6e-3, 9), ("decay",))
+    one, damping = found.curves["decay"], 2 * 0.002 * OMEGA
+
+    def turning(t, y):
+        return y[1]
+
+    own = solve_ivp(lambda t, y: (y[1], -OMEGA**2 * y[0] - damping * y[1] - 60 * np.tanh(y[1] / 3e-3)), (0, 0.3),
+                    [8e-3, 0.0], "LSODA", events=turning, rtol=1e-11, atol=1e-14)
+    time, swing = own.t_events[0], np.abs(np.diff(own.y_events[0][:, 0]))
+    middle = (time[1:] + time[:-1]) / 2
+    order = slice(-2, 0, -1)
+    law = CubicSpline(np.log(swing[order] / 2), 1 / (middle[2:] - middle[:-2])[::-1])(np.log(one.amplitude))
+    assert one.amplitude.size == 9 and (np.abs(one.frequency - law) <= one.frequency_error).all()
+    assert np.abs(one.frequency / law - 1).max() > 3e-9 and (one.frequency_error < 2e-5 * law).all()
 
 
 def test_exact_rigid_friction_by_balance_and_by_decay():
@@ -165,6 +211,29 @@ coefficient = "40 N s/m"
     s = 2j * np.pi * one["decay"].frequency[0]
     s -= s.imag * one["decay"].damping[0] / np.sqrt(1 - one["decay"].damping[0]**2)
     assert abs(np.linalg.det(k + c * s + m * s**2)) < 1e-9 * np.linalg.det(k)
+
+
+def test_a_decay_behind_a_stiff_contact_lasts_some_swings_in_slip():
+    """50 cycles of the held mode, 76 times as fast as the free one, were no swing in slip: the curve had no value."""
+    found = backbone(pf.build(CROWNED), "", [2e-2, 3e-2], ("decay",)).curves["decay"]
+    assert found.amplitude.tolist() == [2e-2, 3e-2] and (found.frequency_error < 1e-3 * found.frequency).all()
+    lost = 4 * 0.3 * 2e3 * 3e-2 / (2 * np.pi * 0.5 * OMEGA**2 * 3e-2**2)  # of Coulomb friction in gross slip
+    assert found.damping[-1] == pytest.approx(0.002 + lost, rel=0.02)
+
+
+def test_a_long_decay_is_told_before_it_begins(monkeypatch):
+    """50 cycles that take a second tell 40 s of the further ones; nothing is told of a short one."""
+    told, run = [], backbone_module.ENGINES["piecewise"].run
+    backbone(model(PLASTIC, **{"structure.mode.axial.damping": 1e-3}), "", [1e-5, 1e-3], ("decay",), told.append)
+    assert told == ["decay"]
+    monkeypatch.setattr(type(backbone_module.ENGINES["piecewise"]), "run", property(lambda engine: lambda *given: (
+        replace(run(*given), seconds=given[0].rig.cycles / 50))))
+    told.clear()
+    backbone(model(PLASTIC, **{"structure.mode.axial.damping": 1e-3}), "", [1e-5, 1e-3], ("decay",), told.append)
+    assert told[0] == "decay" and len(told) > 1
+    for said in told[1:]:
+        cycles = int(said.split()[2])
+        assert cycles >= 500 and said == f"decay over {cycles} cycles: about {cycles / 25:.2g} s of computing time"
 
 
 def test_amplitudes_stay_within_the_stop():
@@ -370,6 +439,26 @@ def test_always_the_mesh_is_in_the_bars_of_micro_slip():
     assert fine.micro == pytest.approx(3, abs=0.3) and fine.expected == 3 and coarse.micro is None
     assert any("the exponent of micro-slip cannot be determined" in note for note in coarse.notes)
     assert any("higher than the frequencies by balance" in note for note in fine.notes)
+
+
+BEHIND_BONDS = JOINT_SHAKEN.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "100 um"').replace(
+    "kinetic = 0.2\n", "").replace("damping = 0.01", "damping = 0.05")
+FEW = "[contact.shear]", 'element_size = "6 mm"\n[contact.shear]'
+
+
+def test_errors_say_what_they_leave_out_of_the_mesh():
+    """Bonds behind pieces that give way have no steady loop: their errors hold the change on a coarser mesh, and where
+    there is none, no error of the mesh."""
+    a = [1e-6, 2e-6]
+    found, few = (backbone(pf.build(one), "", a, ("decay",)) for one in (BEHIND_BONDS, BEHIND_BONDS.replace(*FEW)))
+    (said,), (unmeshed, bare) = ([note for note in one.notes if "the errors of" in note] for one in (found, few))
+    assert said.startswith("the errors of method decay include the change on a coarser mesh, but no estimate of the")
+    assert said.endswith("because the hysteresis loop of this friction law is not known without a computation in time")
+    assert unmeshed.endswith("too few elements for a coarser mesh; leave out contact.element_size")
+    assert bare.startswith("the errors of method decay include no error of the mesh, because the hysteresis loop of")
+    assert (found.curves["decay"].frequency_error > few.curves["decay"].frequency_error).all()
+    plain = backbone(pf.build(JOINT_SHAKEN.replace("kinetic = 0.2\n", "")), "", a, ("balance",))
+    assert plain.curves and not any("the errors of" in note for note in plain.notes)
 
 
 def test_the_held_frequency_is_that_of_the_stiffness_which_a_run_prints():

@@ -109,7 +109,7 @@ def test_the_verb_prints_what_a_law_leaves_out(tmp_path, monkeypatch):
     for one, words in zip(sizes, ("by at most {} (at {}) and by {} rms", "law dissipates per cycle is up to {} ")):
         largest, rms = (f"{plain(100 * abs(one[name]), 2)} %" for name in ("largest", "rms"))
         assert words.format(largest, short(one["at"], "m", 3), rms) in answer.out
-    for word in ("9 amplitudes of the slide, 10 nm to 200 nm", "iwan", "bouc-wen", "elastic-plastic", "by at most",
+    for word in ("9 amplitudes of the slide from 10 nm to 200 nm", "iwan", "bouc-wen", "elastic-plastic", "by at most",
                  "A mesh coarser than the present one"):
         assert word in answer.out
     assert sorted(one.name for one in (tmp_path / "out").iterdir()) == [

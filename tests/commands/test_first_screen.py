@@ -163,9 +163,9 @@ def test_exact_a_level_between_two_others_does_not_claim_the_tolerance():
         return least_known(SimpleNamespace(plan=SimpleNamespace(model=model), measures=measures))
 
     jump, fine = Measure(5 * 9.80665, "m s-2", 9.80665, 9.80665), Measure(2.0, "J", 1e-2)
-    between = "jump_level, 5.0 ± 1.0 g, has an error of one step between drive levels"
+    between = "jump_level, 5.0 ± 1.0 g, has an error of one step between the drive levels of the scene"
     assert said(jump_level=jump, loop_area=fine) == "Every measure with an error estimate meets the tolerance 0.01; " \
-        f"closest to the tolerance is loop_area, 2.000 ± 0.010 J; {between}, which the scene sets."
+        f"closest to the tolerance is loop_area, 2.000 ± 0.010 J; {between}."
     assert said(jump_level=jump) == f"{between}."
     assert said(loop_area=fine).endswith("closest to the tolerance is loop_area, 2.000 ± 0.010 J.")
     assert said(jump_level=jump, loop_area=Measure(2.0, "J", 1.0)) == ""
@@ -217,7 +217,7 @@ def test_always_a_bench_says_whether_it_slipped():
 
     done = Outcome.DONE.sentence
     assert said(1.5e-6, 1e-9) == \
-        f"{done} Slip amplitude 1.5000 ± 0.0010 um, half peak-to-peak, averaged over the interface."
+        f"{done} Slip amplitude (half the peak-to-peak slip, averaged over the interface): 1.5000 ± 0.0010 um."
     for holds in ((1e-12, 2e-12), (1e-23, 1e-33), (1e-11, None)):
         assert said(*holds) == f"{done} The interface sticks: no slip in the last cycle."
     assert verdict({"outcome": "done", "kind": "bench", "measures": {}}) == done

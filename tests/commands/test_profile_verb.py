@@ -41,7 +41,7 @@ def test_exact_the_table(trace):
     assert answer.code == 0 and answer.err == ""
     lines = answer.out.splitlines()
     assert lines[0] == (f"{trace}: 4001 heights, 4 mm long, every 1 um, about the least-squares line; Gaussian filter "
-                        "at 250 um, half of it trimmed at each end, no filter for short waves")
+                        "at 250 um, half this length trimmed at each end, no filter for short waves")
     rows = {line.split()[0]: line.split()[1:] for line in lines[2:]}
     assert {"Pa", "Pq", "Pt", "Psk", "Pku", "Pdq", "Ra", "Rq", "Rp", "Rv", "Rz", "Rt", "Rsk", "Rku", "RSm", "Rdq", "Rk",
             "Rpk", "Rvk", "Mr1", "Mr2", "dominant_wavelength", "band_amplitude"} <= set(rows)

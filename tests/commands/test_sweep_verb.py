@@ -463,13 +463,13 @@ def test_exact_the_answer_begins_with_the_measure_that_is_asked_for(tmp_path):
         mu = [float(row["friction.static"]) for row in csv.DictReader(file)]
     ends = re.search(r"have a secant stiffness from (\S+) N/mm to (\S+) N/mm, a loop area", answer).groups()
     assert [float(one) for one in ends] == pytest.approx(1e2 * np.quantile(mu, [0.05, 0.95]), rel=5e-3)
-    assert answer.startswith("Secant stiffness depends most on friction.static, which is involved in 100 %")
+    assert answer.startswith("Secant stiffness depends most on friction.static, which contributes to 100 %")
     assert answer == said.out.splitlines()[0]
     page = (tmp_path / "a/report.html").read_text("utf-8")
     assert data_of(page)["first"] == "secant_stiffness" and "--of secant_stiffness" in page
     again = cli("sweep", scene, *drawn, "--of", "pressure_peak", "-o", tmp_path / "a", "--resume")
     assert json.loads(data.read_text("utf-8"))["answer"].endswith(
-        "(no case has a value of pressure peak, so this describes other measures).")
+        "(no case has a value of pressure peak, so this answer describes other measures).")
     assert "no case has a value of pressure peak" in again.out
     assert pf.sweep(scene, {"friction.static": [0.1, 0.2]}, of="secant_stiffness").attrs["answer"].startswith(
         "Secant stiffness ranges from 10 N/mm to 20 N/mm")

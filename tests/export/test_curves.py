@@ -66,7 +66,7 @@ def test_exact_spans_of_a_curve():
 
 def test_exact_a_picture_of_a_folded_curve():
     text = pictures.draw(charts.curve(FOLDED))
-    for word in ("stable", "unstable", "fold", "drive frequency [Hz]", "half peak-to-peak [um]"):
+    for word in ("stable", "unstable", "fold", "drive frequency [Hz]", "half the peak-to-peak motion [um]"):
         assert f">{word}<" in text, word
     assert "stroke-dasharray" in text and pictures.draw(charts.curve(FOLDED)) == text
     said = charts.caption(FOLDED)
@@ -118,7 +118,7 @@ def test_exact_a_folded_curve_and_the_motion_at_its_top(written):
     """Of three motions at one frequency the measures are of the largest, which the curve found."""
     folder, data = written(STIFFENED + SWEEP.format(140, 180, 2))
     page = (folder / "report.html").read_text()
-    marks = charts_of(page)["Steady motion at the output", "half peak-to-peak"]["marks"]
+    marks = charts_of(page)["Steady motion at the output", "half the peak-to-peak motion"]["marks"]
     assert [mark["x"] for mark in marks if mark["name"] == "fold"] == pytest.approx(data.curve_fold.values)
     assert {mark["dash"] for mark in marks if mark["name"] == "unstable"} == {"dashed"} and data.curve_fold.size == 2
     top = float(data.curve_amplitude.max())
@@ -145,7 +145,7 @@ def test_exact_levels_on_the_page(written):
     assert [(int(n), int(g), word) for n, g, _, word in rows] == [
         (1, 3, "stuck"), (2, 5, "slips"), (3, 6, "slips"), (4, 5, "slips"),
         (5, 4, "slips"), (6, 3, "stuck")]
-    marks = charts_of(page)["Level by level", "half peak-to-peak"]["marks"]
+    marks = charts_of(page)["Level by level", "half the peak-to-peak motion"]["marks"]
     arrows = [(mark["name"], *mark["x"]) for mark in marks if mark["kind"] == "arrow"]
     assert arrows == [("raised", 5, 6), ("lowered", 6, 5), ("lowered", 5, 4)]
     assert data.level_drive.values == pytest.approx(9.80665 * np.array([3, 5, 6, 5, 4, 3]))

@@ -123,7 +123,7 @@ def test_refuses_a_table_of_a_sweep_that_is_not_whole(made, tmp_path, change):
     shutil.copytree(made / "s", tmp_path / "s")
     lines(tmp_path / "s", change)
     answer = cli("report", tmp_path / "s", "-o", tmp_path / "p.html")
-    assert answer.code == 2 and "its sweep cannot be read" in answer.err, answer
+    assert answer.code == 2 and "the sweep in this folder cannot be read" in answer.err, answer
 
 
 @pytest.mark.parametrize("name, value", [("sets", "5"), ("sets", "[5]"), ("scene", 'title = ["a"]'),

@@ -20,6 +20,8 @@ from patchfem.core import G_N, Outcome
 from patchfem.export import report
 from patchfem.export.drawing import charts
 from patchfem.export.pages import words
+from patchfem.export.pages.document import prose
+from patchfem.response.rows import TABLE as MOTION
 from patchfem.scene.keys.quantities import KINDS
 
 PERIOD, MIL = 1 / 143, 25.4e-6
@@ -190,12 +192,34 @@ def test_always_the_verdict_first_and_every_measure_listed(pages, name):
     assert set(data["summary"]["measures"]) <= set(Parsed(text).cells)
 
 
+@pytest.mark.parametrize("text, html", [
+    ("set `wear.jumps` or `a < b`", "set <code>wear.jumps</code> or <code>a &lt; b</code>"),
+    ("one ` alone & <b>", "one ` alone &amp; &lt;b&gt;"), ("`` and `a` and `b", "`` and <code>a</code> and `b"),
+    ("plain", "plain"), ("`a\nb`", "`a\nb`")])
+def test_exact_a_sentence_on_a_page_has_its_quoted_words_as_code(text, html):
+    assert prose(text) == html
+
+
+def test_always_no_sentence_of_a_page_shows_back_quotes(pages):
+    """Notes, warnings, captions and meanings of measures; a scene or a command is shown as it is written."""
+    key, stick = "`structure.travel`", MOTION["stick_fraction"].text
+    assert "`slip_amplitude`" in stick
+    data = base("rig", "steady", ["friction"], {"stick_fraction": measure(0.5, "1", 0.01)})
+    data["summary"]["notes"], data["summary"]["warnings"] = [f"raise {key}"], [f"lower {key}"]
+    data["means"] = {"stick_fraction": stick}
+    text = report.page(data)
+    assert text.count("<code>structure.travel</code>") == 2 and "as in <code>slip_amplitude</code>" in text
+    for whole in (text, *(page for _, page in pages.values())):
+        said = re.sub(r"(?s)<(script|style|pre)\b.*?</\1>", "", whole)
+        assert "`" not in said
+
+
 def test_always_captions_speak_of_what_the_run_has(pages):
     words = {name: captions(text) for name, (_, text) in pages.items()}
     assert "shear" not in words["patch"] and "cycle" not in words["patch"] and "coating" not in words["patch"]
-    assert "with their coatings" in words["rig"] and "4 frames of the last cycle" in words["rig"]
+    assert "with their coatings" in words["rig"] and "4 instants of the last cycle" in words["rig"]
     assert "over the last 3 cycles" in words["rig"] and "only reversals were kept" in words["rig"]
-    assert "frames of the run" in words["short"] and "last cycle" not in words["short"]
+    assert "instants of the run" in words["short"] and "last cycle" not in words["short"]
     assert "whole run" in words["bench"] and "cycle" not in words["bench"]
     coated = captions(report.page(patch(effects=("contact", "contact.coating"))))
     assert "with their coatings under the load." in coated

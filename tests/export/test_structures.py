@@ -126,7 +126,7 @@ def test_always_the_line_says_what_the_file_has_not(tmp_path, text, says):
      ".mat", "cannot be written with [structure.stiffening]"),
     (STRUCTURE.replace("[drive]", CUBIC + "[drive]"), ".npz", "cannot be written with [structure.stiffening]"),
     (POINT + WAVE + friction_of("tanh") + STRUCTURE, ".npz", "cannot be written under a load that changes"),
-    (POINT + WAVE + PLASTIC + STRUCTURE, ".npz", "cannot be written under a load that changes; leave that out"),
+    (POINT + WAVE + PLASTIC + STRUCTURE, ".npz", "cannot be written under a load that changes; remove this feature"),
     (POINT + "[normal.grooves]\nwavelength = \"80 um\"\namplitude = \"1 um\"\n" + friction_of("tanh") + STRUCTURE,
      ".npz", "cannot be written with [normal.grooves]"),
     (RUB, ".csv", "a structure is exported as .mat or .npz"),

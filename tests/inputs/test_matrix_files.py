@@ -195,7 +195,7 @@ BAD = {"a.mtx": ("hello\n", "cannot be read"), "b.mtx": ("1 2\n3 4\n", "is not a
        "i.mtx": ("0 1 2.0\n", "count from 1"), "j.mtx": ("1.5 1 2.0\n", "must be whole numbers"),
        "a.pch": ("$ nothing\n", "contains no DMIG card"),
        "b.pch": ("DMIG    KAAX    X\n", "b.pch:1: not a readable DMIG card"),
-       "c.pch": (f"DMIG    KAAX    {0:8d}{6:8d}{4:8d}\n", "it is complex"),
+       "c.pch": (f"DMIG    KAAX    {0:8d}{6:8d}{4:8d}\n", "the matrix is complex"),
        "d.pch": (punched("KAAX", K, True).replace("4.0", "4.x"), "not a readable DMIG card ('4.x"),
        "a.op4": ("nothing\n", "not a readable OUTPUT4 file"), "b.op4": ("", "contains no matrix"),
        "c.op4": (output4_text("KAAX", K, False, False).replace("       6       2KAAX", "       6       4KAAX"),

@@ -5,14 +5,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from scene_texts import CROWNED_JOINT, DRIVE, KILOGRAM, POINT, friction_of
+from scene_texts import CROWNED_JOINT, DRIVE, JOINT_SHAKEN, KILOGRAM, POINT, friction_of
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 import patchfem as pf
 from patchfem.campaigns.backbone import backbone
-from patchfem.response.decay_curve import curve_of, of_turns, turns
-from patchfem.runs.rig.decays import decay_of
+from patchfem.response.decay_curve import DecayCurve, _slope, _slopes, curve_of, of_turns, turns
+from patchfem.runs.patch.result import solve_all
+from patchfem.runs.rig import decays
+from patchfem.runs.rig.decays import decay_of, left_by_mesh
 
 RELEASED = DRIVE[:DRIVE.index('kind')] + 'kind = "free"\ndisplacement = "2 mm"\ncycles = 30\n'
 
@@ -24,6 +26,18 @@ def test_exact_a_viscous_decay_has_one_frequency_and_one_ratio(zeta):
     assert found.damping == pytest.approx(zeta, rel=1e-9)
     assert found.frequency == pytest.approx(own / (2 * np.pi), rel=1e-12)
     assert found.amplitude.size > 6 and (np.diff(found.amplitude) < 0).all()
+
+
+@pytest.mark.parametrize("count", [3, 4, 5, 7, 8, 40, 700])
+def test_exact_slopes_at_all_places_at_once_are_those_of_one_place_after_the_other(count):
+    """Straight at first, then bent, then with noise of which nobody tells: spans of all lengths, and both ends."""
+    k, r = np.arange(count), np.random.default_rng(count)
+    for values in (k / 4, np.where(k < count // 2, k / 4, k / 4 + (k - count // 2)**2 / 64), k + 0.1 * r.random(count)):
+        slope, error, span = _slopes(values)
+        one = [_slope(values, np.zeros(count), place) for place in range(1, count - 1)]
+        assert slope == pytest.approx(np.array([each[0] for each in one]), rel=1e-13)
+        assert error == pytest.approx(np.array([each[1] for each in one]), rel=1e-9, abs=1e-13)
+        assert (span == [each[2] for each in one]).all()
 
 
 def viscous(zeta: float, omega: float, samples: int):
@@ -42,7 +56,28 @@ def test_order_turns_lie_between_samples_to_the_fourth():
     assert off[0] < 1e-4 and 50 < off[0] / off[1] < 500
 
 
-def test_exact_between_its_points_a_curve_is_straight_and_outside_there_is_none():
+def test_always_between_its_points_a_curve_holds_a_damping_that_rises_with_the_amplitude():
+    """Of half swings 1/(1 + b k) the decrement of half a cycle over a whole one at any size a is artanh(a b), whatever
+    the places of the half swings."""
+    b, k = 0.1, np.arange(41)
+    found = curve_of(of_turns(np.append(np.pi * k, 41 * np.pi), np.cumsum(np.append(0, (-1.0)**k / (1 + b * k)))))
+    a = np.sqrt(found.amplitude[1:] * found.amplitude[:-1])
+    read, fall = found.over(a), np.arctanh(2 * a * b)
+    law, straight = fall / np.hypot(np.pi, fall), (found.damping[1:] + found.damping[:-1]) / 2
+    assert found.damping == pytest.approx(np.arctanh(2 * found.amplitude * b) / np.hypot(
+        np.pi, np.arctanh(2 * found.amplitude * b)), rel=1e-12)
+    assert (np.abs(read.damping - law) <= read.damping_error).all()
+    assert np.abs(read.damping / law - 1)[1:-1].max() < 0.1 * np.abs(straight / law - 1)[1:-1].max()
+
+
+def test_always_a_curve_between_far_points_stays_between_their_values():
+    """Behind a stiff contact a decay jumps from slip to stick: cubics of any slope gave a frequency of -2 kHz there."""
+    a, f = np.array([3e-2, 2e-2, 3e-7, 2e-7, 1e-7]), np.array([100.0, 99.0, 6600.0, 6640.0, 6650.0])
+    found = DecayCurve(np.arange(5.0), a, f, 0 * f, f / 1e5, 0 * f).over(np.geomspace(1e-7, 3e-2, 50))
+    assert found.frequency.min() >= 99 and found.frequency.max() <= 6650 and found.frequency_error.max() > 500
+
+
+def test_exact_at_its_points_a_curve_is_itself_and_outside_there_is_none():
     found = curve_of(of_turns(np.pi * np.arange(9), (-0.9)**np.arange(9.0)))
     there = found.over(found.amplitude[2:5])
     assert there.damping == pytest.approx(found.damping[2:5], rel=1e-12)
@@ -189,3 +224,51 @@ def test_a_release_and_what_rings_hold_mindlins_damping():
     assert (np.abs(decay.damping[known] - law) <= decay.damping_error[known]).all()
     beside = mindlins(result.measures["relative_displacement_amplitude"].value, stuck, 1.0)[0]
     assert abs(ring.value - beside) <= ring.error and beside > 1.5 * ring.value
+
+
+BEHIND_BONDS = JOINT_SHAKEN.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "100 um"').replace(
+    "kinetic = 0.2\n", "").replace(JOINT_SHAKEN[JOINT_SHAKEN.index("[drive]"):], """\
+[drive]
+kind = "free"
+displacement = "3 um"
+cycles = 12
+""")
+
+
+def test_a_release_says_what_its_errors_leave_out_of_the_mesh():
+    result, said = pf.run(BEHIND_BONDS), "the errors of ring_frequency and ring_damping and of the decay curve include "
+    (note,) = [one for one in result.notes if one.startswith("the errors of")]
+    assert note.startswith(said + "the change on a coarser mesh, but no estimate of the energy that is lost in slip")
+    assert note.endswith("because the hysteresis loop of this friction law is not known without a computation in time")
+    assert np.isfinite(result.extra["decay"].damping_error).any()
+    assert not [one for one in pf.run(CROWNED, **{"drive.cycles": 10}).notes if one.startswith("the errors of")]
+
+
+@pytest.mark.parametrize("old, new, why", [
+    ("[contact.shear]", '[contact.shear]\n[contact.grooves]\nwavelength = "80 um"\namplitude = "2 um"',
+     "the contact slides on grooves"),
+    ("slide = 1.0", "slide = 1.0\nnormal = 0.1", "the normal load changes")])
+def test_where_no_static_loop_tells_the_error_of_the_mesh_there_is_a_reason(old, new, why):
+    scene = CROWNED.replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"').replace(old, new, 1)
+    error, said = left_by_mesh(pf.build(scene), None, None, np.array([1e-7, 1e-6]), int)
+    assert said == why and not error.any()
+
+
+def test_exact_errors_of_the_mesh_are_interpolated_where_no_static_motion_is_found(monkeypatch):
+    model, a = pf.build(CROWNED), np.geomspace(1e-8, 1e-6, 5)
+    patch, coarse, *_ = solve_all(model.patch, 1e-2)
+    best, _ = left_by_mesh(model, patch, coarse, a, lambda laws: 0)
+    rows, lost = decays.static_rows, np.array([2])
+
+    def gappy(*given):
+        found = rows(*given)
+        found[:, lost] = np.nan
+        return found
+
+    monkeypatch.setattr(decays, "static_rows", gappy)
+    found, said = left_by_mesh(model, patch, coarse, a, lambda laws: 0)
+    assert found == pytest.approx(np.where(np.arange(5) == 2, best[:, [1]] / 2 + best[:, [3]] / 2, best), rel=1e-9)
+    assert not said and best.all()
+    lost = np.arange(5)
+    found, said = left_by_mesh(model, patch, coarse, a, lambda laws: 0)
+    assert not found.any() and said == "no static curve of the mode was found at these amplitudes"

@@ -87,6 +87,7 @@ def test_exact_other_geometries_and_lonely_cases_keep_their_own_mesh():
     assert found[1] is fault
 
 
+@pytest.mark.filterwarnings("error")
 def test_always_a_case_that_cannot_be_pressed_costs_the_others_nothing():
     good = family(1e-5, 1e-4)
     tipped = [replace(one, patch=replace(one.patch, load=100.0, line_moment=10.0, rotates=True)) for one in good[:1]]

@@ -141,5 +141,5 @@ def test_refuses_a_list_of_members_that_is_too_long(tmp_path):
     with zipfile.ZipFile(tmp_path / "a.npz", "w") as file:
         for number in range(40):
             file.writestr(f"{number}" * 30_000, b"")
-    with pytest.raises(PatchfemError, match=r"its list of members takes \d+ bytes"):
+    with pytest.raises(PatchfemError, match=r"the list of members takes \d+ bytes"):
         arrays.read(tmp_path / "a.npz")

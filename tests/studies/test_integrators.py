@@ -33,7 +33,7 @@ def test_exact_the_sentences_on_the_report_s_failure(failure, capsys):
     loose, speed = at["Fig 17, 18: displacement 1e-2"], at["Fig 19, 20: velocity 1e-4"]
     assert (loose.early, loose.moves, loose.force) == pytest.approx((0.1146, 5.5, 2.56), abs=5e-3)
     assert loose.worst == pytest.approx(5.4, abs=0.05) and loose.failed == 0
-    assert f"by up to {loose.worst:.1f}, where the friction limit is 3" in failure.ANSWER
+    assert f"friction force reached {loose.worst:.1f}, although the friction limit is only 3" in failure.ANSWER
     assert any("error of 80 of the friction limit" in text for text in loose.run.warnings)
     for tight in (at["displacement 1e-6"], speed):
         assert tight.early < 0.0095 and 0.3 < tight.failed < 0.37 and 0.15 < tight.jumps < 0.25

@@ -28,7 +28,7 @@ def test_figures_2_and_3_motions_of_one_block(capsys):
     assert at[4.0, 5.0].q == pytest.approx(0.28704671337871602, rel=1e-9)  # 40-digit marching
     assert at[4.14, 5.0].q == pytest.approx(0.150075, abs=2e-6)  # half-cycle shooting with D = 0.828
     five, eight = at[4.14, 5.0], at[4.14, 8.0]
-    inside(one.ANSWER, f"q = {five.q:.3f}", f"of {five.acceleration / 5:.2f} times the input's need",
+    inside(one.ANSWER, f"q is {five.q:.3f}", f"is {five.acceleration / 5:.2f} times that of the input",
            f"{at[4.0, 5.0].q:.3f} and {at[4.0, 5.0].acceleration / 5:.2f}", f"to {eight.acceleration:.0f} g",
            f"moves by {at[4.14, 6.0].mil:.0f} and {at[4.14, 7.0].mil:.0f} mil")
     loose, tight = (np.ptp(each.displacement) / 2 for each in stopped.values())
@@ -75,8 +75,9 @@ def test_figure_5_ringing_of_the_block():
     np.testing.assert_allclose(euler[0.1].block, track[-steps - 1:], atol=2e-8)
     ratio = one.swings(exact)[2] / one.swings(exact)[1]
     assert ratio == pytest.approx(np.exp(-0.02 * np.pi), rel=2e-3)
-    inside(one.ANSWER, f"amplitude of {exact.peak:.3f} a0", f"swing is {ratio:.3f} of",
-           f"{euler[0.1].peak:.3f} a0 with a step of 0.1/w0", f"{euler[0.2].peak:.3f} a0 with 0.2/w0")
+    inside(one.ANSWER, f"amplitude of {exact.peak:.3f} a0", f"swing has {ratio:.3f} times",
+           f"{euler[0.1].peak:.3f} a0 with a time step of 0.1/w0",
+           f"{euler[0.2].peak:.3f} a0 with a time step of 0.2/w0")
     inside(one.__doc__, f"for {100 * one.held(exact):.0f} % of the time")
     assert one.swings(euler[0.04])[2] == pytest.approx(one.swings(euler[0.04])[1], rel=3e-3)  # nothing is left of 2 %
     assert one.turns(exact).size == 18 and one.REPRODUCED == "yes"
@@ -115,7 +116,7 @@ def test_figure_15_rest_of_a_released_block():
     first, second, third = rows
     assert first.moving == pytest.approx(-0.125) and first.stop > first.printed == pytest.approx(3.5 * np.pi)
     inside(one.ANSWER, f"w0 = 2 ({second.stop:.3f})", f"1.414 ({third.stop:.3f})", f"a time of {first.printed:.3f}",
-           f"rests at {first.stop:.3f}", f"{max(r.error for r in rows):.0e} of x0")
+           f"to rest at the time {first.stop:.3f}", f"{max(r.error for r in rows):.0e} of x0")
     before, after = time < first.stop, time > first.stop + 0.5
     exact = (1 - (2 * (n := np.floor(time / np.pi)) + 1) / 8) * np.cos(time) + (-1.0) ** n / 8
     off, swing = np.abs(x - exact)[before].max(), np.ptp(x[after]) / 2
@@ -148,7 +149,7 @@ def test_figures_30_and_31_counts_of_all_sets(tmp_path):
     one = study("report/figures_30_31.py")
     six, twelve = one.main(path=tmp_path / "x.svg").values()
     x, y, less, earlier = one.counts(six[0])
-    inside(one.ANSWER, f"In {x} of 20 such sets", f"lower, and in {y} sets", f"In {less} sets")
+    inside(one.ANSWER, f"In {x} of 20 such sets", f"lower; in {y} sets", f"In {less} sets")
     flat, (a, b, c, before) = " ".join(one.__doc__.split()), one.counts(twelve[0])
     assert earlier == before == 0 and not any(part.reference for each in six[0] for part in each.parts)
     inside(flat, f"the counts are {a}, {b} and {c}", f"to {twelve[1].after[0]:.2f} and {twelve[1].after[1]:.2f}, the",

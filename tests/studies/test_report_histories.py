@@ -28,8 +28,8 @@ def drawn(figures, tmp_path_factory):
 
 def held(figures, name, run):
     """The peaks of a run stand in the sentence beside those of the rig."""
-    read = {"Fig. 28: 135 Hz, 5 g": "8.4 and 0.44", "Fig. 28 (text): 135 Hz, 6 g": "9.5 and 0.30",
-            "Fig. 29: 143 Hz, 5 g": "6.0 and 0.23"}[name]
+    read = {"Fig. 28: 135 Hz, 5 g": "8.4 g and 0.44 mil", "Fig. 28 (text): 135 Hz, 6 g": "9.5 g and 0.30 mil",
+            "Fig. 29: 143 Hz, 5 g": "6.0 g and 0.23 mil"}[name]
     assert run.stays
     inside(figures.ANSWER, f"{run.acceleration:.1f} g and {run.displacement:.2f} mil ({read})")
 
@@ -39,7 +39,7 @@ def test_figure_29_stable_at_5_g_and_unstable_at_8(figures, drawn):
     (stable, unstable), text = drawn
     held(figures, stable.title, stable)
     assert not unstable.stays and np.abs(unstable.seen.output).max() > 50e-6 > np.abs(stable.seen.output).max()
-    inside(figures.ANSWER, f"at 8.0 g after {unstable.cycles:.0f} cycles")
+    inside(figures.ANSWER, f"at 8.0 g the block runs away after {unstable.cycles:.0f} cycles")
     inside(figures.__doc__, f"is {stable.distortion:.2f} of the first at")
     inside(figures.REPRODUCED, "in part", "135 Hz")
     assert ">runs away<" in text
@@ -60,7 +60,7 @@ def test_figures_28_and_29_all_that_is_drawn(figures, tmp_path, capsys):
     for run in runs[:3]:
         held(figures, run.title, run)
     more = runs[3]
-    inside(figures.ANSWER, f"friction the block stays at {more.displacement:.2f} mil at 8 g")
+    inside(figures.ANSWER, f"friction the amplitude stays at {more.displacement:.2f} mil at 8 g")
     inside(figures.__doc__, f"of the first at 5 g and {more.distortion:.2f} at 8 g")
     assert figures.ANSWER in capsys.readouterr().out
 
@@ -69,7 +69,7 @@ def test_figures_28_and_29_all_that_is_drawn(figures, tmp_path, capsys):
 def test_figures_28_and_29_where_the_block_leaves(figures):
     at = figures.moved("", 143, 7.9, {})
     assert at.stays
-    inside(figures.ANSWER, f"stays at {at.displacement:.2f} mil at 7.9 g")
+    inside(figures.ANSWER, f"7.9 g the amplitude of the block stays at {at.displacement:.2f} mil;")
     assert [figures.moved("", 135, level, {}).stays for level in (8.0, 8.1)] == [True, False]
     levels = [round(7 + 0.1 * k, 1) for k in range(14)]
     assert [figures.last_level(f, levels) for f in (135, 143)] == [8.2, 8.0]

@@ -61,8 +61,8 @@ def test_exact_a_swept_block_that_friction_holds_moves_with_the_base():
 def test_sweeps_the_sentence(tmp_path, capsys):
     sweeps = study("report/sweeps.py")
     found = sweeps.main(tmp_path / "x.svg")
-    told = {"rigid block": ("for a rigid block", 0), "grooves": ("for a block in grooves", 136),
-            "second path": ("with a second load path", 136)}
+    told = {"rigid block": ("in the model of a rigid block", 0), "grooves": ("in the model with grooves", 136),
+            "second path": ("in the model with a second load path", 136)}
     for model, (words, least) in told.items():
         words = "{:.2f} to {:.2f} g " + words
         mine = [one for one in found if one.model == model]
@@ -173,7 +173,7 @@ def test_engaged_the_sentence(tmp_path, capsys):
     peak = {(one.mode, one.touch, one.level): one.peak for one in turns}
     left = {key: value / peak[key[0], "one point on the axis", key[2]] for key, value in peak.items()}
     one, two = left["yaw", "a patch of 12.7 mm", 5.0], left["yaw", "two patches 20 mm apart", 5.0]
-    inside(engaged.ANSWER, f"{one:.2f} of this height with a patch", f"{two:.2f} with two patches 20 mm apart")
+    inside(engaged.ANSWER, f"{one:.2f} with a patch of 12.7 mm", f"{two:.2f} with two patches 20 mm apart")
     inside(engaged.__doc__, f"leaves {left['yaw', 'one point off it', 5.0]:.2f} of yaw",
            f"to {left['rocking', 'a patch of 12.7 mm', 5.0]:.5f} of its peak",
            f"leaves {left['rocking', 'one point off it', 5.0]:.2f} of it")

@@ -68,7 +68,7 @@ def test_figure_13_curves_of_the_study(tmp_path):
     assert [row["start"] for row in rows.values()] == [float("inf"), 1, 0, 0]
     assert [rows[p]["top_at"] for p in (0.0, 1.0, 2.0)] == [0, 1, 2]
     assert (rows[1]["top"], rows[2]["top"]) == pytest.approx((0.3679, 0.2707), abs=5e-5)
-    assert f"to {rows[1]['top']:.4f} and {rows[2]['top']:.4f} at R = p eps" in one.ANSWER
+    assert f"at R = p eps: {rows[1]['top']:.4f} for p = 1 and {rows[2]['top']:.4f} for p = 2" in one.ANSWER
     assert [row["nine_tenths"] for row in rows.values()] == pytest.approx([1.35, 2.30, 3.89, 5.32], abs=5e-3)
     assert "<svg" in (tmp_path / "figure.svg").read_text()
 

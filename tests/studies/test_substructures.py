@@ -73,6 +73,7 @@ def test_exact_each_format_brings_a_beam_whole_or_says_what_it_lacks(formats):
         else:
             assert 1e-12 < row.off < 1e-2 and (row.first < 1e-5 or "uncertain by" in row.says or np.isinf(row.first)), \
                 row
+            assert "e+" not in row.says, row  # a percentage is read without a power of ten
 
 
 def test_exact_pynastran_writes_what_is_read_here_and_reads_what_the_study_writes(formats, tmp_path):

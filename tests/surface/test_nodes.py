@@ -114,8 +114,8 @@ def test_exact_centred_where_it_does_not_and_said():
     x = np.linspace(0, 15e-3, 5000)
     profile = placed(trace(x, x), EVEN)
     assert on_nodes(profile, EVEN) == pytest.approx(EVEN + 7.5e-3, abs=2e-15)
-    assert profile.notes == ("before.csv: x from 0 um to 15 mm does not cover the patch, -6.35 mm to 6.35 mm: the "
-                             "trace is centred on the patch, which adds -7.5 mm to x",)
+    assert profile.notes == ("before.csv: the trace, from x = 0 um to 15 mm in the file, does not cover the patch, "
+                             "from -6.35 mm to 6.35 mm; the trace is centred on the patch, which adds -7.5 mm to x",)
 
 
 def test_exact_a_trace_as_long_as_the_patch_is_centred_and_said_otherwise():

@@ -139,8 +139,8 @@ def contradictions(asked: Asked, cases: Cases) -> str:
         return ""
     first, swept = found[0][0], {asked.place(axis.key) for axis in cases.axes}
     key = re.search(r"(?:^|: )([a-z_]+(?:\.[\w-]+)+): ", first)
-    helps = f"sweep {key[1]} too, remove it from the scene, or give other values in --over" \
+    helps = f"sweep {key[1]}, too, remove this key from the scene, or give other values in --over" \
         if key and asked.place(key[1]) not in swept else "give other values in --over"
     of = f"{len(found)} of {len(cases)} cases" if len(numbers) == len(cases) else \
-        f"{len(found)} of {len(numbers)} cases that were looked at"
+        f"{len(found)} of {len(numbers)} cases that were checked"
     return f"{of} will fail: {first}; {helps}"

@@ -144,7 +144,7 @@ def finish(modes: ModalBasis, run: Grid, failures: int, warnings: list) -> Compa
     flow = max(abs(work), viscous + abs(friction), abs(stored), 1e-300)
     if not np.isfinite(error):
         step = int(np.argmax(~np.isfinite(v).all(axis=1)))
-        warnings = [*warnings, f"from step {step} on the computed motion is not a finite number; raise "
+        warnings = [*warnings, f"the computed velocity is infinite or undefined from time step {step} on; raise "
                                "accuracy.steps_per_cycle"]
     elif abs(error) > 1e-3 * flow:
         warnings = [*warnings, f"the energy balance has an error: {abs(error) / flow:.1%} of the energy exchanged in "

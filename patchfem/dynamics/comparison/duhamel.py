@@ -85,7 +85,6 @@ def _warnings(modes, laws, found: Grid, failures, steps: int) -> list:
                    "iterations")
     turn = found.h * max(elastic_rates(modes, laws), default=0.0)
     if turn > TURN:
-        out.append(f"the block on the elastic contact oscillates through {turn:.2g} rad in one time step (limit "
-                   f"{TURN:g} rad); set "
-                   f"accuracy.steps_per_cycle = {steps * int(np.ceil(turn / TURN))}")
+        out.append(f"in one time step the free vibration of the block on the elastic contact advances by {turn:.2g} "
+                   f"rad (limit {TURN:g} rad); set accuracy.steps_per_cycle = {steps * int(np.ceil(turn / TURN))}")
     return out

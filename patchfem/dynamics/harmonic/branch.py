@@ -92,7 +92,8 @@ def _curve(modes, drives, group, parameter, how: How) -> Branch:
         if harmonics or above <= tolerance / 4:
             return Branch(points, parameter, tuple(f / scale for f in path.folds),
                           tuple(f / scale for f in path.crossings), path.ended)
-    raise NotConverged(f"harmonic balance with {LADDER[-1]} harmonics misses {above:.1e} of the motion, more than the "
+    raise NotConverged(f"harmonic balance with {LADDER[-1]} harmonics leaves out {above:.1e} of the motion, more than "
+                       "the "
                        f"limit of {tolerance / 4:g}; raise the tolerance")
 
 

@@ -297,13 +297,36 @@ def advance(room, i, s0, c0, s1, c1, h):
 
 
 @njit(error_model="numpy", **LEAN)
+def between(begin, end, way, k, h, u):
+    """Place at the share u of a part of a step, by the law itself where the slide alone tells; arguments as of
+    `held`."""
+    (x, v, _, z), (x1, v1, _, z1) = begin, end
+    if friction.FOLLOWS:
+        return friction.after(k, z, 0.0, cubic(x, x1, h * v, h * v1, u) - x, way)[0]
+    return cubic(z, z1, h * v * friction.flowing(k, z, v, way)[1], h * v1 * friction.flowing(k, z1, v1, way)[1], u)
+
+
+@njit(error_model="numpy", **LEAN)
 def sticks(begin, end, way, k, h, u):
     """Whether less than SHARE of the slide is irreversible at the share u of a part of a step; arguments as of
     `held`."""
-    (_, v, a, z), (_, v1, a1, z1) = begin, end
+    (_, v, a, _), (_, v1, a1, _) = begin, end
     speed = cubic(v, v1, h * a, h * a1, u)
-    place = cubic(z, z1, h * v * friction.flowing(k, z, v, way)[1], h * v1 * friction.flowing(k, z1, v1, way)[1], u)
-    return abs(1 - friction.flowing(k, place, speed, way)[1]) < SHARE
+    return abs(1 - friction.flowing(k, between(begin, end, way, k, h, u), speed, way)[1]) < SHARE
+
+
+@njit(error_model="numpy", **LEAN)
+def edge(begin, end, way, k, h, low, high, turns):
+    """Share of a part of a step, in [low, high], at which a stick begins or ends, or where it `turns` the stretch over;
+    arguments as of `held`."""
+    below, first = begin[3] < 0.0, sticks(begin, end, way, k, h, low)
+    for _ in range(HALVINGS):
+        u = 0.5 * (low + high)
+        if (between(begin, end, way, k, h, u) < 0.0) == below if turns else sticks(begin, end, way, k, h, u) == first:
+            low = u
+        else:
+            high = u
+    return low
 
 
 @njit(error_model="numpy", **LEAN)
@@ -311,21 +334,19 @@ def held(begin, end, way, room, i, h):
     """(share of a part of a step in which the contact sticks; share inside it at which it begins to slip, 2: nowhere;
     irreversible part of the slide where that turns inside it, that of its end without).
 
-    begin, end: x, x', x'' and place at the ends of the part, of an angle h; in between they are cubics. The
-    irreversible part turns where there is no stretch; at a kink `advance` tells where.
+    begin, end: x, x', x'' and place at the ends of the part, of an angle h; in between, x, x' and, unless the law tells
+    it, the place are cubics. The irreversible part turns where there is no stretch; at a kink `advance` tells where.
     """
     k, (x, v, _, z), (x1, v1, _, z1) = numbers(room, i), begin, end
-    furthest, low, high = slid(x1, z1, room, i), 0.0, 1.0
-    if not friction.BENDS and z * z1 < 0.0:
-        u = zero(z, z1, h * v * friction.flowing(k, z, v, way)[1], h * v1 * friction.flowing(k, z1, v1, way)[1])
-        furthest = cubic(x, x1, h * v, h * v1, u)
-    first = sticks(begin, end, way, k, h, 0.0)
-    if first == sticks(begin, end, way, k, h, 1.0):
+    furthest, middle = slid(x1, z1, room, i), 1.0
+    if z * z1 < 0.0:
+        middle = edge(begin, end, way, k, h, 0.0, 1.0, True)
+        furthest = furthest if friction.BENDS else cubic(x, x1, h * v, h * v1, middle)
+    first, last = sticks(begin, end, way, k, h, 0.0), sticks(begin, end, way, k, h, 1.0)
+    if first != last:
+        u = edge(begin, end, way, k, h, 0.0, 1.0, False)
+        return u if first else 1 - u, u if first else 2.0, furthest
+    if first or not sticks(begin, end, way, k, h, middle):
         return 1.0 if first else 0.0, 2.0, furthest
-    for _ in range(HALVINGS):
-        u = 0.5 * (low + high)
-        if sticks(begin, end, way, k, h, u) == first:
-            low = u
-        else:
-            high = u
-    return low if first else 1 - low, low if first else 2.0, furthest
+    u = edge(begin, end, way, k, h, middle, 1.0, False)  # it slips at both ends, by stretches of opposite sign
+    return u - edge(begin, end, way, k, h, 0.0, middle, False), u, furthest

@@ -354,6 +354,15 @@ def remember(i, room):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def cut_short(i, room, low, high):
+    """Whether an extreme of the last cycle of a lane, `low` or `high`, is where the cycle begins or ends while the
+    slide goes on: not at its turn, which may be the extreme of later cycles."""
+    x, begun = room[X * LANES + i], room[PAST * LANES + i]
+    return (room[V * LANES + i] != 0.0 and (x == low or x == high)) \
+        or (room[(PAST + 1) * LANES + i] != 0.0 and (begun == low or begun == high))
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def map_of(i, room, history, case, k, size):
     """(a, b, whether they are sure) of the map of a cycle, by which each number changes in the next one: by a of its
     last change and b of that before; size: range of a cycle.
@@ -365,7 +374,8 @@ def map_of(i, room, history, case, k, size):
     """
     (x, x1, x2), (v, v1, v2), (p, p1, p2) = changes(X, 0, room, i), changes(V, 1, room, i), changes(PLACE, 2, room, i)
     way = room[WAY * LANES + i]
-    alike = max(abs(x), abs(v)) < NEAR * size and law.settles(room, i)
+    alike = max(abs(x), abs(v)) < NEAR * size and law.settles(room, i) \
+        and not cut_short(i, room, history[case, k - 1, 0], history[case, k - 1, 1])
     for n in range(ENDS):
         alike = alike and room[(PAST + n * TOLD + 3) * LANES + i] == way
     if not alike:
@@ -486,7 +496,10 @@ def open_cycle(i, room):
 def close_cycle(i, room, first, cycles, h):
     """Take the range, the secant and the means of a cycle of a lane, the first or not, into what it shows."""
     size, begun = room[HIGH * LANES + i] - room[LOW * LANES + i], room[BEGUN * LANES + i]
-    secant = (room[PULL_HIGH * LANES + i] - room[PULL_LOW * LANES + i]) / size
+    high, low = room[PULL_HIGH * LANES + i], room[PULL_LOW * LANES + i]
+    if law.RESTS and size > 0.0:  # an extreme at an end of the cycle turns beside it, with no force in the mean
+        high, low = high if high == high else 0.0, low if low == low else 0.0
+    secant = (high - low) / size
     room[RANGE * LANES + i] += size / cycles
     if secant == secant and size > 0.0:
         room[SEEN * LANES + i] += 1.0

@@ -12,6 +12,7 @@ HERE = "dynamics.lanes"
 MASING = "masing", "table"  # laws of Masing's rule, by the curve of their first loading
 TERMS = 24  # of a Taylor series over a step; what is left falls below round-off for rates up to 2 a step
 BEYOND = 1e300  # place of a yield that there is not
+AWAY = 1e100  # slide [m] beyond which a march ran away by too long steps, and energies would overflow
 ONCE = 3  # cycles that are read of a motion that repeats
 
 
@@ -208,7 +209,8 @@ def room_of(numbers, motion) -> tuple:
 
 
 def march(law: str, cases: Cases, cycles: int, window: int, steps: int, device: str = "cpu") -> Marched:
-    """March cases over `cycles` by so many steps each; the last `window` of them are read, fewer of what repeats.
+    """March cases over `cycles` by so many steps each; the last `window` of them are read, fewer of what repeats. All
+    numbers of a march that ran away are NaN.
 
     device: as of `kernels`.
     """
@@ -224,4 +226,7 @@ def march(law: str, cases: Cases, cycles: int, window: int, steps: int, device: 
     done = ended + read
     for case in np.flatnonzero(done < cycles):  # a motion that repeats goes on as it is
         history[case, done[case]:] = history[case, done[case] - 1]
+    away = ~(np.abs(history[:, :, :2]).max(axis=(1, 2), initial=0.0) < AWAY)
+    for one in (begun, motion, history, shown):
+        one[away] = np.nan
     return Marched(start, begun, motion, history, shown, ended, read, numbers, 2 * np.pi / steps)

@@ -5,6 +5,8 @@ Equation, in the angle of the drive: x'' + D x' + W x = P sin - f, f = K (x - pl
 begins at |x - place| = LENGTH. Twin: a run from event to event (`dynamics.events`).
 """
 
+from math import sqrt
+
 from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
 from .names_kernels import (
@@ -47,7 +49,6 @@ from .rigid_kernels import (
     folds,
     foretell,
     furthest,
-    held,
     path,
     resume,
     slid,
@@ -76,14 +77,23 @@ def felt(x, v, way, place, sine, room, i):
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def rise(v, a, way, place, room, i, when):
-    """Rate of the friction at a speed v and an acceleration a."""
-    return room[K * LANES + i] * v if way == 0.0 else 0.0
+    """Rate of the friction at a speed v and an acceleration a; what holds on after an event moves there in its slip."""
+    return room[K * LANES + i] * v if way == 0.0 and when != 2 else 0.0
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def at_turn(x, way, place, turned, room, i):
-    """Friction at a turn of the slide."""
-    return felt(x, 0.0, way, place, 0.0, room, i)
+    """Friction at a turn of the slide, before which it may have slipped."""
+    most = room[GK * LANES + i]
+    return min(max(felt(x, 0.0, way, place, 0.0, room, i), -most), most)
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def held(begin, end, way, room, i, h):
+    """As of `rigid_kernels`; a stick whose place moves begins with a slip that turns, whose speed falls as a line."""
+    slip, speed = abs(end[3] - begin[3]) if way == 0.0 else 0.0, abs(begin[1]) * h
+    slips = min(2 * slip / speed, 1.0) if speed > 0.0 else 0.0
+    return 1.0 - slips if way == 0.0 else 0.0, 0.0 if slips > 0.0 else 2.0, end[3]
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -113,6 +123,40 @@ def ahead(room, i, s0, c0, s1, c1, reads):
     return x1, v1, place if held else x1 - way * length, yields or v * v1 < 0.0 or (reads and v1 == 0.0)
 
 
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def bent(r, damp, stiff, one, two, three):
+    """(Slide, speed) an angle r after rest of d'' + damp d' + stiff d = one r + two r^2 / 2 + three r^3 / 6."""
+    r2, e2 = r * r, damp * damp - stiff
+    of_one, of_one_v = 1.0 / 6 + r * (-damp / 24 + r * (e2 / 120 - r * damp * (e2 - stiff) / 720)), \
+        0.5 + r * (-damp / 6 + r * e2 / 24)
+    of_two, of_two_v = 1.0 / 24 + r * (-damp / 120 + r * e2 / 720), 1.0 / 6 + r * (-damp / 24 + r * e2 / 120)
+    of_three, of_three_v = 1.0 / 120 - r * damp / 720, 1.0 / 24 - r * damp / 120
+    return r2 * r * (one * of_one + r * (two * of_two + r * three * of_three)), \
+        r2 * (one * of_one_v + r * (two * of_two_v + r * three * of_three_v))
+
+
+@njit(error_model="numpy", **LEAN)
+def last_slip(v, a, j, spring, most):
+    """Angle of a slip that begins at a speed v and turns within `most`: the speed of the stick goes on as
+    v + a r + j r^2 / 2, and the slip adds the spring's lack of pull."""
+    square = a * a - 2 * v * j
+    r = min(2 * abs(v) / (abs(a) + sqrt(square)) if square > 0.0 > a * v else most, most)
+    for _ in range(4):
+        speed = v + r * (a + r * (j / 2 + spring * (v / 2 + r * (a / 6 + r * j / 24))))
+        slope = a + r * (j + spring * (v + r * (a / 2 + r * j / 6)))
+        r = min(max(r - speed / slope, 0.0), most) if slope != 0.0 else r
+    return r
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def held_on(d, dv, damp, stiff, hold, r):
+    """(Slide, speed) an angle r after (d, dv) of d'' + damp d' + stiff d = hold."""
+    a = hold - damp * dv - stiff * d
+    j = -damp * a - stiff * dv
+    k = -damp * j - stiff * a
+    return d + r * (dv + r * (a / 2 + r * (j / 6 + r * k / 24))), dv + r * (a + r * (j / 2 + r * k / 6))
+
+
 @njit(error_model="numpy", **LEAN)
 def advance(room, i, s0, c0, s1, c1, h):
     """(x, v, way, place at the end of a step h; share u of the step up to an event; x, v and place there; x where the
@@ -132,7 +176,7 @@ def advance(room, i, s0, c0, s1, c1, h):
     turns = v * vs < 0.0 or (way != 0.0 and way * v < 0.0)
     ut = crossing(v, m0, c2, c3, v / (v - vs)) if v * vs < 0.0 else 0.0 if turns else 1.0
     turn = x + h * ut * (v + ut * (m0 / 2 + ut * (c2 / 3 + ut * c3 / 4))) if turns else xs
-    u, x1, v1, way1, xe, ve, pe, place1 = 1.0, xs, vs, way, xs, vs, place, place
+    u, x1, v1, way1, xe, ve, pe, place1, grazes = 1.0, xs, vs, way, xs, vs, place, place, False
     if way != 0.0:
         pe = place1 = xs - way * length
         if turns:  # it stops, and holds on by its spring
@@ -149,6 +193,9 @@ def advance(room, i, s0, c0, s1, c1, h):
             top = ut if turns and side * (turn - place) > length else 1.0
             y0 = side * (x - place) - length
             u = top * min(max(-y0 / (far - length - y0), 0.0), 1.0)
+            if top < 1.0:  # a parabola from the turn, beside which the slope of a line is far from that of the slide
+                bow = h * max(abs(m0 + top * (2 * c2 + 3 * c3 * top)), 1e-300)
+                u = max(top - sqrt(2 * (far - length) / bow), 0.0)
             for _ in range(4):
                 now = x + h * u * (v + u * (m0 / 2 + u * (c2 / 3 + u * c3 / 4))) - place
                 speed = side * (v + u * (m0 + u * (c2 + u * c3)))
@@ -157,18 +204,21 @@ def advance(room, i, s0, c0, s1, c1, h):
             xe = place + side * length
             way1, speed = side, ve
             rate, more = (m0 + u * (2 * c2 + 3 * c3 * u)) / h, (2 * c2 + 6 * c3 * u) / (h * h)
-            part = spring
-            if turns and side * (turn - place) > length:  # it yields by a last bit before it turns
-                way1, place1, part = 0.0, turn - side * length, 0.0
+            part, grazes = spring, turns and side * (turn - place) > length
     if u < 1.0:
-        r = h - u * h
-        r2, e2 = r * r, damp * damp - square - (spring if way1 == 0.0 else 0.0)
-        one = r2 * r * (1.0 / 6 + r * (-damp / 24 + r * (e2 / 120 - r * damp * (e2 - square) / 720)))
-        two, three = r2 * r2 * (1.0 / 24 + r * (-damp / 120 + r * e2 / 720)), r2 * r2 * r * (1.0 / 120 - r * damp / 720)
-        one_v = r2 * (0.5 + r * (-damp / 6 + r * e2 / 24))
-        two_v, three_v = r2 * r * (1.0 / 6 + r * (-damp / 24 + r * e2 / 120)), r2 * r2 * (1.0 / 24 - r * damp / 120)
-        x1 = xs + part * (speed * one + rate * two + more * three)
-        v1 = vs + part * (speed * one_v + rate * two_v + more * three_v)
+        r, stiff = h - u * h, square + (spring if way1 == 0.0 else 0.0)
+        d, dv = bent(r, damp, stiff, part * speed, part * rate, part * more)
+        x1, v1 = xs + d, vs + dv
         if way1 != 0.0:
             place1 = x1 - way1 * length
+        if grazes:  # it turns in its slip, later than it would in a stick, or not in this step
+            turns = side * v1 < 0.0
+            if turns:
+                r = last_slip(ve, rate, more, spring, r)
+                d, dv = bent(r, damp, square, spring * speed, spring * rate, spring * more)
+                w = u + r / h
+                turn = x + h * w * (v + w * (m0 / 2 + w * (c2 / 3 + w * c3 / 4))) + d
+                way1, place1 = 0.0, turn - side * length
+                d, dv = held_on(d, dv, damp, square + spring, spring * (place1 - place), h - u * h - r)
+                x1, v1 = xs + d, vs + dv
     return x1, v1, way1, place1, u, xe, ve, pe, turn if turns else x1, 0.0

@@ -109,8 +109,8 @@ def interface(x, fields: dict, name: str = "") -> list:
         frame = int(np.argmax(np.abs(tau @ np.gradient(x))))
         shown = np.unique(np.linspace(1, len(tau) - 1, min(FRAMES, len(tau) - 1)).round().astype(int))
         frames = [line(x * size, tau[k] * scale, "soft", most=FAINT, width=0.6, alpha=0.6) for k in shown]
-        title = f"Shear stress{f' on {name}' * bool(name)} at {len(shown)} instants; the one with the largest stress " \
-            "is in colour"
+        title = f"Shear stress{f' on {name}' * bool(name)} at {len(shown)} instants; the instant with the largest " \
+            "stress is in colour"
         out.append(chart(title, place, axis("shear stress", unit),
                          [*frames, line(x * size, tau[frame] * scale, "warm")]))
     return out
@@ -331,7 +331,7 @@ def caption(found: dict) -> str:
     """Caption of the picture of a curve of steady motions: what it shows, its regimes, folds and gaps."""
     what, parts = axis_of(found)[1], [regime for regime, _, _ in spans(found)]
     count, folds = np.asarray(found["amplitude"]).size, len(found.get("folds", ()))
-    text = f"Half peak-to-peak of the steady motion against the {what}, {count} points; "
+    text = f"Half the peak-to-peak steady motion at the output against the {what}, {count} points; "
     text += "colour and line style show the regime: " + ", ".join(dict.fromkeys(parts)) + "."
     if folds:
         text += f" The curve turns back at {folds} fold{'s' if folds > 1 else ''}."
@@ -353,7 +353,7 @@ def curve(found: dict) -> list:
         marks.append(line(along[first:stop], value[first:stop], colours[regime], regime,
                           dash="dashed" if "unstable" in regime else REGIMES.get(regime, "solid")))
     marks += [mark("rule", "soft", "fold", x=at if unit == "Hz" else at / G_N) for at in found.get("folds", ())]
-    out = [chart("Steady motion at the output", axis(what, unit), axis("half peak-to-peak", name), marks)]
+    out = [chart("Steady motion at the output", axis(what, unit), axis("half the peak-to-peak motion", name), marks)]
     if "acceleration_peak" in found:
         lines = [line(along, np.asarray(found[f"acceleration_{key}"]) / G_N, colour, text, dash=dash)
                  for key, colour, text, dash in (("peak", "accent", "largest", "solid"),
@@ -433,7 +433,7 @@ def levels(rows: list) -> list:
             marks.append(mark("dots", "soft", text, x=drive[which], y=y[which], errors=error[which], shape=shape,
                               **style))
     what = axis("force", "N") if forced else axis("base acceleration", "g")
-    return [chart("Level by level", what, axis("half peak-to-peak", name, log), marks)]
+    return [chart("Level by level", what, axis("half the peak-to-peak motion", name, log), marks)]
 
 
 def wear(x, cycles, pressure, depth, history: dict) -> list:

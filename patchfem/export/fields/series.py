@@ -75,7 +75,7 @@ class Series:
         except OSError as error:
             raise PatchfemError(f"{path}: not a readable HDF5 file ({error})") from None
         try:
-            with readable(path, "a series of fields of patchfem"):
+            with readable(path, "fields of a patchfem run, frame by frame"):
                 self._open()
         except PatchfemError:
             self.file.close()
@@ -100,11 +100,11 @@ class Series:
         wanted(points.ndim == 2 and points.shape[1] == 3 and len(points) and numeric(points)
                and np.abs(points).max() < HUGE, f"{name}/Points are not valid positions")  # NaN is not below it
         wanted(all(one.ndim == 1 and one.size and one.dtype.kind in "iu" for one in (nodes, ends, types)),
-               f"{name}: its cells are not whole numbers")
+               f"{name}: the numbers that define the cells are not whole")
         sizes = np.diff(ends.astype(np.int64))
         wanted(len(sizes) == len(types) and ends[0] == 0 and ends[-1] == len(nodes) and sizes.min() >= 2
                and sizes.max() <= MOST and nodes.min() >= 0 and nodes.max() < len(points),
-               f"{name}: its cells refer to points that are not in the file")
+               f"{name}: the cells refer to points that are not in the file")
         for kind, size in ("PointData", len(points)), ("CellData", len(types)):
             lacks = sorted(set(LEAST[name][kind]) - set(group[kind]))
             wanted(not lacks, f"{name}/{kind} lacks {', '.join(lacks)}")

@@ -113,8 +113,8 @@ def _refuse(model: Model) -> None:
                             "use law 'elastic-plastic', 'iwan' or 'tanh', or law 'coulomb' with [contact.shear]",
                             f"{rig.interfaces[0].key}.law")
     if why:
-        raise PatchfemError(f"matrices and friction elements cannot be written {why}; leave that out of the scene",
-                            "structure")
+        raise PatchfemError(f"matrices and friction elements cannot be written {why}; remove this feature from the "
+                            "scene", "structure")
 
 
 def elements_of(model: Model) -> Elements:

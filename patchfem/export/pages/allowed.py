@@ -230,8 +230,8 @@ def _moving(limits: Limits) -> str:
         far = _at(limits, least) + _brackets(_gap(limits, least))
         size = np.asarray(limits.key["values"], float)
         sure = min((one for one in ends if one.beyond is not None), key=lambda one: size[one.beyond], default=None)
-        rest = "no case with a larger value shows the limit" if sure is None else \
-            f"{label(sure.name)} has changed by more at {_at(limits, sure, float(size[sure.beyond]))}"
+        rest = "the cases with larger values do not show where this limit lies" if sure is None else \
+            f"{label(sure.name)} has changed by more than {within} at {_at(limits, sure, float(size[sure.beyond]))}"
         return f"{name} may reach at least {far} {held}; {rest}"
     between = f"between cases at {_between(limits, least)}"
     later = "" if last is least or last.beyond is None else f"; {label(last.name)} {_where(limits, last)}"
@@ -317,13 +317,14 @@ def table(limits: Limits, measures: dict) -> str:
                 f", at about {_at(limits, one)}" if isfinite(one.about) else "")
         else:
             far = "in no case" if one.whole else \
-                f"not up to {at(one.inside)}; no case with a larger value shows the limit"
+                f"not up to {at(one.inside)}; the cases with larger values do not show where this change is reached"
         by = f"{100 * WITHIN:g} %" if abs(one.change) < 1 else "double"
         first = short(one.name, one.first, measures[one.name][2], 4)
         rows.append([linked(label(one.name), one.name), escape(first), _change(one.changed), by,
                      f"<td class=soft>{escape(far)}</td>"])
     several = int(np.sum(np.asarray(key["values"], float) == np.min(np.asarray(key["values"], float)))) > 1
-    least = (" If other keys change too, each limit is for the values of these keys that give the smallest limit."
+    least = (" Other keys are swept, too; each limit is the smallest limit that is found for any values of these "
+             "other keys."
              if several else "")
     return (f"<p class=soft>{escape(key['name'])} grows from {escape(at(limits.found[0].start))}. A measure counts as "
             "changed if the difference from its value in the first case exceeds the amount under &ldquo;changed "

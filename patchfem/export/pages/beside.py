@@ -14,7 +14,7 @@ from ..drawing.charts import COLOURS, mark
 from ..readback import numeric, readable, variables, wanted
 from ..summary import read_summary
 from ..written import NUMBER
-from .document import Section, document, table
+from .document import Section, document, prose, table
 from .sweep import label
 from .words import linked, meaning, pair
 
@@ -124,10 +124,10 @@ def page(runs: list, read: FinishedRun | None = None) -> str:
     sections = [Section("scenes", "What differs in the scenes", _differences(runs, names)),
                 Section("measures", "Measures side by side", _measures(runs, names))]
     sections += [Section(one["anchor"] + "-part", one["title"], f'<div id="{one["anchor"]}" class=chart role=img '
-                         f'aria-label="{escape(one["told"])}"></div><p class=soft>{escape(one["told"])}</p>')
+                         f'aria-label="{escape(one["told"])}"></div><p class=soft>{prose(one["told"])}</p>')
                  for one in charts]
     known = dict.fromkeys(name for run in runs for name in run.summary["measures"])
-    means = [(f" id='measure-{escape(name)}'", [escape(label(name)), escape(meaning(name))]) for name in known]
+    means = [(f" id='measure-{escape(name)}'", [escape(label(name)), prose(meaning(name))]) for name in known]
     sections.append(Section("means", "What the measures are", table(("", ""), means)))
     title = " and ".join(names) if len(names) < 4 else f"{len(names)} runs side by side"
     return document(title, f"<p class=verdict>{outcomes}.</p>", sections, {"charts": charts} if charts else None,

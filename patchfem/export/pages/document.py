@@ -16,6 +16,7 @@ NUMBER = f"%.{DIGITS}g,"
 OLD = ("The pictures of this page are packed, and this browser cannot unpack them: it has no DecompressionStream, "
        "which browsers have had since 2023. Texts and tables are complete.")
 NOT_FINITE = re.compile("nan|-?inf")
+QUOTED = re.compile(r"`([^`\s](?:[^`\n]*[^`\s])?)`")  # a word of a scene or a command inside a sentence
 # colours of `drawing.pictures`, and those of the page that stand for them in either theme
 INKS = {"#ffffff": "paper", "#000000": "ink", "#4d4d4d": "ink", "#e3e3e3": "line", "#1f5f99": "accent",
         "#c8551b": "warm", "#8a8a8a": "soft"}
@@ -74,9 +75,14 @@ def table(heads: Sequence, rows: Iterable, frame: str = "across", kind: str = ""
             f"{f'<thead><tr>{top}</tr></thead>' if headed else ''}<tbody>{body}</tbody></table></div>")
 
 
+def prose(text: str) -> str:
+    """A sentence as HTML: escaped, and what stands between two back-quotes as code."""
+    return QUOTED.sub(r"<code>\1</code>", escape(text))
+
+
 def warned(texts: Sequence, heading: str = "") -> str:
     """A box of warnings under a heading, "" without one."""
-    told = "".join(f"<p>{escape(text)}</p>" for text in texts)
+    told = "".join(f"<p>{prose(text)}</p>" for text in texts)
     return told and f"<div class='verdict warn'>{heading and f'<b>{heading}</b>'}{told}</div>"
 
 
@@ -87,7 +93,7 @@ def figure(number: int | str, svg: str, caption: str, alternative: str) -> str:
     svg = re.sub(r'\bid="([^"]+)"', rf'id="f{number}\1"', svg)
     svg = re.sub(r'(url\(|href=")#', rf"\1#f{number}", svg)
     svg = re.sub(r"(?<=: )#[0-9a-f]{6}\b", lambda one: f"var(--{INKS[one[0]]})" if one[0] in INKS else one[0], svg)
-    return f"<figure>{svg}<figcaption>{escape(caption)}</figcaption></figure>"
+    return f"<figure>{svg}<figcaption>{prose(caption)}</figcaption></figure>"
 
 
 def encoded(value) -> str:

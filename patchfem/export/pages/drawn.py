@@ -39,7 +39,8 @@ def _of_rows(table: dict, most: int) -> Drawn:
     kinds = np.unique(np.asarray(table["outcome"], str), return_index=True)[1]
     ends = np.array(sorted({*ends, *kinds.tolist()}), int)
     cases = np.union1d(_evenly(number, max(most - ends.size, FEWEST)), ends)
-    return Drawn(cases, f"{cases.size} of {number} cases are drawn: evenly spaced ones, and those with the largest or "
+    return Drawn(cases, f"{cases.size} of {number} cases are drawn: evenly spaced cases, and the cases with the "
+                        "largest or "
                         "smallest value of a measure or a key.")
 
 

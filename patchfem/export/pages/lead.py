@@ -113,10 +113,10 @@ def _left(table: dict, outcome: np.ndarray, known: bool) -> str:
         said.append(f"{count} of {outcome.size} cases {'has' if count == 1 else 'have'} no result yet and "
                     f"{'is' if count == 1 else 'are'} left out.")
     if ran.size and not np.isin(ran, SETTLED).any() and not known:
-        said.append("No case has settled, so this describes the end of each run.")
+        said.append("No case has settled, so this answer describes the end of each run.")
     first = table.get("first", "")
     if first and not np.isfinite(table["measures"].get(first, {"values": ()})["values"]).any():
-        said.append(f"No case has a value of {label(first)}, so this describes other measures.")
+        said.append(f"No case has a value of {label(first)}, so this answer describes other measures.")
     return joined(said)
 
 

@@ -34,7 +34,8 @@ def told(table: dict, trusted: dict, settled: np.ndarray) -> tuple:
     moves = not settled.any() or Outcome.TRANSIENT.value in list(table["outcome"])
     names, first = asked_first(SPREAD, table), table.get("first", "")
     rank = sentence(ranks, left, moves) if not first or first in ranks or first not in table["measures"] else \
-        f"What {label(first)} depends on cannot be told from these {of} cases; more cases may show it." if ranks else ""
+        (f"These {of} cases do not show on which key the {label(first)} depends most; more cases may show this."
+         if ranks else "")
     rank = joined([one for one in (rank, trend(table, ranks, settled)) if one])
     few = "" if rank else too_few(table, settled)
     return ranks, rank or few, found, "" if few else scatter(found, of, settled.any() and moves, names)
@@ -133,7 +134,7 @@ def sentence(ranks: dict, left: int = 0, moves: bool = True) -> str:
     if name is None:
         return ""
     first, *others = ranks[name]
-    said = [f"depends most on {first.key}, which is involved in {percent(first)} of the variance{_between(first)}"]
+    said = [f"depends most on {first.key}, which contributes to {percent(first)} of the variance{_between(first)}"]
     said += [f"then on {one.key} ({percent(one)})" for one in others[:NAMED - 1]]
     if len(others) >= NAMED:
         said.append(f"least on {others[-1].key} ({percent(others[-1])})")
@@ -203,9 +204,9 @@ def picture(ranks: dict) -> str:
                  f"<td class=bars>{_bar(one)}</td>"] for one in shares]
         parts.append(f"<h3>{linked(label(name), name)}</h3>"
                      + document.table(("key", ">alone", ">total", ">from, to", "share"), rows, "wide", "shares"))
-    return ("<p class=soft>The bars show the share of each key in the variance over the cases: the key alone (dark) "
-            "and with its interactions (light). "
-            "The line is the interval of the share with interactions.</p>" + "".join(parts))
+    return ("<p class=soft>The bars show the fraction of the variance over the cases that is due to each key: due to "
+            "the key alone (dark), and due to the key together with its interactions with other keys (light). The "
+            "line is the interval of the fraction with interactions.</p>" + "".join(parts))
 
 
 def _bar(one) -> str:
@@ -229,5 +230,6 @@ def spread(found: dict) -> str:
     if not rows:
         return ""
     return (document.table(("measure", ">5 %", ">half", ">95 %", "unit", ">cases", ">miss the tolerance"), rows, "wide")
-            + "<p class=soft>The curve gives the share of the random cases with a smaller value. If any case has "
-              "settled, only settled cases count. Cases that miss the tolerance are included with their values.</p>")
+            + "<p class=soft>The curve gives, for each value, the fraction of the random cases with a smaller value. "
+              "If any case has settled, only settled cases count. Cases that miss the tolerance are included with "
+              "their values.</p>")

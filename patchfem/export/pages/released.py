@@ -45,6 +45,7 @@ def swung(time, output) -> str:
     last = np.ptp(output[time >= time[-1] - 0.1 * (time[-1] - time[0])]) / 2
     if last > RESTS * far.max():
         at = short(float(time[-1]), "s", 3)
-        return f"{first} and still moves by {say(float(last), 3)} half peak-to-peak at the end, after {at}"
+        return f"{first} and at the end, after {at}, still moves with an amplitude (half peak-to-peak) of " \
+               f"{say(float(last), 3)}"
     rests = f"comes to rest at {say(end, 3)} after {short(float(time[beyond + 1]), 's', 3)}"
     return f"{first}, reverses {turns.size} times and {rests}" if turns.size else f"{first} and {rests}"

@@ -10,7 +10,7 @@ from ...scales import LADDERS, axis_unit, rounded
 from ..missed import over
 from ..written import NUMBER, brief, label
 from . import allowed, document, peaks, ranked
-from .document import Section
+from .document import Section, prose
 from .drawn import BAR, SHORT, digits, drawn
 from .lead import FIRST, SETTLED, Lead, columns, lead_of
 from .words import is_share, linked, zero_below
@@ -93,7 +93,7 @@ def _along(keys: list) -> str:
 
 def _explorer(said: str) -> str:
     """The choices and the place of the picture; `explorer.js` fills both; said: which cases are drawn, "" for all."""
-    thinned = said and f"<p class=soft>{escape(said)}</p>"
+    thinned = said and f"<p class=soft>{prose(said)}</p>"
     return ("<div class=choices><label>Measure<select id=measure></select></label>"
             "<label>Key on the axis<select id=along></select></label>"
             "<label>Logarithmic axis<input type=checkbox id=log-along></label>"
@@ -119,9 +119,9 @@ def _lead(table: dict, said: Lead) -> str:
     number, over = len(table["outcome"]), " × ".join(one["name"] for one in table["keys"])
     ended = ", ".join(f"{count} {label(name)}" for name, count in Counter(table["outcome"]).most_common())
     first, others = said.sentences()[:1], said.sentences()[1:]
-    lines = [*map(escape, first), f"<b>{number} case{'s' * (number != 1)}</b> over {escape(over)}: {escape(ended)}.",
+    lines = [*map(prose, first), f"<b>{number} case{'s' * (number != 1)}</b> over {escape(over)}: {escape(ended)}.",
              *map(escape, others)]
-    lines += [f"<i>{escape(label(one))}</i>: {escape(one.sentence)}" for one in Outcome
+    lines += [f"<i>{escape(label(one))}</i>: {prose(one.sentence)}" for one in Outcome
               if one.value in table["outcome"] and one.value not in SETTLED]
     text = "".join(f"<p>{line}</p>" for line in lines)
     fault = document.warned([f"{count} case{'s' if count > 1 else ''} failed: {why}"
@@ -173,7 +173,7 @@ def _number(value: float, error: float, least: float) -> str:
 
 
 def _meanings(table: dict) -> str:
-    rows = [(f" id='measure-{escape(name)}'", [escape(label(name)), escape(one["unit"]), escape(one.get("means", ""))])
+    rows = [(f" id='measure-{escape(name)}'", [escape(label(name)), escape(one["unit"]), prose(one.get("means", ""))])
             for name, one in table["measures"].items()]
     return document.table(("measure", "unit", "meaning"), rows)
 

@@ -13,6 +13,7 @@ from ...response.rows import of_first, of_number
 from ...runs.results.patch_rows import TABLE as STATIC
 from ...runs.results.result import Result
 from ..summary import measure_object
+from .document import prose
 
 G, LBF, INCH = 9.80665, 4.4482216152605, 0.0254
 DEG = ("deg", 180 / pi)
@@ -34,7 +35,8 @@ OF_WHAT = {  # said behind a value that would otherwise be taken for another, or
 SCATTER = "_scatter"  # behind the name of what a record of a random drive shows: how far other records differ
 SHAKEN = {"relative_displacement_rms": "the displacement of the output is {} rms",
           "absolute_acceleration_rms": "the acceleration of the output is {} rms",
-          "response_frequency": "H1 peaks at {}", "response_damping": "the damping ratio of that peak is {}"}
+          "response_frequency": "the frequency response H1 peaks at {}",
+          "response_damping": "the damping ratio of that peak is {}"}
 BETWEEN = ("jump_level",)  # known to lie between two levels of the drive, whatever the tolerance
 ROUND = 1e-12  # of the friction force times the motion: work that is round-off
 NONE = MappingProxyType({})
@@ -142,7 +144,8 @@ def _slid(slip: dict | None, done: str, patch: bool) -> str:
         return done
     if slip["value"] <= max(_open(slip), NO_SLIP):
         return f"{done} {_holds(patch, 'cycle')}"
-    return f"{done} Slip amplitude {pair('slip_amplitude', slip)}, half peak-to-peak, averaged over the interface."
+    return (f"{done} Slip amplitude (half the peak-to-peak slip, averaged over the interface): "
+            f"{pair('slip_amplitude', slip)}.")
 
 
 def _open(one: dict) -> float:
@@ -186,7 +189,7 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str, str], s
         else:
             for name, text in SHAKEN.items():
                 said(name, text)
-            said("relative_displacement_amplitude", "the largest swing is {} half peak-to-peak"
+            said("relative_displacement_amplitude", "half the peak-to-peak displacement of the output is {}"
                  if next(iter(SHAKEN)) in measures else "displacement amplitude at the output {} (half peak-to-peak)")
             said("relative_displacement_amplitude_steady", "this amplitude would settle at {}")
             said("absolute_acceleration_peak", "peak acceleration {}")
@@ -243,10 +246,10 @@ def least_known(result: Result) -> str:
 
     steps = [name for name in wide if name in BETWEEN]
     name = max(wide.keys() - set(steps), key=lambda one: ("±" in told[one], wide[one], one), default="")
-    of_steps = f"{', '.join(map(known, steps))}, has an error of one step between drive levels"
+    of_steps = f"{', '.join(map(known, steps))}, has an error of one step between the drive levels of the scene"
     if not name:
         return f"{of_steps}."
-    but = f"; {of_steps}, which the scene sets" if steps else ""
+    but = f"; {of_steps}" if steps else ""
     least = f"; closest to the tolerance is {known(name)}" if "±" in told[name] else ""
     sharp = "" if all("±" in one for one in told.values()) else f"; {SHARP}"
     return f"Every measure with an error estimate meets the tolerance {tolerance:g}{least}{but}{sharp}."
@@ -325,7 +328,7 @@ def fragment(summary: dict, sentence: str, cycles: float | None, released: str =
         cells = f"<td>{escape(name)}</td><td style='text-align:right'>{escape(value.strip())}</td>"
         rows.append(f"<tr>{cells if value else f'<th colspan=2>{escape(name)}</th>'}</tr>")
     title = f"<b>{escape(summary['title'])}</b><br>" if summary["title"] else ""
-    warnings = "".join(f"<p>&#9888; {escape(text)}</p>" for text in summary["warnings"])
+    warnings = "".join(f"<p>&#9888; {prose(text)}</p>" for text in summary["warnings"])
     answer = escape(f"{summary['outcome']}: {sentence} {headline(summary, cycles, released=released)}")
     return f"<div>{title}{answer}{warnings}<table>{''.join(rows)}</table></div>"
 

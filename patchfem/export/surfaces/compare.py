@@ -19,7 +19,7 @@ from ...surface.quantity import LEVEL, Quantity
 from ...surface.roughness.parameters import Heights, abbott
 from ...surface.roughness.spectrum import BAND
 from ...surface.scans.change import Change, hidden
-from ..pages.document import Section, document, figure, table, warned
+from ..pages.document import Section, document, figure, prose, table, warned
 from ..pages.words import pair
 from . import line, pictures
 from .areal import write_columns, write_x3p
@@ -37,7 +37,8 @@ WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_ma
          "track_depth_floor": "track depth, floor", "track_area_gross": "track, lost area",
          "track_pile_up": "track, pile-up", "track_area_net": "track, lost area minus pile-up",
          "hidden_wear": "mean wear that a tilt may hide",
-         "worn_volume": "worn volume", "grown_volume": "grown volume", "worn_share": "share of the region that is worn",
+         "worn_volume": "worn volume", "grown_volume": "grown volume",
+         "worn_share": "fraction of the common region that is worn",
          "shift_x": "shift along x", "shift_y": "shift along y", "rotation": "rotation",
          "worn_depth_mean_from_abbott": "worn depth, mean, from Abbott curves"}
 DRAWN = 1_000_000  # heights that a histogram and an Abbott curve are drawn from, spread over a larger scan
@@ -197,21 +198,22 @@ def page(parts: list, found: tuple, directions: list = (), pressing: Pressed | N
     names = [Path(each.source).name for each in (parts[0].before, parts[0].after)]
     title = f"{names[0]} and {names[1]}: before and after"
     lead = (f"<p class=soft>patchfem {escape(__version__)}</p><div class=verdict>"
-            f"<b>{escape(headline[0].upper() + headline[1:])}.</b>"
-            + "".join(f"<p>{escape(text)}</p>" for text in sentences) + "</div>"
+            f"<b>{prose(headline[0].upper() + headline[1:])}.</b>"
+            + "".join(f"<p>{prose(text)}</p>" for text in sentences) + "</div>"
             + warned([f"{text}." for one in parts for text in one.notes]))
     sections = []
     if directions:
         said = "; ".join(f"{when} {' '.join(shown(one)[:2])}" for when, one, _ in directions)
         sections.append(Section("directions", "x over y", figure(
             "xy", pictures.crossed(parts, directions),
-            "Left: spectra of both directions. Right: amplitude of the band and slope along x over those along y, with "
-            "their 95 % intervals; the value 1 means that the surface is equally rough in both directions.",
-            f"Waves along x over those along y: amplitude {said}")))
+            "Left: spectra of both directions. Right: amplitude of the band along x divided by that along y, and "
+            "slope along x divided by that along y, with their 95 % intervals; the value 1 means that the "
+            "surface is equally rough in both directions.",
+            f"Waves along x divided by waves along y: amplitude {said}")))
     for number, one in enumerate(parts):
         body = [*(figure(f"{number}{place}", *each) for place, each in enumerate(figures(one))), _table(one),
-                f"<p class=soft>{escape(NOTE)}</p>"]
-        head = "Changes at each place, and waves" if one.change is not None else \
+                f"<p class=soft>{prose(NOTE)}</p>"]
+        head = "Changes of depth at each place, and changes of the waves" if one.change is not None else \
             "Waves" if one.direction and parts[0].change is not None else "What changed"
         sections.append(Section(f"changes{number}", f"{head}{one.direction and f' along {one.direction}'}",
                                 "\n".join(body)))
@@ -234,7 +236,7 @@ def figures(one: Comparison) -> list:
         out.append((pictures.overlay(found.x, found.first - tilt, second - tilt, worn, _closer(found.x, worn)),
                     "The trace measured after wear, moved by shift, tilt and offset, is drawn over the trace measured "
                     "before.",
-                    f"Both traces, registered: mean worn depth {' '.join(shown(one.worn.mean)[::2])}"))
+                    f"Both traces after alignment: mean worn depth {' '.join(shown(one.worn.mean)[::2])}"))
         out.append((pictures.difference(found.x, found.rest, found.used, found.noise, None),
                     "The curve is the depth of the second trace (after wear) below the first trace (before wear). "
                     "Blue: the unworn heights to which shift, tilt and offset were fitted.",
@@ -276,7 +278,7 @@ def _maps(one: Change) -> list:
     there = there[::-(-there.size // DRAWN)]
     heights = [each.ravel()[there] for each in (first, second)]
     out.append((pictures.both_heights(heights, [_bearing(z) for z in heights]),
-                "Left: share of the heights in each class. Right: Abbott curves. Heights are those of the region "
+                "Left: fraction of the heights in each class. Right: Abbott curves. Heights are those of the region "
                 "common to both scans, measured from the reference plane of the first scan (before wear).",
                 "Histograms and Abbott curves of the heights before and after"))
     if one.track is not None and not one.track.why:
@@ -315,7 +317,7 @@ def _table(one: Comparison) -> str:
         value, interval, unit = shown(quantity)
         cells = [escape(value), escape(interval), escape(unit)] if quantity.value is not None else ["&ndash;", "", ""]
         text = quantity.text if quantity.value is not None else f"{quantity.text}: not available"
-        rows.append([escape(WORDS[key]), *cells, f"<td class=soft>{escape(text)}</td>"])
+        rows.append([escape(WORDS[key]), *cells, f"<td class=soft>{prose(text)}</td>"])
     return table(("quantity", ">value", ">95 %", "unit", "meaning"), rows)
 
 
@@ -328,13 +330,13 @@ def _pressing(found: Pressed) -> str:
     if sides:
         peaks = ", ".join(f"{name} {_said('pressure_peak', one.measures.get('pressure_peak'))}" for name, one in
                           (("before", found.before), ("after", found.after)) if one is not None)
-        parts.append(figure("p", pictures.pressures(sides), "Normal stress of the pressed patch; all other settings of "
-                                                            "the scene are the "
-                                                            "same.", f"Pressure along the patch, largest: {peaks}"))
+        parts.append(figure("p", pictures.pressures(sides), "Normal stress of the patch, pressed once with each of "
+                                                            "the two surfaces; all other settings of the scene are "
+                                                            "the same.", f"Pressure along the patch, largest: {peaks}"))
         rows = [[escape(words), *(escape(_said(name, one)) for one in measures), _times(*measures)]
                 for name, words, *measures in found.rows()]
         parts.append(table(("measure", ">before", ">after", ">after / before"), rows))
-    parts += [f"<p class=soft>{escape(text)}.</p>" for text in found.lacking]
+    parts += [f"<p class=soft>{prose(text)}.</p>" for text in found.lacking]
     return "\n".join(parts)
 
 

@@ -41,7 +41,7 @@ def _wide(depth) -> np.ndarray:
 def section(one: Change) -> Section:
     """The part of the page in which the line stands."""
     every = [-(-count // MOST) for count in one.volumes.filled.shape[::-1]]
-    sample = "" if max(every) == 1 else f" The page shows one height of each block of {every[0]} x {every[1]}."
+    sample = "" if max(every) == 1 else f" Of each block of {every[0]} x {every[1]} heights the page shows only one."
     text = ("Drag on the map to draw a line, or click to move it through a point; the sliders shift and turn the line. "
             "Heights are measured from the reference plane of the first scan (before wear), with which the second scan "
             "(after wear) is aligned. Worn depth is positive where material was lost; missing depths are taken from "

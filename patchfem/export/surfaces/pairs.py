@@ -9,14 +9,14 @@ from ...disk.whole import write_rows, write_text
 from ...scales import LADDERS, plain
 from ...surface.compare import pairs, verdict
 from ...surface.quantity import Mean
-from ..pages.document import Section, document, figure, table, warned
+from ..pages.document import Section, document, figure, prose, table, warned
 from . import compare, pictures, worn
 
 TRACES, SCANS = ("worn_depth_mean", "amplitude_ratio"), ("worn_volume", "worn_depth_mean")  # the main numbers
 ABOUT = ("The mean is taken over the pairs that have a value, each with equal weight. The interval is the 95 % "
          "interval of the mean, by Student's t from the scatter of the pairs, or from the intervals of the pairs if "
          "these give a wider interval. The interval does not include an error that all pairs share, such as "
-         "calibration. The scatter is the standard deviation of one pair.")
+         "calibration. The scatter is the standard deviation of the values of single pairs.")
 
 
 def answers(asked: list, direction: str = "", done=None, **how) -> list[dict]:
@@ -56,8 +56,8 @@ def notes(rows: list) -> list:
     for group, count, found in pairs.means_of(rows):
         less = [f"{words(name)} ({one.count})" for name, one in found.items() if one.count < count]
         if less:
-            out.append(f"{title(*group)}: not all {count} pairs have {', '.join(less)}; such a mean says nothing about "
-                       "the other pairs")
+            out.append(f"{title(*group)}: not all {count} pairs have a value of {', '.join(less)}; the mean of this "
+                       "value says nothing about the other pairs")
     return out
 
 
@@ -115,7 +115,7 @@ def headline(rows: list) -> str:
     """How many pairs there are, show wear, and failed."""
     failed = sum(row["outcome"] == "failed" for row in rows)
     worn = sum((row[_leading(row)[0]]["low"] or 0.0) > 0 for row in rows if row["outcome"] == "done")
-    return f"{len(rows)} pairs, {worn} with wear shown{f', {failed} failed' * (failed > 0)}"
+    return f"{len(rows)} pairs, {worn} with detected wear{f', {failed} failed' * (failed > 0)}"
 
 
 def _leading(row: dict) -> tuple:
@@ -151,7 +151,7 @@ def page(rows: list, name: str) -> str:
     sections = [Section(f"means{number}", _heading(group, count), _means(number, group, rows, found))
                 for number, (group, count, found) in enumerate(pairs.means_of(rows)) if found]
     cells = [[str(row["line"]), *map(escape, (row["before"], row["after"] + _along(row), *row["labels"].values())),
-              escape(row["message"] or row["verdict"]), escape("; ".join(_lead(row)))] for row in rows]
+              prose(row["message"] or row["verdict"]), escape("; ".join(_lead(row)))] for row in rows]
     heads = (">line", "before", "after", *map(escape, rows[0]["labels"]), "verdict", "main numbers, 95 %")
     sections.append(Section("pairs", "Each pair", table(heads, cells)))
     return document(f"{name}: pairs before and after", lead, sections)
@@ -177,7 +177,7 @@ def _means(number: int, group: tuple, rows: list, found: dict) -> str:
         value, interval, unit = compare.shown(one.mean)
         cells.append([escape(words(name)), value, interval, _scatter(one, unit), str(one.count), unit])
     return "\n".join([*drawn, table(("quantity", ">mean", ">95 %", ">scatter", ">pairs", "unit"), cells),
-                      f"<p class=soft>{escape(ABOUT)}</p>"])
+                      f"<p class=soft>{prose(ABOUT)}</p>"])
 
 
 def write_page(path: Path, rows: list, name: str) -> None:

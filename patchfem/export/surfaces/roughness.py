@@ -12,7 +12,7 @@ from ...scales import LADDERS, plain, step_of
 from ...surface.quantity import Mean, Quantity
 from ...surface.roughness import means, peaks
 from ...surface.roughness.report import RoughnessReport, fitting_cutoff
-from ..pages.document import Section, document, figure, table, warned
+from ..pages.document import Section, document, figure, prose, table, warned
 from . import asperities, pictures
 from .areal import write_columns, write_profile, write_x3p
 
@@ -20,8 +20,10 @@ ALONG = ("PSm", "RSm", "dominant_wavelength", "Sal")  # lengths along the surfac
 AREAL = ("Interval: 90 % interval (from 5 % to 95 %) of the mean over all scans of this size, for a surface with "
          "Gaussian heights and the spectrum of this scan. A kurtosis above 3 makes the interval wider. The interval "
          "holds neither for a surface that differs from place to place nor for waves longer than the scan.")
-MEANS = ("Interval: 95 % of the mean, by Student's t from the scatter of the files, each with equal weight; an error "
-         "common to all, such as calibration, is not included. Scatter: standard deviation of one file.")
+MEANS = ("Interval: 95 % interval of the mean, by Student's t from the scatter of the files, each with equal weight. "
+         "The interval does not include an error common to all files, such as calibration. Scatter: standard "
+         "deviation of the values of "
+         "single files.")
 INTERVAL = ("Interval: 90 % interval (from 5 % to 95 %) of the mean over all traces of this length, for a surface with "
             "Gaussian heights and the spectrum of this trace. A kurtosis above 3 makes the interval wider. The "
             "interval does not hold for a surface that differs from place to place.")
@@ -65,9 +67,10 @@ def heading(report: RoughnessReport) -> str:
             f' (--cutoff "{say(fits)}" '
             'is the longest standard cut-off that fits five times into the trace)' if fits else
             ", and no standard cut-off fits five times into the trace")
-        return text + (f"; S-filter at {say(short)}, half of it trimmed at each end" if short else "")
-    return (f"{text}; Gaussian filter at {say(report.cutoff)}, half of it trimmed at each end, "
-            + (f"S-filter at {say(short)}, trimmed in the same way" if short else "no filter for short waves"))
+        return text + (f"; S-filter at {say(short)}, half this length trimmed at each end" if short else "")
+    return (f"{text}; Gaussian filter at {say(report.cutoff)}, half this length trimmed at each end, "
+            + (f"S-filter at {say(short)}, half this length trimmed at each end" if short else
+               "no filter for short waves"))
 
 
 def _areal_filters(short: float | None, cutoff: float | None, holes: bool) -> str:
@@ -76,7 +79,8 @@ def _areal_filters(short: float | None, cutoff: float | None, holes: bool) -> st
     if not parts:
         return "; no filter"
     surface = " (the S-L surface)" if short and cutoff else " (the S-F surface)" if short else ""
-    return (f"; Gaussian {' and '.join(parts)}{surface}, half of {'each' if parts[1:] else 'it'} trimmed at each border"
+    lengths = "each length" if parts[1:] else "this length"
+    return (f"; Gaussian {' and '.join(parts)}{surface}, half {lengths} trimmed at each border"
             + ("; near a hole the filter weights of the measured heights are scaled to a sum of one" if holes else ""))
 
 
@@ -227,7 +231,7 @@ def write_page(path: Path, reports: list) -> None:
 def _mean_section(each: means.Means) -> Section:
     rows = table(("parameter", ">mean", ">95 %: from .. to", ">scatter", "unit"), _means(each))
     doubt = warned([f"{each.doubt[0].upper()}{each.doubt[1:]}."]) if each.doubt else ""
-    return Section(f"mean-{each.kind}", _of_many(each), f"{doubt}{rows}<p class=soft>{escape(MEANS)}</p>")
+    return Section(f"mean-{each.kind}", _of_many(each), f"{doubt}{rows}<p class=soft>{prose(MEANS)}</p>")
 
 
 def _section(number: int, report: RoughnessReport) -> Section:
@@ -235,7 +239,7 @@ def _section(number: int, report: RoughnessReport) -> Section:
     told = [*report.notes, *([report.tip.sentence] if report.tip is not None and not report.tip.reaches else [])]
     parts.append(warned([f"{text}." for text in told]))
     if report.tip is not None and report.tip.reaches:
-        parts.append(f"<p class=soft>Stylus: {escape(report.tip.sentence)}.</p>")
+        parts.append(f"<p class=soft>Stylus: {prose(report.tip.sentence)}.</p>")
     parts += [figure(f"{number}{place}", *one) for place, one in enumerate(figures(report))]
     parts += [_table(report), _printed(report), _definitions(report)]
     if report.kind == "profile":
@@ -294,11 +298,11 @@ def _table(report: RoughnessReport) -> str:
     for one in report.values:
         value, interval, unit = shown(one, units[one.name])
         rows.append([escape(one.name), *([escape(value), escape(interval), escape(unit)] if one.value is not None else
-                                         [f"<td colspan=3 class=soft>{escape(one.reason)}</td>"])])
+                                         [f"<td colspan=3 class=soft>{prose(one.reason)}</td>"])])
     return (f"<h3>Parameters</h3>{table(('parameter', '>value', '>90 %: from .. to', 'unit'), rows)}"
             + (f"<p class=soft>{escape(AREAL if report.kind == 'areal' else INTERVAL)}</p>"
                if any(one.low is not None for one in report.values) else "")
-            + "".join(f"<p class=soft>No interval of {escape(', '.join(names))}: {escape(reason)}.</p>"
+            + "".join(f"<p class=soft>No interval of {escape(', '.join(names))}: {prose(reason)}.</p>"
                       for reason, names in _untold(report).items()))
 
 
@@ -314,5 +318,5 @@ def _printed(report: RoughnessReport) -> str:
 
 
 def _definitions(report: RoughnessReport) -> str:
-    rows = [[escape(one.name), escape(one.text)] for one in report.values]
+    rows = [[escape(one.name), prose(one.text)] for one in report.values]
     return f"<h3>Definitions</h3>{table(('', ''), rows)}"

@@ -18,7 +18,7 @@ from ...surface.quantity import LEVEL, Quantity, refused
 from ..drawing.charts import axis, chart, line, loop, mark
 from ..drawing.pictures import draw
 from ..pages import beside
-from ..pages.document import Section, document, figure, table, warned
+from ..pages.document import Section, document, figure, prose, table, warned
 from ..pages.sweep import label
 from ..pages.words import pair
 from ..readback import numeric, readable, variables, wanted
@@ -34,7 +34,7 @@ TEXTS = {"worn_volume": ("m3", "material lost over the whole patch, both pieces 
          "worn_depth_max": ("m", "largest worn depth"), "worn_depth_mean": ("m", "mean worn depth: worn volume divided "
                                                                                  "by the area"),
          "worn_area": ("m2", "worn area of the section: worn volume divided by the width"),
-         "worn_share": ("1", "share of the patch that lost more than the error of the depth"),
+         "worn_share": ("1", "fraction of the patch area that lost more than the error of the depth"),
          "hidden_wear": ("m", "mean of the highest straight line that nowhere exceeds the worn depth: uniform and "
                               "wedge-shaped wear, which a trace of this part alone could not show")}
 PLANE = ("mean of the highest plane that nowhere exceeds the worn depth: uniform and wedge-shaped wear, which a scan "
@@ -125,7 +125,7 @@ def read(path: Path) -> Worn:
         shape = (size,) if y is None else (y.size, size)
         depth = held["worn_depth"][-1] if "worn_depth" in held else np.zeros(size)
         wanted(all(one.shape in ((size,), shape) for one in (depth, held["unloaded_gap"])),
-               "its fields do not match its strips")
+               "the fields do not match the strips")
     area, gap, depth = (np.broadcast_to(one, shape) for one in (held["weight"], held["unloaded_gap"], depth))
     cycles = float(held["wear_cycle"][-1]) if "wear_cycle" in held else 0.0
     return Worn(run, str(path), held["x"], y, area if y is None else area / y.size, gap, depth,
@@ -323,9 +323,11 @@ def verdict(one: Lost) -> tuple:
         mean, unseen, seen = track["depth_mean"], track["hidden_wear"], "trace within this part"
         inside = (x >= track["from"].value) & (x <= track["to"].value)
         ends = hidden_line(x[inside], one.depth[inside])
-        head += f", by {say(mean.value, 3)} from x = {say(track['from'].value, 3)} to {say(track['to'].value, 3)}"
+        head += (f", and by {say(mean.value, 3)} on average from x = {say(track['from'].value, 3)} to "
+                 f"{say(track['to'].value, 3)}")
     if unseen.value > 0.01 * mean.value:
-        head += f"; {say(unseen.value, 3)} of this is {_kind(ends)} that a {seen} alone could not show"
+        head += (f"; of the {say(mean.value, 3)}, {say(unseen.value, 3)} is {_kind(ends)} that a {seen} alone could "
+                 "not show")
     place, volume = place_of(one.after, np.argmax(one.depth)), one.values["worn_volume"]
     told = [f"Worn volume {' '.join(shown(volume)[::2])}; {say(float(one.depth.max()), 3)} at the deepest place, "
             f"{place}; both pieces together; {one.after.cycles:.6g} cycles of wear"
@@ -384,8 +386,9 @@ def _rows(one: Lost) -> list:
     track = {f"track_{name.removesuffix('_mean')}": each for name, each in one.track.items()}
     words = WORDS | {"track_from": "worn part from", "track_to": "worn part to", "track_depth": "worn part, mean",
                      "track_depth_floor": "worn part, floor",
-                     "track_hidden_wear": "worn part, uniform wear and wedge",
-                     "hidden_wear": "uniform wear and wedge, mean", "worn_share": "share of the patch that is worn"}
+                     "track_hidden_wear": "uniform and wedge-shaped wear, in the worn part",
+                     "hidden_wear": "uniform wear and wedge, mean",
+                     "worn_share": "fraction of the patch area that is worn"}
     of_part = ("track_from", "track_to", "track_depth", "track_depth_floor", "track_hidden_wear")
     shown_of = one.values | {name: track[name] for name in of_part if name in track}
     return [(words[name], each) for name, each in shown_of.items()]
@@ -406,10 +409,10 @@ def write_page(path: Path, one: Lost, found: tuple) -> None:
     """Write the page, the verdict first, nothing fetched."""
     names = [Path(each.path).resolve().name for each in (one.before, one.after)]
     lead = (f"<p class=soft>patchfem {escape(__version__)}</p><div class=verdict>"
-            f"<b>{escape(found[0][0].upper() + found[0][1:])}.</b>"
-            + "".join(f"<p>{escape(text)}</p>" for text in found[1]) + "</div>" + warned(one.notes))
+            f"<b>{prose(found[0][0].upper() + found[0][1:])}.</b>"
+            + "".join(f"<p>{prose(text)}</p>" for text in found[1]) + "</div>" + warned(one.notes))
     rows = [[escape(name), *map(escape, _texts(each)),
-             f"<td class=soft>{escape(each.text + (f': {each.reason}' if each.reason else ''))}</td>"]
+             f"<td class=soft>{prose(each.text + (f': {each.reason}' if each.reason else ''))}</td>"]
             for name, each in _rows(one)]
     body = [figure(number, *each) for number, each in enumerate(_figures(one))]
     body.append(table(("quantity", ">value", ">interval", "unit", "meaning"), rows))
@@ -452,5 +455,5 @@ def _figures(one: Lost) -> list:
     return [(draw([chart("", place, axis("gap of the unloaded surfaces", up), marks)], height=2.9),
              "The gap between the unloaded surfaces includes the wear.", "Gap of the surfaces before and after"),
             (draw([chart("", place, down, depths)], height=2.5), "The curve is the depth lost by both pieces together "
-             "between the two runs. The dashed line is the part that a trace alone could not show.",
+             "between the two runs. The dashed line is the part of this depth that a trace alone could not show.",
              f"Worn depth: mean {say(one.values['worn_depth_mean'].value, 3)}")]

@@ -129,7 +129,8 @@ def read_table(folder: Path) -> dict:
         raise PatchfemError(f"{folder}: not the folder of a sweep: it has no {name}") from None
     except Exception as fault:  # damaged files have many ways to fail
         said = " ".join(str(fault).split())[:200]
-        raise PatchfemError(f"{folder}: its sweep cannot be read: {said or type(fault).__name__}") from None
+        raise PatchfemError(f"{folder}: the sweep in this folder cannot be read: "
+                            f"{said or type(fault).__name__}") from None
 
 
 def _whole(table: dict) -> dict:
@@ -166,7 +167,8 @@ def _table(folder: Path, rows: list, keys: list, file) -> dict:
     held = {name: float(file.attrs[name]) for name in ("tolerance", "patch_length", "patch_width")
             if name in file.attrs}
     title = tomllib.loads(text).get("title") or folder.resolve().name
-    wanted(isinstance(title, str) and isinstance(sets, list), "sweep.nc: its scene or its --set cannot be read")
+    wanted(isinstance(title, str) and isinstance(sets, list), "sweep.nc: the scene or the --set stored in this file "
+                                                              "cannot be read")
     return {**titles(columns, title), **_shared(held, columns),
             "version": str(file.attrs["source"]).removeprefix("patchfem "), "scene": text,
             "command": shlex.join(["patchfem", "sweep", str(file.attrs["scene_file"]),

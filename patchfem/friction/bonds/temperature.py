@@ -36,8 +36,8 @@ def _scaled(name: str, value: float, exponent, key: str):
     total = np.log(value) + exponent
     if not ((total < np.log(np.finfo(float).max)) & (total > np.log(np.finfo(float).tiny))).all():
         worst = float(np.asarray(total).flat[np.argmax(np.abs(total))]) / np.log(10)
-        raise PatchfemError(f"at the surface temperature {name} would be 1e{worst:.0f}, outside the range of "
-                            f"floating-point numbers; lower temperature.{key}, or bring temperature.surface closer to "
+        raise PatchfemError(f"at the surface temperature {name} would be about 1e{worst:.0f}; a computer cannot "
+                            f"represent such a number; lower temperature.{key}, or bring temperature.surface closer to "
                             "temperature.reference")
     out = value * np.exp(exponent) if (np.abs(exponent) < 600).all() else np.exp(total)
     return float(out) if np.ndim(out) == 0 else out

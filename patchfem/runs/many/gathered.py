@@ -72,7 +72,7 @@ def refuses(model: Model) -> str:
             or listed(model.friction):
         return "the case is not an elastic patch with a law of bonds"
     if model.rig.load_varies or model.patch.strips is not None or model.grooves is not None or model.wear is not None:
-        return "its load changes, or it has strips, grooves or wear"
+        return "the load of the case changes, or the case has strips, grooves or wear"
     return "" if engine_of(model) is MARCH else "the case is not integrated in time"
 
 
@@ -96,10 +96,11 @@ def no_lanes(model: Model) -> str:
     if rig.cycles != int(rig.cycles) or rig.cycles < 20:
         return "the case has fewer than 20 cycles, or a number of cycles that is not whole"
     if law.grows or law.order != 1 or law.initial != 1 or law.breakaway or law.ratio != 1 or not law.static > 0:
-        return "its bonds change in number or length"
+        return "the bonds of the case change in number or length"
     if model.heat is not None or model.accuracy.shear_modes is not None or unread(model):
-        return "it has [friction.temperature], accuracy.shear_modes, or an unreadable table of measured responses"
-    return "" if lanes.fits(rig.modes) else "it has too many modes"
+        return "the case has [friction.temperature] or accuracy.shear_modes, or its table of measured responses " \
+            "cannot be read"
+    return "" if lanes.fits(rig.modes) else "the case has too many modes"
 
 
 def solve(models: Sequence[Model], say=None) -> Answers:

@@ -326,7 +326,7 @@ def least_of(hidden: Hidden, mine: dict) -> dict:
     peak = hidden.corner + np.where((cell > 0) & (count <= FEW), total / (4 * count**2), 0.0)
     peak = np.maximum(np.maximum(peak, hidden.wedge), hidden.missed - total)
     turned = ROUND * (np.abs(mine["approach"]) + hidden.spread) + np.abs(mine["rotation"]) * aside * hidden.turns
-    fullness = mine["loaded_fraction"] / np.where(total == 0, np.inf, total)
+    fullness = np.divide(mine["loaded_fraction"], total, out=np.zeros(np.shape(total)), where=total != 0)
     # an edge of a contact of few nodes lies anywhere in its cell
     near = np.maximum(hidden.offset, np.where(few, 1.0, 1 / count**2)) * (not hidden.skin)
     off, outer = (near * cells + hidden.open_ends for cells in (hidden.cells, hidden.cells - hidden.between))

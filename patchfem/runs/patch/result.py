@@ -134,12 +134,12 @@ def left_out(model, patch, coarse) -> list:
     out += [f"scikit-fem assembles the stiffness of the {' and the '.join(by_forms)} piece"] if by_forms else []
     out += [*drawn_otherwise(patch.pair), *slender(asked, patch.pressure.load / patch.pieces.interface.weight.sum())]
     if patch.sharper and patch.averaging is not None:
-        out.append("a static measure is computed on points "
-                   f"{say(patch.averaging, 3)} apart if its error is then smaller; on these points short waves are "
-                   f"treated as in infinite layers; fields and motion are computed on the mesh of {patch.x.size} "
-                   "interface points")
+        out.append(f"each static measure is computed on the mesh and on points {say(patch.averaging, 3)} apart, and "
+                   "the value with the smaller error is given; on these points short waves are treated as in infinite "
+                   f"layers; fields and motion are computed on the mesh of {patch.x.size} interface points")
     elif patch.sharper:
-        out.append("a static measure is computed on Gauss-Lobatto cells of order 4 if its error is then smaller; "
+        out.append("each static measure is computed on the mesh and on Gauss-Lobatto cells of order 4, and the value "
+                   "with the smaller error is given; "
                    f"fields and motion are computed on the bilinear mesh of {patch.x.size} interface points")
     elif patch.averaging is not None and not asked.gap.rough:
         out.append("where the profile is in contact, its heights are averaged over a length of "

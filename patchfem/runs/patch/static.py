@@ -108,12 +108,13 @@ class Together(NamedTuple):
 def not_together(asked) -> str:
     """Why a `PatchModel` is not pressed together with others; "" where it may be."""
     if asked.meshes is None:
-        return "it has a mesh of its own"
+        return "the case has a mesh of its own"
     if not all(isinstance(body, TensorGrid) or body is None for level in asked.meshes.levels for body in level):
-        return "its pieces are not plain grids"
+        return "the meshes of the pieces are not plain grids"
     if asked.gap.profile is not None:
         return "a profile has its own averaging length"
-    return _not_of_one_stretch(asked) or ("" if len(asked.meshes.levels) > 2 else "its mesh has no coarser levels")
+    return _not_of_one_stretch(asked) or \
+        ("" if len(asked.meshes.levels) > 2 else "the mesh of the case cannot be made coarser")
 
 
 def _not_of_one_stretch(asked) -> str:
@@ -121,8 +122,8 @@ def _not_of_one_stretch(asked) -> str:
     if asked.strips is not None or (asked.skin is not None and asked.skin.law != "linear"):
         return "strips or a smooth skin lie between the pieces"
     if not asked.load:
-        return "no load presses it"
-    return "its pressure may have no bound" if asked.singular_ends or asked.gap.jumps else ""
+        return "no load presses the pieces together"
+    return "the pressure of the case may be unbounded" if asked.singular_ends or asked.gap.jumps else ""
 
 
 def pressing_kind(asked) -> tuple:

@@ -90,9 +90,9 @@ def of_growth(law, peak: float | None) -> list:
                    "length grows, a bond that formed while the length was small pulls harder and breaks later; set "
                    "friction.order <= 1 to keep friction near mu_s N")
     if peak is not None and peak > 1 + BOUND:
-        out.append(f'friction reaches {peak:.3g} mu_s N, because bonds that formed while the bond length was small '
-                   'last longer as the bond length grows; to keep friction within mu_s N set friction.reading = '
-                   '"report" and friction.order <= 0')
+        out.append(f'the friction force reaches {peak:.3g} times mu_s N: the bond length grows during the run, and '
+                   'bonds that formed while the bond length was small then break later; to keep the friction force at '
+                   'or below mu_s N, set friction.reading = "report" and friction.order <= 0')
     return out
 
 

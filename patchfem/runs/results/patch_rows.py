@@ -3,16 +3,17 @@
 from ...core import Row
 
 ROWS = (
-    Row("normal_load", "N", 0.0, "normal load on the interface, sum over all pairs", group="patch"),
-    Row("contact_fraction", "1", 0.0, "share of the length of the interface that is in contact; the edges of contact "
-                                      "may lie between nodes",
+    Row("normal_load", "N", 0.0, "normal load on the interface, summed over all equal patches (key `pairs`)",
+        group="patch"),
+    Row("contact_fraction", "1", 0.0, "fraction of the length of the interface that is in contact; the edges of "
+                                      "contact may lie between nodes",
         group="patch"),
     Row("pressure_peak", "Pa", 0.0, "largest normal stress on the interface", group="patch"),
     Row("moment", "N m", 1e-10, "moment of the pressure about the middle of the patch; positive if the pressure centre "
                                 "is on the side x > 0",
         group="patch"),
-    Row("rotation", "rad", 1e-12, "rotation of the upper piece about the middle of the patch; positive opens the gap "
-                                  "at +x",
+    Row("rotation", "rad", 1e-12, "rotation of the upper piece about the middle of the patch; a positive rotation "
+                                  "opens the gap at +x",
         group="patch"),
     Row("approach", "m", 1e-13, "distance by which the holders approach each other at x = 0, counted from the first "
                               "touch of the unloaded flat pieces",
@@ -49,8 +50,8 @@ ROWS = (
         group="wear"),
     Row("roll_moment", "N m", 1e-10, "moment of the pressure about "
                                      "x; needs strips that may rotate about x", group="patch"),
-    Row("roll", "rad", 1e-12, "rotation of the upper piece about x; needs [contact.strips]; positive opens the gap at "
-                              "+y", group="patch"),
+    Row("roll", "rad", 1e-12, "rotation of the upper piece about x; needs [contact.strips]; a positive rotation "
+                              "opens the gap at +y", group="patch"),
 )
 # what a mesh is chosen for
 DECISIVE = ("pressure_peak", "contact_fraction", "approach", "rotation", "normal_stiffness", "tangential_stiffness")

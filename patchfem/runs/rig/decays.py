@@ -20,6 +20,10 @@ from . import interface, numerics
 from .solution import Solution
 from .steady import balance
 
+MOVING = ("the contact slides on grooves", "the normal load changes",
+          "the strips of the patch slide independently of one another")
+NO_LOOP = "the hysteresis loop of this friction law is not known without a computation in time"
+NOT_STATIC = "no static curve of the mode was found at these amplitudes"
 APART = 16  # amplitudes a decade at which the error of the mesh is computed
 
 
@@ -99,32 +103,55 @@ def _spread(stiffness, slide) -> tuple:
     return spread(stiffness[order], slide[order])
 
 
-def left_by_mesh(model, patch, coarse, amplitudes, mode) -> np.ndarray:
-    """Static errors (2, k) of frequency [Hz] and damping by the mesh at amplitudes (k,) [m] of the output; 0 without a
-    patch that slips part by part, NaN where its law has no steady loop of its own.
+def left_by_mesh(model, patch, coarse, amplitudes, mode) -> tuple:
+    """(Static errors (2, k) of frequency [Hz] and damping by the mesh at amplitudes (k,) [m] of the output, why). The
+    errors are 0 without a patch that slips part by part, and where they are not known; why: the reason, else "".
 
-    patch, coarse: of the [contact] of the rig, None without; mode(Group) -> number of the mode.
+    patch, coarse: of the [contact] of the rig, None without; mode(Group) -> number of the mode. amplitudes: rising;
+    between those that have a static motion the errors are interpolated.
     """
-    rig, apart = model.rig, np.zeros((2, len(amplitudes)))
+    rig, none = model.rig, np.zeros((2, len(amplitudes)))
     if not (model.soft or rig.soft):
-        return apart
-    if model.grooves is not None or rig.load_varies or rig.strips_slide_apart:
-        return apart * np.nan
+        return none, ""
+    moves = (model.grooves is not None, rig.load_varies, rig.strips_slide_apart)
+    if any(moves):
+        return none, MOVING[moves.index(True)]
     try:
         fine = laws_on(model, patch)
         number = mode(fine)
-        return mesh_error(fine, rough_laws(model, coarse), lambda laws: static_rows(
+        error = mesh_error(fine, rough_laws(model, coarse), lambda laws: static_rows(
             rig.modes, laws, number, amplitudes, balance.SAMPLES)[1:3])
-    except (NotConverged, PatchfemError):
-        return apart * np.nan
+    except NotConverged as reason:
+        return none, str(reason)
+    except PatchfemError:
+        return none, NO_LOOP
+    known = np.isfinite(error).all(axis=0)
+    if not known.any():
+        return none, NOT_STATIC
+    return np.array([np.interp(np.log(amplitudes), np.log(amplitudes[known]), one[known]) for one in error]), ""
 
 
-def left_by_mesh_on(amplitude, frequency: float, model, patch, coarse) -> np.ndarray:
-    """Errors (2, k) of `left_by_mesh` at many amplitudes (k,) [m], of the held mode nearest to a frequency [Hz]."""
+def left_by_mesh_on(amplitude, frequency: float, model, patch, coarse) -> tuple:
+    """(Errors (2, k), why) of `left_by_mesh` at many amplitudes (k,) [m], of the held mode nearest to a frequency
+    [Hz]."""
     low, high = np.log10([amplitude.min(), amplitude.max()])
     at = np.logspace(low, high, 2 + int(APART * (high - low)))
-    wide = left_by_mesh(model, patch, coarse, at, lambda laws: _mode(model.rig.modes, laws, frequency))
-    return np.array([np.interp(np.log(amplitude), np.log(at), one) for one in wide])
+    wide, why = left_by_mesh(model, patch, coarse, at, lambda laws: _mode(model.rig.modes, laws, frequency))
+    return np.array([np.interp(np.log(amplitude), np.log(at), one) for one in wide]), why
+
+
+def without_slip_between_nodes(whys: dict, ways) -> list:
+    """Sentences on errors that leave out what `left_by_mesh` would add.
+
+    whys: reason, or "", by what has these errors; ways() -> the `Coarser` runs in space that are part of them.
+    """
+    out = []
+    for why in dict.fromkeys(filter(None, whys.values())):
+        whose = " and of ".join(name for name, one in whys.items() if one == why)
+        lacks = "the change on a coarser mesh, but no estimate of the energy that is lost in slip too small for both " \
+            "meshes" if any(one.of == "mesh" for one in ways()) else "no error of the mesh"
+        out.append(f"the errors of {whose} include {lacks}, because {why}")
+    return out
 
 
 def _mode(modes, laws, frequency: float) -> int:

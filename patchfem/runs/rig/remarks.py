@@ -102,7 +102,7 @@ def marched_elements(model, numerics, patch, raw) -> list:
         return []
     pinned = patch is not None and not model.patch.chosen
     return [f"the motion is computed in time steps, because {dear_elements(model)}; "
-            f"{'on a coarser mesh, or ' * pinned}with accuracy.method = \"exact\" it is exact"]
+            f"{'on a coarser mesh, or ' * pinned}with accuracy.method = \"exact\" the motion is computed exactly"]
 
 
 def unmoved_elements(model, numerics, patch, raw) -> list:

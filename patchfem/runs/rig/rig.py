@@ -69,8 +69,8 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     run = Coupled(model, numerics, patch, raw, raw.extra.get("at", rig.drive), known, measures)
     for go in (_levelled, _settled, _started, _reasoned):
         run = go(run)
-    run, decay = _decayed(run, coarse[0])
-    warned, notes = remarks.warnings_of(run), remarks.notes_of(run)
+    run, decay, left_out = _decayed(run, coarse[0])
+    warned, notes = remarks.warnings_of(run), [*remarks.notes_of(run), *left_out]
     if decay_rate(rig.modes) < 0 and run.rubs:
         fluttering, more = flutter.flutter_of(run)
         run, notes = replace(run, measures=run.measures | fluttering), [*notes, *more]
@@ -120,25 +120,27 @@ def _reasoned(run: Coupled) -> Coupled:
 
 
 def _decayed(run: Coupled, coarse) -> tuple:
-    """(The run, the curve of its decay), neither with smaller errors than the mesh leaves; of what rings, at half the
-    swing in the last stick. None without a release; coarse: the Patch of a coarser mesh or None."""
+    """(The run, the curve of its decay, sentences), neither with smaller errors than the mesh leaves; of what rings, at
+    half the swing in the last stick. The curve is None without a release; coarse: the Patch of a coarser mesh or None;
+    the sentences say where what the mesh leaves is not known."""
     found, raw = decays.decay_of(run.raw) if run.model.rig.kind == "free" and run.estimated else None, run.raw
     if run.model.rig.kind != "free" or not run.estimated or not (run.model.soft or run.model.rig.soft):
-        return run, found
-    ring, own = run.measures.get("ring_frequency"), (run.model, run.patch, coarse)
+        return run, found, []
+    ring, own, whys = run.measures.get("ring_frequency"), (run.model, run.patch, coarse), {}
     sticks = run_events.spans_of(raw.window, run.drive, raw.log, raw.held)
     if ring is not None and ring.value and ring.error is not None and sticks:
         swing = np.ptp(raw.window.output[raw.window.time >= sticks[-1][0]]) / 2
         if swing > 0:
-            left = decays.left_by_mesh_on(np.array([swing]), ring.value, *own)[:, 0]
-            wider = {name: replace(run.measures[name], error=float(np.fmax(run.measures[name].error, one)))
-                     for name, one in zip(("ring_frequency", "ring_damping"), left)}
+            left, whys["ring_frequency and ring_damping"] = decays.left_by_mesh_on(np.array([swing]), ring.value, *own)
+            wider = {name: replace(run.measures[name], error=max(run.measures[name].error, float(one)))
+                     for name, one in zip(("ring_frequency", "ring_damping"), left[:, 0])}
             run = replace(run, measures=run.measures | wider)
     if found is not None:
-        mesh = decays.left_by_mesh_on(found.amplitude, found.frequency[-1], *own)
+        mesh, whys["the decay curve"] = decays.left_by_mesh_on(found.amplitude, found.frequency[-1], *own)
         found = found._replace(frequency_error=np.fmax(found.frequency_error, mesh[0]),
                                damping_error=np.fmax(found.damping_error, mesh[1]))
-    return run, found
+    return run, found, decays.without_slip_between_nodes(whys, lambda: ENGINES[run.numerics.engine].in_space(
+        run.model, run.numerics, run.patch, coarse, raw))
 
 
 def _judged(run: Coupled) -> Coupled:

@@ -45,7 +45,8 @@ def start_ring(outcome, measures: dict, window, drive, cycles: float, tolerance:
         return StartRing(measures | wide, {}, [])
     until = max(_until(one, measures, drive, cycles) for one in missed.values())
     remedy = f"set drive.cycles = {until:g} to let the free vibration that began at the start decay" if until else \
-        "the free vibration that began at the start has not decayed; give the modes in [[structure.mode]] more damping"
+        "the free vibration that began at the start has not decayed; raise the damping of the modes in " \
+        "[[structure.mode]]"
     ring = measures.get("ring_frequency")
     pitch = f" at {ring.value:.5g} Hz (damping {measures['ring_damping'].value:.2g})" if ring is not None else ""
     note = (f"the free vibration that began at the start has not decayed{pitch}: loop_area contains not only the "

@@ -10,8 +10,8 @@ from .types import Positive, Share, Speed, Table, key, number, whole
 def _still_summed(value: object) -> object:
     """An engine of the sum over bonds; ValueError for the one that 0.4 had besides."""
     if value == "exponential":
-        raise ValueError("'exponential' was removed, because it supported only order 0, 1 and 2 of reading 'report' "
-                         "and made a whole run at most 1.4 times faster; use 'merged'")  # fmt: skip
+        raise ValueError("'exponential' was removed: this method supported only the orders 0, 1 and 2 of reading "
+                         "'report', and a run with it was at most 1.4 times faster; use 'merged'")  # fmt: skip
     return value
 
 
@@ -37,8 +37,8 @@ class Accuracy(Table):
                                             "tolerance") = None
     shear_modes: key(whole(1, 10_000) | None, "number of shear modes of the pieces; default: set by the "
                                               "tolerance") = None
-    convergence: key(Literal["force", "velocity", "displacement"] | None, "quantity whose relative change per "
-                     "iteration decides when method 'duhamel' stops iterating") = None
-    convergence_tolerance: key(Positive | None, "relative change of the quantity `convergence` below which method "
-                               "'duhamel' stops iterating") = None
+    convergence: key(Literal["force", "velocity", "displacement"] | None, "method 'duhamel' stops iterating when the "
+                     "relative change of this quantity in one iteration is below `convergence_tolerance`") = None
+    convergence_tolerance: key(Positive | None, "method 'duhamel' stops iterating when the relative change of the "
+                               "quantity named in `convergence` is below this value") = None
     stick_speed: key(Speed | None, "sliding speed below which method 'newmark' treats the interface as stuck") = None

@@ -157,8 +157,9 @@ class Asperities(Table):
     rms_curvature: key(quantity("curvature", gt=0) | None, "root mean square curvature of the rough piece",
                        "with `rms_height`") = None
     cutoff: key(Length | None, "wavelength that divides a trace (Gaussian filter of ISO 16610-21): longer waves "
-                "belong to [contact.profile], shorter waves to the asperities; default: 1/100 of the interface length "
-                "with [contact.profile]; without [contact.profile] all waves of `from` belong to the asperities") = None
+                "belong to [contact.profile], shorter waves to the asperities; default: with [contact.profile], 1/100 "
+                "of the length of the interface; without it, all waves of the trace in `from` belong to the "
+                "asperities") = None
     tangential_ratio: key(Positive | None, "tangential stiffness of the rough layer divided by its normal stiffness; "
                           "default: the layer is rigid along x") = None
 

@@ -90,20 +90,21 @@ class Friction(Table):
     micro_damping: key(quantity("damping", ge=0), "damping force on the bristles divided by the rate of their "
                        "deflection, for the whole contact") = 0.0
     viscous: key(quantity("damping", ge=0), "viscous force divided by the sliding speed, for the whole contact") = 0.0
-    reading: key(Literal["stretch", "report"], "how eq. 2.17 is read: 'stretch' separates the stretch of a bond from "
-                 "its damage, so that no energy is created; 'report' uses eq. 2.17 as printed "
-                 "in the report") = "stretch"
+    reading: key(Literal["stretch", "report"], "how equation 2.17 is read: 'stretch' separates the stretch of a bond "
+                 "from its damage, so that no energy is created; 'report' uses equation 2.17 as printed in the "
+                 "report") = "stretch"
     order: key(number(le=100), "power p with which the strength of a bond rises along its path; must be > -1, and >= "
                "0 with reading 'stretch'") = 1.0
-    rest_growth: key(Acceleration | None, "growth a_s of the bond length at rest (eq. 2.10); without `rest_growth` "
+    rest_growth: key(Acceleration | None, "growth a_s of the bond length at rest (equation 2.10); without "
+                                          "`rest_growth` "
                      "and `slip_growth` the bond length is constant", "with `slip_growth`") = None
     slip_growth: key(Length | None, "slip length l_k over which the bond length approaches its value in fast slip "
-                     "(eq. 2.10)", "with `rest_growth`") = None
-    rest_speed: key(Speed | None, "lower limit v_h of the sliding speed |v| in the term a_s/|v| (eq. 2.10); default: "
-                    "1e-3 of the largest sliding speed") = None
+                     "(equation 2.10)", "with `rest_growth`") = None
+    rest_speed: key(Speed | None, "lower limit v_h of the sliding speed |v| in the term a_s/|v| (equation 2.10); "
+                    "default: 1e-3 of the largest sliding speed") = None
     initial_bonds: key(Share, "fraction m_0 of all bonds that already exist when the run begins") = 1.0
     breakaway: key(number(ge=0, le=1), "fraction of the bond length over which a bond stretches without damage") = 0.0
-    spread: key(Length | None, "width rho of a bond perpendicular to the path (eq. 2.15); default: this width is "
+    spread: key(Length | None, "width rho of a bond perpendicular to the path (equation 2.15); default: this width is "
                 "ignored") = None
     temperature: Temperature | None = None
 
@@ -266,7 +267,7 @@ class Structure(Table):
                   "subtracted from the stiffness of the modes") = "free"
     stiffening: Stiffening | None = None
     bonded: Bonded | None = None
-    masses: key(tuple[Mass, ...] | None, "masses that are connected by springs; they replace the modes") = None
+    masses: key(tuple[Mass, ...] | None, "masses that are connected by springs; these masses replace the modes") = None
     output_mass: key(whole(1, MOST_MASSES) | None, "number of the mass that carries the "
                      "accelerometer; default: 1") = None
     spring: tuple[Spring, ...] = ()
@@ -275,13 +276,13 @@ class Structure(Table):
     file: key(Text | None, "file of matrices, modes or measured responses (.npz, .mat, .uff); replaces the tables of "
               "modes") = None
     reduced: Reduced | None = None
-    slide_at: key(Text | None, "node and direction in the file, such as 12:+x, whose motion is the motion of the "
-                  "patch along x") = None
-    output_at: key(Text | None, "node and direction in the file at which the accelerometer is placed") = None
-    base_at: key(Text | None, "node and direction in the file that is driven as the base") = None
-    force_at: key(Text | None, "node and direction in the file on which the force acts") = None
-    normal_at: key(Text | None, "node and direction in the file whose motion opens the contact") = None
-    pitch_at: key(Text | None, "node and direction in the file whose motion rotates the patch") = None
+    slide_at: key(Text | None, "node and direction, as named in the file (such as 12:+x), whose motion is the motion "
+                               "of the patch along x") = None
+    output_at: key(Text | None, "node and direction, as named in the file, at which the accelerometer is placed") = None
+    base_at: key(Text | None, "node and direction, as named in the file, that is driven as the base") = None
+    force_at: key(Text | None, "node and direction, as named in the file, on which the force acts") = None
+    normal_at: key(Text | None, "node and direction, as named in the file, whose motion opens the contact") = None
+    pitch_at: key(Text | None, "node and direction, as named in the file, whose motion rotates the patch") = None
     start: Start | None = None
 
 
@@ -317,12 +318,12 @@ class Drive(Table):
                        "amplitude of the base acceleration of each sine, zero to peak") = None
     phases: key(Annotated[tuple[quantity("angle"), ...], Field(min_length=2)] | None, "phase of each sine at the "
                 "start of the run; default: 0") = None
-    onset: key(Literal["slip", "distortion", "gauge"], "what counts as the onset of slip in the measure onset_level: "
-               "'slip', the first irreversible motion (for an elastic interface, more than a thousandth of its "
-               "elastic range); 'distortion', a third harmonic of the acceleration above 3 % of the first harmonic; "
-               "'gauge', half the peak-to-peak motion at the output above `onset_length`") = "distortion"
-    onset_length: key(Length | None, "smallest motion that the gauge shows, as half the peak-to-peak motion at the "
-                      "output", "with onset `gauge`") = None
+    onset: key(Literal["slip", "distortion", "gauge"], "event that counts as the onset of slip in the measure "
+               "onset_level. 'slip': the interface slips irreversibly (an elastic interface: by more than a thousandth "
+               "of its elastic range). 'distortion': the third harmonic of the acceleration exceeds 3 % of the first "
+               "harmonic. 'gauge': half the peak-to-peak motion at the output exceeds `onset_length`") = "distortion"
+    onset_length: key(Length | None, "smallest motion at the output that the gauge can show, half peak-to-peak",
+                      "with onset `gauge`") = None
     force: key(Force | None, "amplitude of the force, zero to peak",
                "with kind `force` and waveform `sine`, `step` or `sweep`") = None
     mass: key(whole(1, MOST_MASSES) | None, "number of the mass on which the force acts; default: the force acts at "

@@ -14,8 +14,8 @@ PART, SAMPLES, FILLED = 0.05, 40, 0.7  # of the length, samples, and share of un
 WORN, BROAD, LEAST = 2 * REACH, 16, 0.005  # deviations of a rubbed place, its samples at half of them, share of x
 CURVED, BOWED = 30.0, 0.75  # chi-squared of a bow in an unworn part, and its size in noises, from which it is none
 TURNS, HIGHER, VALLEYS = 8, 0.65, 0.1  # worn tops, share of unworn heights that lie lower than they, share of valleys
-HIDDEN = ("largest mean depth of wedge-shaped wear that can hide in the tilt between the traces (for the upper end of "
-          "the interval of the tilt); uniform wear of any depth can hide")
+HIDDEN = ("largest mean depth of wedge-shaped wear that is possible if the tilt between the traces (upper end of its "
+          "interval) is due to wear alone; uniform wear of any depth would not be detected")
 NO_LIMIT = "no limit"
 
 

@@ -22,7 +22,7 @@ MAX, MEAN, AREA = ("largest worn depth, corrected for noise",
 WITHIN = "mean worn depth between the first and the last worn point, including the unworn valleys between these points"
 TAIL = (0.02, 0.25)  # share of the lowest heights that both Abbott curves are laid on each other over
 DEPOSIT = 4.0  # deviations above the trace before from which a height is a deposit, not noise
-FROM, TO = "first worn place", "last worn place"
+FROM, TO = "x of the first worn place", "x of the last worn place"
 SLIGHT = 0.5  # noises: wear less deep than that passes for none (test_registration)
 
 
@@ -91,7 +91,7 @@ def extent_of(found: Registration, together: float) -> Extent | None:
         return None
     x, last = found.x, rest.size - 1
     places = [tuple(float(x[k]) for k in ends[0]), tuple(float(x[last - k]) for k in (ends[1][0], *ends[1][:0:-1]))]
-    after = tuple(Quantity(*place, "m", f"{text}, as x of the second trace (after wear)")
+    after = tuple(Quantity(*place, "m", f"{text} in the second trace (after wear)")
                   for place, text in zip(places, (FROM, TO)))
     scale = 1 + (found.stretch[0] if found.stretch[2] else 0.0)
     moved = SIDE * found.errors[2]
@@ -100,8 +100,8 @@ def extent_of(found: Registration, together: float) -> Extent | None:
         return found.middle + (place - found.middle) / scale - found.shift
 
     before = tuple(Quantity(back(place), back(low) - moved, back(high) + moved, "m",
-                            f"{text}, as x of the first trace (before "
-                            "wear)") for (place, low, high), text in zip(places, (FROM, TO)))
+                            f"{text} in the first trace (before wear)")
+                   for (place, low, high), text in zip(places, (FROM, TO)))
     return Extent(before, after)
 
 

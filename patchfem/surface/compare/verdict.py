@@ -45,12 +45,12 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
         headline = f"worn, waves {headline}"
     elif headline == "no change shown":
         told = worn + ["flatter"] * any(changed(one.slope_ratio) == "reduced" for one in parts)
-        headline = " and ".join(told) + ", no change of the amplitude of the waves shown" if told else headline
+        headline = " and ".join(told) + ", no change detected in the amplitude of the waves" if told else headline
     if (areal == EXCHANGED or any(one.exchanged for one in parts)) and not worn:
         headline = f"{EXCHANGED}; as given: {headline}"
     elif areal == scans.OPEN:
-        headline = (f"{areal}; "
-                    f"{'no change of the amplitude of the waves shown' if headline == 'no change shown' else headline}")
+        said = "no change detected in the amplitude of the waves" if headline == "no change shown" else headline
+        headline = f"{areal}; {said}"
     elif areal == ELSEWHERE or any(_elsewhere(one) for one in parts):
         headline = f"{ELSEWHERE}; {headline}"
     if any(_gain(one, "") and word != "no change shown" for one, word in zip(parts, words)):
@@ -160,8 +160,9 @@ def _variant(one: Comparison, name: str) -> list:
         out.append(f"The second trace{name} was measured in the opposite direction; the trace was mirrored here, so "
                    "its x counts from the other end.")
     if one.turned:
-        out.append(f"The heights of both traces{name} have opposite signs: one trace was inverted here, so that wear "
-                   "counts as missing material; check in which file the heights point into the material.")
+        out.append(f"In one trace{name} the heights point out of the material, in the other trace into the material. "
+                   "One trace was inverted here: the one with which wear counts as missing material. Check in which "
+                   "file the heights point into the material.")
     return out
 
 
@@ -177,7 +178,7 @@ def _worn(one: Comparison, name: str) -> str:
                  "are deposits or pile-up.")
     if one.reference == "place" and not one.carried.by:
         seen = "" if one.visible is None else f" {would_show(one.visible)}"
-        return f"Worn depth{name}: none shown.{above}{seen} {may_hide(one.registration, one.hidden)}"
+        return f"Worn depth{name}: no wear detected.{above}{seen} {may_hide(one.registration, one.hidden)}"
     if mean.value is None:
         text = f"Worn depth{name}: not available; {mean.reason}."
         if one.abbott is not None and one.abbott.value is not None:
@@ -185,8 +186,9 @@ def _worn(one: Comparison, name: str) -> str:
                      "the surface is uniform and its valleys are unworn.")
         return text
     if not _sure(mean):
-        return f"Worn depth{name}: none shown; at most {say(mean.high)} on average.{above}"
-    what = "over the track below its unworn flanks" if one.reference == "flanks" else "over the common length"
+        return f"Worn depth{name}: no wear detected; at most {say(mean.high)} on average.{above}"
+    what = "over the track, measured from its unworn flanks" if one.reference == "flanks" else \
+        "over the common length"
     text = (f"Worn{name}: {_track(one)}{_length(mean)} on average {what}, {_length(one.worn.largest)} at the deepest "
             f"place.{above}")
     if one.worn.extent is not None and not one.tracks.sizes:

@@ -48,7 +48,7 @@ def instrument(raw: Raw, units: tuple | None) -> Profile | Areal:
     if not found["unit"]:
         along, up = lengths(raw, units)
         arrays = [*(one * along for one in arrays[:-1]), arrays[-1] * up]
-    stated = "the file states both units" if found["unit"] else GIVEN
+    stated = "the file states the units of heights and length" if found["unit"] else GIVEN
     notes = (f"{raw.path}: read as {shown(found['format'])} by SurfaceTopography {shown(found['version'])}",)
     notes += (f"{raw.path}: {ASIDE}",) if found["unit"] and units else ()
     if len(arrays) == 3:

@@ -22,7 +22,7 @@ def form_of(text: str) -> int | str:
     if text == CYLINDER:
         return text
     if not text.isdecimal() or not 1 <= int(text) <= MOST:
-        raise PatchfemError(f"the form '{text}' is not known; use a degree from 1 (a line or a plane) to {MOST}, or "
+        raise PatchfemError(f"the form '{text}' is not possible; use a degree from 1 (a line or a plane) to {MOST}, or "
                             f"{CYLINDER}")
     return int(text)
 

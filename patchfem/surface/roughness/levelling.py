@@ -34,7 +34,7 @@ def one_sided_line(x: np.ndarray, z: np.ndarray, side: str = "above", noise: flo
     noise of which three tenths are unmoved, at one end or at both. PatchfemError for fewer than two places.
     """
     if side not in SIDES:
-        raise PatchfemError(f"side '{side}' of a one-sided line is not known; use above or below")
+        raise PatchfemError(f"side of the one-sided line: '{side}' is not possible; use 'above' or 'below'")
     x, z = np.asarray(x, float), np.asarray(z, float) * SIDES[side]
     if x.size < 2 or np.ptp(x) == 0:
         raise PatchfemError(f"a line cannot be fitted to {x.size} heights; at least two heights are needed")

@@ -83,13 +83,14 @@ _BASE = (  # name without its letter
     ("vk", "m", "reduced valley depth: height of a triangle on the base 1 - Mr2 with the area of the valleys below "
                 "the core",
      _core("valleys"), "ratio"),
-    ("Mr1", "1", "share of the trace's length where the surface lies above the core", _core("first"), "share"),
-    ("Mr2", "1", "share of the trace's length where the surface lies above the bottom of the "
-                 "core", _core("second"), "share"),
+    ("Mr1", "1", "fraction of the length of the trace where the surface lies above the core", _core("first"), "share"),
+    ("Mr2", "1", "fraction of the length of the trace where the surface lies above the bottom of the core",
+     _core("second"), "share"),
     ("c", "m", "mean height difference between a hill and the neighbouring dale, for the hills and dales that count "
                "for the mean spacing", mean_element,
      "ratio"),
-    ("mr", "1", "material ratio: share of the trace's length where the surface lies above the level {level}, measured "
+    ("mr", "1", "material ratio: fraction of the length of the trace where the surface lies above the level {level}, "
+                "measured "
                 "from the mean line", material_ratio,
      "share"),
     ("dc", "m", "height difference between the levels with material ratios {second} and "
@@ -163,9 +164,9 @@ AREAL = (
               _all(_core("peaks")), ""),
     Parameter("Svk", "m", "reduced valley depth: height of a triangle on the base 1 - Smr2 with the volume of the "
               "valleys below the core", _all(_core("valleys")), ""),
-    Parameter("Smr1", "1", "share of the area where the surface lies above the core", _all(_core("first")), ""),
-    Parameter("Smr2", "1", "share of the area where the surface lies above the bottom of the "
-                           "core", _all(_core("second")), ""),
+    Parameter("Smr1", "1", "fraction of the area where the surface lies above the core", _all(_core("first")), ""),
+    Parameter("Smr2", "1", "fraction of the area where the surface lies above the bottom of the core",
+              _all(_core("second")), ""),
     Parameter("Vmp", "m", "volume of the peaks per area: material above the material ratio 10 %",
               _all(volume, 0.1, True), ""),
     Parameter("Vmc", "m", "volume of the core's material per area: between the material ratios 10 % and 80 %",
@@ -174,7 +175,8 @@ AREAL = (
               _all(lambda heights: volume(heights, 0.1, False) - volume(heights, 0.8, False)), ""),
     Parameter("Vvv", "m", "volume of the valleys' void per area: below the material ratio 80 %",
               _all(volume, 0.8, False), ""),
-    Parameter("Smr", "1", "material ratio: share of the area where the surface lies above the level {level}, measured "
+    Parameter("Smr", "1", "material ratio: fraction of the area where the surface lies above the level {level}, "
+                          "measured "
                           "from the reference surface",
               _all(material_ratio), ""),
     Parameter("Sxp", "m", "peak extreme height: height difference between the levels with material ratios 50 % and 2.5 "

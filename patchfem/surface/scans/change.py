@@ -175,7 +175,8 @@ def sentences(one: Change) -> list:
                    f"wore off the second part; if the second part is unworn, up to {_most(grown)} grew on the first "
                    "part. To tell the two cases apart, scan farther beyond the rubbed part.")
     else:
-        out.append("Worn volume: none shown. Uniform wear of any depth would give the same two scans. Wedge-shaped "
+        out.append("Worn volume: no wear detected. Uniform wear of any depth would give the same two scans. "
+                   "Wedge-shaped "
                    "wear would also give the same two scans if the worn part was mounted level for the second scan. To "
                    "tell wear from no wear, scan an unworn part beside the rubbed part before and after wear.")
     out += [] if one.track is None or one.track.why else [_track(one.track)]
@@ -218,8 +219,9 @@ def _ways(one: Change) -> list:
     if abs(abs(one.registration["rotation"].value) - np.pi) < 0.2:
         out.append("The second scan (after wear) is rotated by 180 degrees.")
     if guess.turned:
-        out.append("The heights of both scans have opposite signs: one scan was inverted here, so that more material "
-                   "is lost than gained; check in which file the heights point into the material.")
+        out.append("In one scan the heights point out of the material, in the other scan into the material. One scan "
+                   "was inverted here: the one with which more material is lost than gained. Check in which file the "
+                   "heights point into the material.")
     return out
 
 

@@ -34,8 +34,9 @@ def test_always_a_sweep_leaves_on_disk_about_what_it_says(tmp_path):
 
 
 @pytest.mark.parametrize("more, count, of, helps", [
-    ("kinetic = 0.3\n", 64, "16 of 32 cases that were looked at", "sweep friction.kinetic too, remove it from the "),
-    ("kinetic = 0.3\n", 8, "4 of 8 cases", "sweep friction.kinetic too, remove it from the scene, or give"),
+    ("kinetic = 0.3\n", 64, "16 of 32 cases that were checked",
+     "sweep friction.kinetic, too, remove this key from the "),
+    ("kinetic = 0.3\n", 8, "4 of 8 cases", "sweep friction.kinetic, too, remove this key from the scene, or give"),
     ("", 64, "", "")])
 def test_exact_a_contradiction_in_half_of_a_range_is_told_before_and_leaves_a_plan(more, count, of, helps):
     """static is drawn from 0.2 to 0.4 beside kinetic = 0.3. Every 8th point of Sobol's sequence is in one half: the

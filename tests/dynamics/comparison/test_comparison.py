@@ -181,7 +181,7 @@ def test_exact_warnings_of_each_method():
     tight = duhamel.run(FREE_FREE, drive, slow, 10.0, 1000, "displacement", 1e-6, 0.1)
     assert "did not converge within" in said(tight) and tight.failures > 10
     stiff = duhamel.run(FREE_FREE, drive, (elastic_plastic(3.0, 0.003),), 10.0, 1000, "velocity", 1e-6)
-    assert "the elastic contact oscillates through" in said(stiff)
+    assert "block on the elastic contact advances by" in said(stiff)
     assert "printed" in said(duhamel.run(FREE_FREE, drive, (elastic_plastic(3.0, 0.1, True),), 10.0, 1000))
     caught = newmark.run(PLAIN, UNIT, (Coulomb(0.8, 0.8),), 10.0, 1000, 1e-3)
     assert "up to a force of 1.12 N instead of 0.8 N" in said(caught) and "stops the interface at once" in said(caught)
@@ -191,7 +191,8 @@ def test_exact_warnings_of_each_method():
     assert "changes its sign from step to step" in said(grown)
     assert "by the numerical method" in said(euler.run(PLAIN, release(6.0), (tanh(1e-6, 1.0),), 60.0, 100, Start(
         np.ones(1), np.zeros(1))))
-    assert "a finite" in said(euler.run(basis([300.0], [0.0], [[1.0]], [1.0]), UNIT, (tanh(0.1, 1.0),), 3000.0, 300))
+    assert "infinite or undefined" in said(euler.run(basis([300.0], [0.0], [[1.0]], [1.0]), UNIT, (tanh(0.1, 1.0),),
+                                                     3000.0, 300))
 
 
 @pytest.mark.parametrize("by_force, release_at", [(False, 3.0), (True, 1.0)])

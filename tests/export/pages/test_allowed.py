@@ -130,8 +130,8 @@ def test_exact_nothing_that_moves_changes():
     assert sentence(limits({"loop_area": [1, 1.01, 1.02, 1.03, 0.96]})) == \
         "Tilt may reach 1 mrad (13 um over the patch): loop area changes by less than 5 %."
     assert sentence(limits({"loop_area": [1, 1.01, 1.02, 1.03, 0.96]}, trusted=[1, 1, 1, 1, 0])) == (
-        "Tilt may reach at least 0.5 mrad (6.4 um over the patch) before loop area changes by 5 %; no case with a "
-        "larger value shows the limit.")
+        "Tilt may reach at least 0.5 mrad (6.4 um over the patch) before loop area changes by 5 %; the cases with "
+        "larger values do not show where this limit lies.")
 
 
 def test_exact_a_limit_among_the_cases_comes_before_one_that_errors_leave_open():
@@ -144,7 +144,7 @@ def test_exact_a_limit_among_the_cases_comes_before_one_that_errors_leave_open()
                     "amplitude or loop area changes by 5 % (first to change: loop area).")
     said = sentence(limits({"slip_amplitude": [1, 1.01, 1.05, 1.05], "loop_area": [1, 1.01, 1.01, 1.2]}, 5e-4, tilt))
     assert said == ("Tilt may reach at least 0.15 mrad (1.9 um over the patch) before slip amplitude or loop area "
-                    "changes by 5 %; loop area has changed by more at 0.19 mrad.")
+                    "changes by 5 %; loop area has changed by more than 5 % at 0.19 mrad.")
 
 
 def test_exact_a_measure_that_cannot_be_told_is_not_among_what_moves():

@@ -155,7 +155,7 @@ def test_always_a_sweep_of_which_no_case_has_settled_says_so_first(drawn):
     """Their numbers then count as they ended; 256 such cases were told as if they had settled."""
     table = read_table(drawn[0])
     count = len(table["outcome"])
-    said = "o case has settled, so this describes the end of each run"
+    said = "o case has settled, so this answer describes the end of each run"
     assert said not in "".join(lead_of(table).sentences())
     lead = lead_of(table | {"outcome": ["transient"] * (count - 2) + ["failed", ""]})
     assert lead.sentences()[0] == lead.answer() and lead.answer().endswith(

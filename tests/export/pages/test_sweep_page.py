@@ -418,6 +418,21 @@ def test_always_a_picture_is_one_stop_of_the_tab_key_and_obeys_keys(chromium, ta
     assert seen.faults == []
 
 
+def test_exact_a_fraction_is_told_in_percent_as_a_run_tells_it():
+    """0.2193 of the length is 21.93 % in sentence, table and picture alike."""
+    values, none = np.array([1.0, 0.2193, 0.1231]), np.zeros(3)
+    assert span({"contact_fraction": (values, none, "1")}, {"contact_fraction": np.ones(3, bool)}, np.ones(3, bool),
+                ("contact_fraction",)) == "Contact fraction ranges from 12.31 % to 100 %."
+    tilt = {"name": "contact.tilt.angle", "unit": "rad", "values": np.array([0, 1e-4, 2e-4]), "log": False,
+            "texts": ["0 mrad", "0.1 mrad", "0.2 mrad"]}
+    text = page({"title": "t", "version": "0", "command": "c", "scene": "s", "grid": True, "keys": [tilt],
+                 "measures": {"contact_fraction": {"unit": "1", "means": "m", "values": values, "errors": none}},
+                 "outcome": ["done"] * 3, "messages": {}, "folders": None, "tolerance": 0.01})
+    (shown,) = data_of(text)["measures"]
+    assert shown["unit"] == "%" and shown["values"] == pytest.approx([100, 21.93, 12.31])
+    assert "contact fraction</a> [%]" in text and "<td class=n>21.93</td>" in text
+
+
 HIDDEN = """[...document.querySelectorAll('.across,.wide,figure')].filter(
     (one) => one.scrollWidth > one.clientWidth + 1).map((one) => one.textContent.slice(0, 40))"""
 DOUBLE = """[...document.querySelectorAll('.across,.wide')].filter(

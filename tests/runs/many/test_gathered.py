@@ -62,7 +62,7 @@ def test_a_table_of_measured_responses_keeps_no_batch_away_unless_it_cannot_be_r
     beside = pf.build(SCENE + f'[measured]\nfile = "{table}"\n')
     assert gathered.no_lanes(beside) == ""
     lost = replace(beside, measured=(tmp_path / "none.csv", *beside.measured[1:]))
-    assert "unreadable table" in gathered.no_lanes(lost)
+    assert "table of measured responses cannot be read" in gathered.no_lanes(lost)
     found = many.answers([lost], study=32)
     assert "none.csv" in found.messages[0]
 

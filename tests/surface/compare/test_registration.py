@@ -106,7 +106,7 @@ def test_always_unworn_traces_of_one_place_show_no_wear(count):
         found = compared(p.before, p.after)
         assert found.reference == "place"
         assert found.worn.mean.value is None and abs(found.registration.rest.mean()) < 0.004 * UM
-        assert "none shown" in verdicts([found])[1][0] and "at most" not in verdicts([found])[1][0]
+        assert "no wear detected" in verdicts([found])[1][0] and "at most" not in verdicts([found])[1][0]
 
 
 @pytest.mark.parametrize("high, rows", [(128, 4), pytest.param(512, 8, marks=pytest.mark.slow)])

@@ -167,7 +167,7 @@ def test_always_steep_heights_in_a_file_that_says_metres_are_told(tmp_path):
         found = read(tmp_path, data, name)
         assert found.z == pytest.approx(Z * 1e6, rel=1e-14)
         assert found.notes[0].startswith(f"{tmp_path / name}: heights span ")
-        assert found.notes[0].endswith("over a length of 2.5 um: the file gives both in metres")
+        assert found.notes[0].endswith("over a length of 2.5 um: in the file, heights and length are in metres")
 
 
 def test_exact_sdf_of_one_profile_is_a_trace(tmp_path):

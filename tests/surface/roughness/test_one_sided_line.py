@@ -51,7 +51,8 @@ def test_exact_levelling_by_least_squares_would_wear_it_away():
     assert abs(np.polyval(np.polyfit(X, z, 1), X[0])) > 0.2 * UM and abs(one_sided_line(X, z).at(X[0])) < 1e-15
 
 
-@pytest.mark.parametrize("x, side, says", [(X[:1], "above", "at least two heights"), (X, "left", "use above or below")])
+@pytest.mark.parametrize("x, side, says", [(X[:1], "above", "at least two heights"),
+                                           (X, "left", "use 'above' or 'below'")])
 def test_refuses(x, side, says):
     with pytest.raises(PatchfemError, match=says):
         one_sided_line(x, np.zeros(x.size), side)

@@ -25,25 +25,25 @@ def not_one_point(model: Model) -> str:
     """Why a model is not one mode under one sine behind a point under a constant load; "" where it is."""
     rig = model.rig
     if model.kind != "rig" or model.patch is not None or model.wear is not None or unread(model):
-        return "the case is not one lumped contact, or its table of measured responses cannot be read"
+        return "the contact of the case is not a single point, or its table of measured responses cannot be read"
     if model.heat is not None or rig.load_varies or rig.names or rig.bends or len(rig.interfaces) != 1 \
             or not model.point.load > 0:
-        return "its interface is not one point under a constant load"
+        return "the interface of the case is not one point under a constant load"
     return not_one_sine(rig)
 
 
 def not_one_sine(rig) -> str:
     """Why a rig is not one mode under one sine, seen by one accelerometer; "" where it is."""
     if rig.modes.gauge is not None:
-        return "its gauge and its accelerometer move differently"
+        return "the gauge and the accelerometer of the case move differently"
     if rig.richer is not None:
         return "its structure is reduced"
     if rig.modes.omega.size != 1 or not isinstance(rig.drive, BaseSine) or rig.levels:
         return "the case is not one mode driven by one sine"
     if np.isfinite(rig.travel):
-        return "its motion may reach a stop, or may gain energy"
+        return "the flexure of the case has an end stop, or the motion of the case may gain energy"
     if rig.cycles != int(rig.cycles) or not rig.modes.base[0] or not rig.modes.slide[0] or not rig.modes.output[0]:
-        return "its cycles are not whole, or it has no drive, slide or output"
+        return "the number of cycles of the case is not whole, or the case has no drive, slide or output"
     return ""
 
 

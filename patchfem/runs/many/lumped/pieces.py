@@ -39,12 +39,13 @@ def refuses(model) -> str:
     """Why the law, the cycles or the engine of a model are not of this batch; "" where they are."""
     f = model.friction
     if not _holds(model) and not has(f.law, "cells") and f.law != "elastic-plastic":
-        return "its law is not a set of friction elements"
+        return "the friction law of the case is not a set of friction elements"
     if not SHORTEST <= model.rig.cycles <= LONGEST:
-        return "its cycles are too few or too many"
+        return "the case has too few or too many cycles"
     if _holds(model) and not f.static > 0:
         return "nothing rubs"
-    return "" if engine_of(model) is (EXACT if _holds(model) else PIECES) else "its engine is not the piecewise one"
+    return "" if engine_of(model) is (EXACT if _holds(model) else PIECES) else \
+        "the case is not computed by the engine from yield to yield"
 
 
 def _holds(model) -> bool:

@@ -50,15 +50,15 @@ def refuses(model: Model) -> str:
     if model.patch is None or not model.soft or model.patch.strips is not None or model.grooves is not None:
         return "the case is not a patch that slips part by part"
     if model.wear is not None or model.heat is not None or unread(model):
-        return "it has [wear] or [friction.temperature], or its table of measured responses cannot be read"
+        return "the case has [wear] or [friction.temperature], or its table of measured responses cannot be read"
     if why := not_one_sine(model.rig):
         return why
     if model.friction.law != "elastic-plastic" and (not has(model.friction.law, "set-valued")
                                                     or has(model.friction.law, "averaged")):
-        return "the points of its patch have no slip force"
+        return "the points of the patch have no slip force"
     if not pieces.SHORTEST <= model.rig.cycles <= pieces.LONGEST:
-        return "its cycles are too few or too many"
-    return "" if engine_of(model) is PIECES else "its engine is not the piecewise one"
+        return "the case has too few or too many cycles"
+    return "" if engine_of(model) is PIECES else "the case is not computed by the engine from yield to yield"
 
 
 def group(model: Model) -> tuple:
