@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import matplotlib.image
@@ -124,7 +125,8 @@ def test_exact_a_picture_needs_no_opengl(bench, tmp_path, monkeypatch):
     assert answer.code == 0 and not answer.err, answer.err
     shape, share = colours(tmp_path / "a.png")
     assert shape == (1000, 1800, 3) and share > 0.2
-    assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
+    assert ", frame 0 (of 0 to " in answer.out and [path.name for path in tmp_path.iterdir()] == ["a.png"]
+    assert re.search(r", frame \d+ \(the last\), \S+ s$", cli("view", bench, "-o", tmp_path / "b.svg").out)
 
 
 @pytest.mark.slow
