@@ -7,7 +7,7 @@ from pathlib import Path
 
 from ..disk import whole
 from ..export import folder, summary
-from ..export.pages import released, words
+from ..export.pages import driven, released, words
 from ..runs import plan
 from .shared import (
     Ended,
@@ -46,6 +46,14 @@ def run(scene: Path, /, *, out: Out = None, set_: Sets = (), json_: Json = False
         compiles = plan.compile_words(what.compile_seconds)
         talk(f"about {what.seconds:.1f} s of computing time{compiles}, {what.steps} steps, engine {what.engine}")
     target = placed(out, what.model.source.path.stem)
+    if resume and folder.is_complete(what, target):
+        talk(f"{target}: this run is already complete, nothing is left to resume; to run it again, leave out --resume")
+        answer = summary.read_summary(target / "summary.json")
+        if json_:
+            print(json.dumps(answer, ensure_ascii=False), flush=True)
+        if answer["outcome"] == "not_converged":
+            raise NotReached
+        return
     with progress_bar(quiet or json_) as progress:
         written = folder.run_into(what, target, talk, progress, fresh, resume)
     answer = written.summary
@@ -82,7 +90,8 @@ def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
     """The verdict first, then what is known least well, every measure in its group, and where all of it is."""
     answer = written.summary
     if answer["title"]:
-        print(answer["title"])
+        sets = written.result.plan.model.source.sets
+        print(f"{answer['title']}{f'; changed: {driven.changed(sets)}' if sets else ''}")
     print(f"{answer['outcome']}: {words.verdict(answer)}")
     if text := words.headline(answer, summary.cycles_of(written.result), released=released.released(written.result)):
         print(text)

@@ -1,8 +1,11 @@
 """A results folder in another format, or shown, as the ending of a file says."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from ..core import PatchfemError
+from ..core import Missing, PatchfemError
+from ..disk.whole import unmade
 from . import lab
 from .drawing import paraview
 from .drawing import view as viewer
@@ -24,7 +27,8 @@ def export(folder: Path, out: Path, frame: int | None = None, histories: bool = 
         if frame is not None:
             raise PatchfemError("--frame can be used only with fields (.vtu, .csv); a file of histories contains all "
                                 "times")
-        return write.export(folder, out)
+        with _beside(out):
+            return write.export(folder, out)
     if histories:
         raise PatchfemError(f"--histories: histories are written as {', '.join(lab.ENDINGS)}, not as "
                             f"{out.suffix or out}")
@@ -34,16 +38,42 @@ def export(folder: Path, out: Path, frame: int | None = None, histories: bool = 
     if out.suffix == ".py":
         if frame is not None:
             raise PatchfemError("--frame: cannot be used with a script, which plays the whole last cycle")
-        return paraview.write_script(folder, out, of or "von_mises")
-    return vtu.export(folder, out, frame)
+        with _beside(out):
+            return paraview.write_script(folder, out, of or "von_mises")
+    with _beside(out):
+        return vtu.export(folder, out, frame)
 
 
 def view(folder: Path, out: Path | None, frame: int | None = None, magnify: float | None = None) -> str:
     """Show the pieces of a results folder in a window, or draw them into `out`; one line on a page, "" for others."""
     if out is None or out.suffix != ".html":
-        viewer.view(folder, out, frame, magnify)
+        with _beside(out):
+            viewer.view(folder, out, frame, magnify)
         return ""
     if frame is not None or magnify is not None:
         raise PatchfemError("--frame, --magnify: cannot be used with a page, which shows the last cycle and has "
                             "sliders for frame and magnification")
-    return player.write_page(folder, out)
+    with _beside(out):
+        return player.write_page(folder, out)
+
+
+@contextmanager
+def _beside(out: Path | None) -> Iterator[None]:
+    """The folder of a file to write is made, as `run -o` makes its own, and goes where nothing was written into it;
+    Missing where it cannot be made."""
+    places = [] if out is None else [one for one in out.parents if not one.exists()]
+    try:
+        if places:
+            _made(places[0], out)
+        yield
+    finally:
+        with suppress(OSError):  # it holds what was written
+            for one in places:
+                one.rmdir()
+
+
+def _made(place: Path, out: Path) -> None:
+    try:
+        place.mkdir(parents=True)
+    except OSError as error:
+        raise Missing(f"{out}: the folder of this file cannot be made ({unmade(error)})") from None

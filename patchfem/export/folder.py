@@ -7,7 +7,7 @@ from time import perf_counter
 from typing import NamedTuple
 
 from .. import __version__
-from ..core import Missing, NotConverged
+from ..core import Missing, NotConverged, PatchfemError
 from ..disk.whole import write_text
 from ..runs.results.result import Result, without_folders
 from ..runs.run import KeptState, marches, run
@@ -15,8 +15,10 @@ from . import netcdf, shown
 from .fields import bodies as body_fields
 from .histories import contents
 from .pages import player
-from .results import INTERFACES, MOST, PAGE, STATE, Folder
-from .summary import summary_of, write_json
+from .results import INTERFACES, MOST, PAGE, STATE, Folder, is_state
+from .summary import read_summary, summary_of, write_json
+
+SCENE = "scene.resolved.toml"
 
 
 class Written(NamedTuple):
@@ -65,11 +67,29 @@ def keeps(what) -> bool:
     return (what.model.wear is not None and what.model.patch is not None) or marches(what)
 
 
+def is_complete(what, target: Path) -> bool:
+    """Whether a folder holds the whole run of a plan, so that nothing of it is left to resume, False where it holds no
+    whole run or the state of an interrupted one; PatchfemError where it holds the whole run of another scene."""
+    state = target.parent / f"{target.name}.partial"
+    try:
+        if state.is_dir() and any(is_state(one.name) for one in state.iterdir()):
+            return False
+        version = read_summary(target / "summary.json")["patchfem"]
+        text = (target / SCENE).read_text("utf-8")
+    except (OSError, ValueError):
+        return False
+    if (version, text) == (__version__, what.model.source.resolved):
+        return True
+    raise PatchfemError(f"{target}: this folder contains no interrupted run but a complete run of another scene or of "
+                        "another version of patchfem; name another folder with -o, or run without --resume to replace "
+                        "that run")
+
+
 def write(result: Result, path: Path) -> Written:
     """Write every file of a run but its page into the folder `path`."""
     begin, bodies = perf_counter(), {}
     text = result.plan.model.source.resolved
-    write_text(path / "scene.resolved.toml", text)
+    write_text(path / SCENE, text)
     netcdf.write(contents(result), path / "result.nc")
     if result.patch is not None:
         bodies = body_fields.write_fields(result, path / "fields.vtkhdf")

@@ -11,6 +11,7 @@ from ..effects import shown_absent
 from .drawing import charts
 from .pages import player
 from .pages.document import Section, document, prose, table, warned
+from .pages.driven import changed
 from .pages.words import SHARP, G, headline, in_order, linked, of_records, others, pair, texts, units
 from .results import MOST
 
@@ -47,9 +48,11 @@ def page(data: dict) -> str:
     """The whole HTML page from the plain data of a run, as `shown.report_data` gives them."""
     summary = data["summary"]
     title = summary["title"] or data.get("name") or "patchfem run"
+    of = f"Scene: {escape(title)} &middot; " if data.get("sets") else ""  # whose title tells of the values before
+    title = changed(data["sets"]) if of else title
     motion = f" &middot; {escape(data['driven'])}" if data.get("driven") else ""
-    lead = [f"<p class=soft>patchfem {escape(summary['patchfem'])} &middot; {escape(summary['kind'])}{motion} &middot; "
-            f"engine {escape(data['engine'] or 'static')} &middot; "
+    lead = [f"<p class=soft>{of}patchfem {escape(summary['patchfem'])} &middot; {escape(summary['kind'])}{motion} "
+            f"&middot; engine {escape(data['engine'] or 'static')} &middot; "
             f"computed in {summary['seconds'].get('total', 0):.2f} s</p>",
             f"<p class=verdict>{verdict(data)}</p>"]
     warnings = [w for w in summary["warnings"] if w != data["sentence"]]

@@ -26,7 +26,7 @@ def report_data(result: Result) -> dict:
     scene = tomllib.loads(resolved)
     summary = summary_of(result)
     data = {"name": source.path.stem, "summary": summary, "scene": source.text, "resolved": resolved,
-            "driven": driven(scene), "command": command(source.path, source.sets),
+            "sets": source.sets, "driven": driven(scene), "command": command(source.path, source.sets),
             "sentence": verdict(summary), "released": released(result),
             "cycles": cycles_of(result), "engine": result.extra.get("engine", ""),
             "fields": result.fields,

@@ -11,6 +11,7 @@ from .. import __version__
 from ..disk.installed import installed
 from ..disk.whole import write_text
 from ..effects import EFFECTS
+from ..runs.patch import values
 from ..runs.results.result import Result, choices
 
 PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
@@ -100,7 +101,17 @@ def summary_of(result: Result) -> dict:
     answer = summary(__version__, what.model.source.title, what.kind, str(result.outcome), result.measures,
                      effects_of(result), list(what.not_in_scene), (result.warnings, result.extra.get("notes", [])),
                      result.seconds)
-    return answer | {"numerics": choices(result)}
+    return answer | {"numerics": choices(result)} | contact_of(result)
+
+
+def contact_of(result: Result) -> dict:
+    """Where a pressed patch is in contact: {"contact": {"from", "to": ends of the interface, "stretches": [[begin, end]
+    of each part in contact]}}, x in m; {} without a patch that touches, and for strips."""
+    patch = result.patch
+    if patch is None or patch.strips is not None or not patch.active.any():
+        return {}
+    found = values.stretches_of(patch, values.contact_ends(patch))
+    return {"contact": {"from": float(patch.x[0]), "to": float(patch.x[-1]), "stretches": found.tolist()}}
 
 
 def cycles_of(result: Result) -> float | None:

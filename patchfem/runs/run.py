@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from .. import compiled
-from ..core import Measure, NotConverged, Outcome, PatchfemError
+from ..core import Measure, NotConverged, Outcome
 from ..dynamics import resume
 from ..model.model import Model
 from ..model.source import placed
@@ -142,7 +142,7 @@ def _keeping(kept: KeptState | None, what: Plan, patch):
         return kept.path.parent / f"march_{number}.npz"
 
     if kept.resume and model.wear is None and not path(1).is_file():
-        raise PatchfemError(f"{kept.path.parent.name}: this folder contains no interrupted run; run without --resume")
+        raise evolve.nothing_kept(kept.path)
     return resume.keeping(resume.Keeper(path, state_key(model, patch, kept.version), kept.resume))
 
 

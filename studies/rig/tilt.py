@@ -1,6 +1,6 @@
 """What does a tilt of one piece change?
 
-Little in the motion: tilt may reach 0.17 mrad (2.2 um over the patch) before amplitude, acceleration peak, slip, loop
+Little in the motion: tilt may reach 0.16 mrad (2 um over the patch) before amplitude, acceleration peak, slip, loop
 area or friction force changes by 5 %, the loop area first. The share of the cycle that sticks and the phase at which
 slip begins change by 6 and 8 % at 0.03 mrad; the pressure peak doubles at 0.011 mrad.
 

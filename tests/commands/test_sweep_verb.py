@@ -151,6 +151,23 @@ def test_exact_a_resumed_sweep_runs_what_is_missing(swept, scene, tmp_path, monk
     assert cli("sweep", scene, *OVER, "-o", out).code == 3 and len(ran) == 10
 
 
+@pytest.mark.parametrize("change, why", [
+    (("--set", "friction.static=0.31"), "a sweep of another scene or of another version of patchfem"),
+    (("--over", "drive.cycles=3,4"), "a sweep of other keys (normal.load)")])
+def test_refuses_to_resume_into_a_whole_sweep_of_another(scene, tmp_path, change, why):
+    """The tables of the older sweep were once replaced without a word."""
+    out, over = tmp_path / "out", ("--over", "normal.load=10 N,20 N")
+    assert cli("sweep", scene, *over, "-o", out).code == 0
+    before = {one.relative_to(out): one.read_bytes() for one in out.rglob("*") if one.is_file()}
+    told = cli("sweep", scene, *(() if change[0] == "--over" else over), *change, "-o", out, "--resume")
+    assert told.code == 2 and f"out: this folder contains {why}; name another folder with -o" in told.err
+    assert {one.relative_to(out): one.read_bytes() for one in out.rglob("*") if one.is_file()} == before
+    told = cli("sweep", scene, "--over", "normal.load=20 N,30 N", "-o", out, "--resume")  # of the same keys
+    assert told.code == 0 and "note: 1 case of this folder is not among the values of this sweep" in told.err
+    told = cli("sweep", scene, "--over", "normal.load=10 N,20 N,30 N", "-o", out, "--resume")
+    assert told.code == 0 and "not among" not in told.err and len(rows(out)) == 3
+
+
 def test_exact_an_interrupt_keeps_what_is_done(swept, scene, tmp_path, monkeypatch):
     real, left = many.answers, [2]
 
@@ -355,6 +372,8 @@ def test_exact_pages_of_cases_that_are_there_are_drawn(scene, tmp_path):
     assert cli("sweep", scene, *over, "-o", out, "--keep", "results").code == 0
     assert cli("sweep", scene, *over, "-o", out, "--resume", "--keep", "pages").code == 0
     pages = sorted((out / "cases").glob("*/report.html"))
+    heads = {re.search("<h1>(.*?)</h1>", page.read_text("utf-8"))[1] for page in pages}  # not that of the scene
+    assert heads == {"friction.static = 0.1", "friction.static = 0.2"}
     before = [page.stat().st_mtime_ns for page in pages]
     assert len(pages) == 2
     assert cli("sweep", scene, *over, "-o", out, "--resume", "--keep", "pages").code == 0

@@ -1,5 +1,6 @@
 """A march that is interrupted goes on to the same bits: every kind of run, at its first state and on the way."""
 
+import json
 import os
 import signal
 import subprocess
@@ -90,7 +91,7 @@ def test_refuses_the_state_of_another_march(tmp_path, often):
     scene.write_text(RIGS["one slide"], "utf-8")
     words = ("run", scene, "--no-page", "-o", tmp_path / "out", "--resume")
     answer = cli(*words)
-    assert answer.code == 2 and "this folder contains no interrupted run; run without --resume" in answer.err
+    assert answer.code == 2 and "out: this folder contains no interrupted run; run without --resume" in answer.err
     assert sorted(one.name for one in tmp_path.iterdir()) == ["scene.toml"]
     often.stop = 5
     assert cli(*words[:-1]).code == 130
@@ -106,6 +107,11 @@ def test_refuses_the_state_of_another_march(tmp_path, often):
         assert answer.code == 2 and "cannot be read" in answer.err and "without --resume" in answer.err
     state.write_bytes(data)
     assert cli(*words).code == 0
+    answer = cli(*words)  # once: "out.partial: this folder contains no interrupted run"
+    assert answer.code == 0 and "out: this run is already complete" in answer.err and ".partial" not in answer.err
+    assert json.loads(cli(*words, "--json").out) == json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
+    answer = cli(*words, "--set", "friction.static=0.31")
+    assert answer.code == 2 and "out: this folder contains no interrupted run but a complete run of" in answer.err
     scene.write_text(BENCH, "utf-8")
     answer = cli(*words)
     assert answer.code == 2 and "integrated in time" in answer.err

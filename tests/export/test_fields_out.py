@@ -234,14 +234,25 @@ def test_exact_vtkhdf_is_copied_and_not_onto_itself(tmp_path):
     (["-o", "a.mat"], 4, "neither result.nc"), (["-o", "a.uff"], 4, "neither result.nc"),
     (["-o", "a.xlsx"], 2, ".pvd, .vtu, .csv, .vtkhdf"), (["-o", "a"], 2, ".pvd"),
     (["-o", "a.vtu", "--frame", "3"], 2, "frames 0 to 2"), (["-o", "a.vtu", "--frame", "-4"], 2, "frames 0 to 2"),
-    (["-o", "a.pvd", "--frame", "1"], 2, "whole series"), (["-o", "nowhere/a.vtu"], 4, "cannot be written"),
-    (["-o", "nowhere/a.pvd"], 4, "cannot be written"), ([], 2, "-o")])
+    (["-o", "a.pvd", "--frame", "1"], 2, "whole series"), ([], 2, "-o"),
+    (["-o", f"out/{NAME}/x/a.vtu"], 4, f"{NAME} is a file"), (["-o", "nowhere/x/a.bmp"], 2, ".pvd, .vtu, .csv")])
 def test_refuses_exports_by_name(tmp_path, monkeypatch, words, code, says):
     write_small(tmp_path / "out")
     monkeypatch.chdir(tmp_path)
     answer = cli("export", "out", *words)
     assert answer.code == code and says in answer.err and "internal fault" not in answer.err
     assert [path.name for path in tmp_path.iterdir()] == ["out"]
+
+
+@pytest.mark.parametrize("name, made", [("a.vtu", {"a.vtu"}), ("fields.pvd", {"fields.pvd", "fields_frames"}),
+                                        ("a.csv", {"a.csv"}), ("a.vtkhdf", {"a.vtkhdf"})])
+def test_always_the_folder_of_an_export_is_made(tmp_path, name, made):
+    """`export tp -o tp_pvd/fields.pvd`, as the answer of a run suggests it, once named fields_frames that could not be
+    written."""
+    write_small(tmp_path / "out")
+    answer = cli("export", tmp_path / "out", "-o", tmp_path / "new" / "one" / name)
+    assert answer.code == 0, answer.err
+    assert {one.name for one in (tmp_path / "new" / "one").iterdir()} == made
 
 
 def test_refuses_folders_without_fields_and_spoilt_files(tmp_path):

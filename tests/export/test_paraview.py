@@ -163,7 +163,7 @@ def test_refuses_a_script_without_its_fields_or_of_nothing_that_moves(bench, wri
     (tmp_path / "lumped").mkdir()
     answer = cli("export", tmp_path / "lumped", "-o", tmp_path / "a.py")
     assert answer.code == 4 and "only a run with [contact] writes one" in answer.err
-    answer = cli("export", bench, "-o", tmp_path / "none" / "a.py")
+    answer = cli("export", bench, "-o", tmp_path / "alone.py" / "a.py")
     assert answer.code == 4 and "cannot be written" in answer.err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["alone.py", "lumped", "still"]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import matplotlib.image
@@ -124,7 +125,8 @@ def test_exact_a_picture_needs_no_opengl(bench, tmp_path, monkeypatch):
     assert answer.code == 0 and not answer.err, answer.err
     shape, share = colours(tmp_path / "a.png")
     assert shape == (1000, 1800, 3) and share > 0.2
-    assert [path.name for path in tmp_path.iterdir()] == ["a.png"]
+    assert ", frame 0 (of 0 to " in answer.out and [path.name for path in tmp_path.iterdir()] == ["a.png"]
+    assert re.search(r", frame \d+ \(the last\), \S+ s$", cli("view", bench, "-o", tmp_path / "b.svg").out)
 
 
 @pytest.mark.slow
@@ -157,7 +159,7 @@ def test_refuses_a_window_without_opengl_and_says_why(bench, monkeypatch, probe,
 @pytest.mark.parametrize("words, code, says", [
     (["-o", "a.bmp"], 2, ".png, .svg, .pdf"), (["-o", "a.svg", "--frame", "999"], 2, "--frame"),
     (["-o", "a.svg", "--magnify", "-1"], 2, "--magnify"), (["-o", "a.svg", "--magnify", "nan"], 2, "--magnify"),
-    (["-o", "nowhere/a.svg"], 4, "cannot be written")])
+    (["-o", "nowhere/x/a.svg", "--frame", "999"], 2, "--frame")])
 def test_refuses_pictures_by_name(bench, tmp_path, monkeypatch, words, code, says):
     monkeypatch.chdir(tmp_path)
     answer = cli("view", bench, *words)

@@ -453,3 +453,28 @@ def test_exact_the_chain_of_a_plan_knows_both_pieces():
     chain = plan(scene(soft + rub)).chain
     bars = 1 / (HEIGHT * 2.6 / 210e9 + HEIGHT * 2.6 / 1e9) * LENGTH * WIDTH
     assert chain["pieces_shear"] == pytest.approx(bars, rel=1e-9)
+
+
+@pytest.mark.parametrize("shape, ends, told", [
+    (TILT.format(1e-4), (True, False), r", from x = -6.35 to -4.47 mm \(left end\); peak"),
+    (TILT.format(-1e-4), (False, True), r", from x = 4.47 to 6.35 mm \(right end\); peak"),
+    ('[contact.crown]\nradius = "10 m"\n', (False, False), r", from x = -([\d.]+) to \1 mm; peak"),
+    ('[contact.profile]\nfile = "hollow.csv"\n', (True, True),
+     r", from x = -6.35 to -(\S+) mm \(left end\) and from \1 to 6.35 mm \(right end\); peak"),
+    ("", (True, True), "^100 % of the length in contact; peak")], ids=["left", "right", "middle", "both", "whole"])
+def test_exact_the_answer_says_where_the_contact_is(tmp_path, shape, ends, told):
+    """The parts of the contact add up to its share of the length, and their outer edges lie 2 half-widths apart."""
+    x = np.linspace(-6.35, 6.35, 501)
+    (tmp_path / "hollow.csv").write_text("x [mm],z [um]\n" + "".join(
+        f"{place:.6f},{1 - (place / 6.35)**2:.9f}\n" for place in x))
+    path = tmp_path / "scene.toml"
+    path.write_text(TEXT.format(keys='load = "26 lbf"\nelement_size = "0.0635 mm"', material=STEEL, tables=shape))
+    answer = cli("run", path, "-o", tmp_path / "out", "--no-page")
+    assert answer.code == 0 and re.search(told, answer.out, re.M), answer.out[:300]
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    contact, known = summary["contact"], {name: one["value"] for name, one in summary["measures"].items()}
+    parts = np.array(contact["stretches"])
+    assert [contact["from"], contact["to"]] == pytest.approx([-LENGTH / 2, LENGTH / 2])
+    assert (parts[0, 0] == contact["from"], parts[-1, 1] == contact["to"]) == ends
+    assert np.diff(parts).sum() / LENGTH == pytest.approx(known["contact_fraction"], rel=1e-3)
+    assert parts[-1, 1] - parts[0, 0] == pytest.approx(2 * known["contact_half_width"], rel=1e-3)

@@ -51,7 +51,8 @@ def view(folder: Path, out: Path | None, frame: int | None = None, magnify: floa
         one = series.frame(-1 if frame is None else frame)
         head = series.path.parent.resolve().name
         if len(series) > 1:
-            head += f", frame {one.number} of 0 to {len(series) - 1}, {one.time:.6g} s"
+            last = len(series) - 1
+            head += f", frame {one.number} ({f'of 0 to {last}' if one.number < last else 'the last'}), {one.time:.6g} s"
     if out is None:
         _window(one, head, magnify)
         return

@@ -52,15 +52,21 @@ def _export(series: Series, out: Path, number: int) -> str:
             raise PatchfemError(f"{out}: this is the file to export; choose another name with -o")
         with whole(out, series.path.stat().st_size) as partial:
             shutil.copyfile(series.path, partial)
-        return f"{out}: {len(series)} frames"
+        return f"{out}: {_frames(len(series))}"
     if out.suffix == ".pvd":
-        return f"{out}: {write_pvd(out, series)} frames in {frames_beside(out).name}"
+        return f"{out}: {_frames(write_pvd(out, series))} in {frames_beside(out).name}"
     one = series.frame(number)
     if out.suffix == ".vtu":
         write_vtu(out, one, one.time, one.units)
     else:
         write_csv(out, one)
-    return f"{out}: frame {one.number} of {len(series)}, {one.time:.6g} s"
+    last = len(series) - 1
+    which = "the last" if one.number == last else f"of 0 to {last}"
+    return f"{out}: frame {one.number} ({which}), {one.time:.6g} s"
+
+
+def _frames(count: int) -> str:
+    return f"{count} frame{'s' * (count != 1)}"
 
 
 def frames_beside(path: Path) -> Path:

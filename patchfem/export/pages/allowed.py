@@ -1,23 +1,24 @@
 """How far a swept key may go: until a measure of the motion changes by 5 %, and until the largest pressure doubles.
 
 A limit stands between two cases, the last one surely within and the first one surely beyond; where these are
-neighbours, a straight line between them (over the logarithm of a key that grows by factors) says about where, unless a
-straight line through the logarithm of the change says another place. A case that did not settle, or whose measure
-misses its tolerance, is neither.
+neighbours, the least of three curves says about where: a straight line between them (over the logarithm of a key that
+grows by factors), a straight line through the logarithm of the change, a parabola that also runs through the case
+before them. Where the two lines disagree nothing is said. A limit is written rounded down. A case that did not settle,
+or whose measure misses its tolerance, is neither within nor beyond.
 """
 
 from collections.abc import Sequence
 from html import escape
-from math import ceil, exp, isfinite, log, log10
+from math import ceil, exp, floor, isfinite, log, log10
 from typing import NamedTuple
 
 import numpy as np
 
-from ...scales import LADDERS, plain, short, step_of
+from ...scales import LADDERS, plain, step_of
 from ..written import NUMBER, bare, label
 from . import document
 from .changes import lines_of, shown_of
-from .words import linked, zero_below
+from .words import linked, short, zero_below
 
 WITHIN = 0.05  # of its value in the first case, in which a measure is said to stay
 MOVES = ("relative_displacement_amplitude", "absolute_acceleration_peak", "slip_amplitude", "loop_area",
@@ -121,13 +122,42 @@ def _along(name: str, change: float, line: np.ndarray, size: np.ndarray, values:
     if known[beyond] != known[inside] + 1:
         return ends
     way = np.array([share[inside], ends.change, share[beyond]])
-    way = np.log(1 + way) if factors and change >= 1 else way  # a power of the key is straight in both logarithms
+    way = _way(way, change, factors)
     part = float((way[1] - way[0]) / (way[2] - way[0]))
     low, high = float(size[last]), float(size[next_one])
     bent = log(change / away[inside]) / log(away[beyond] / away[inside]) if share[inside] * ends.change > 0 else 1.0
-    place, other = (exp(log(low) + one * log(high / low)) if factors and low > 0 else low + one * (high - low)
-                    for one in (part, bent))
-    return ends._replace(about=part, value=place) if abs(other - place) <= ALIKE * abs(place) else ends
+    before = known[inside - 1] if inside else None
+    arched = part if before is None else _arched(np.append(_way(share[inside - 1], change, factors), way), _places(
+        [float(size[int(line[before])]), low, high], factors))
+    place, other, third = (exp(log(low) + one * log(high / low)) if factors and low > 0 else low + one * (high - low)
+                           for one in (part, bent, arched))
+    return ends._replace(about=part, value=min(place, other, third)) if abs(other - place) <= ALIKE * abs(place) \
+        else ends
+
+
+def _way(share, change: float, factors: bool):
+    """Relative changes as they are interpolated: a power of the key is straight in both logarithms."""
+    return np.log(1 + share) if factors and change >= 1 else share
+
+
+def _places(size: list, factors: bool) -> list:
+    """Values of the key as they are interpolated over."""
+    return [log(one) for one in size] if factors and size[0] > 0 else size
+
+
+def _arched(way: np.ndarray, at: list) -> float:
+    """Where the parabola through three cases reaches a value first, as a share of the way from the second to the
+    third.
+
+    way: of the first case, the second, the wanted value, that of the third; at: the places of the cases. In Newton's
+    form with s the share and h the step: w = w2 + (w3 - w2) s + c h^2 s (s - 1).
+    """
+    first, second, wanted, third = way.tolist()
+    step = at[2] - at[1]
+    curved = ((third - second) / step - (second - first) / (at[1] - at[0])) / (at[2] - at[0]) * step**2
+    roots = np.roots([curved, third - second - curved, second - wanted]) if curved else \
+        [(wanted - second) / (third - second)]
+    return min((float(one.real) for one in roots if abs(one.imag) < 1e-12 and 0 <= one.real <= 1), default=1.0)
 
 
 def _order(one: Allowed) -> tuple:
@@ -137,13 +167,14 @@ def _order(one: Allowed) -> tuple:
 
 def as_json(limits: Limits) -> list:
     """The limits as sweep.json has them, SI: `value` of the key, between the cases `low` and `high`, from which a
-    measure differs by `change`, relative to the first case."""
+    measure differs by `change`, relative to the first case; `value` is `low` where no case lies between the first one
+    and one beyond the limit."""
     if limits.key is None:
         return []
     size = np.asarray(limits.key["values"], float)
     return [{"measure": one.name, "key": limits.key["name"], "value": one.value, "unit": limits.key["unit"],
              "change": one.change, "low": float(size[one.inside]), "high": float(size[one.beyond])}
-            for one in limits.found if one.beyond is not None and one.resolved()]
+            for one in limits.found if one.beyond is not None]
 
 
 def sentence(limits: Limits) -> str:
@@ -161,6 +192,25 @@ def sentence(limits: Limits) -> str:
     return f"{where}{'; '.join(parts)}." if parts else ""
 
 
+def passed(limits: Limits) -> str:
+    """Which of the largest pressure and the stiffness are beyond their limit in the second case already, so that the
+    cases do not show how far the key may go, as one sentence; "" where none is."""
+    if limits.key is None:
+        return ""
+    found = [one for one in limits.found if one.beyond is not None and not one.resolved()]
+    found = sorted((one for one in found if one.name in ("pressure_peak", *STIFF)),
+                   key=lambda one: (one.beyond, one.name in STIFF))
+    size, said = np.asarray(limits.key["values"], float), {}
+    for one in found:
+        by = "more than doubled" if one.change >= 1 else \
+            f"{'risen' if one.change > 0 else 'fallen'} by more than {100 * WITHIN:g} %"
+        said.setdefault(_at(limits, one, float(size[one.beyond])), {}).setdefault(by, []).append(label(one.name))
+    places = [f"at {place} " + " and ".join(f"the {' and the '.join(names)} ha{'s' if len(names) == 1 else 've'} {by}"
+                                            for by, names in told.items()) for place, told in said.items()]
+    return f"As {limits.key['name']} grows, already {'; '.join(places)}; smaller values would show these limits." \
+        if places else ""
+
+
 def _moving(limits: Limits) -> str:
     """How far the key may go before one of the MOVES that it names changes; "" where the cases do not show it."""
     moving = [one for one in limits.found if one.name in MOVES]
@@ -171,7 +221,7 @@ def _moving(limits: Limits) -> str:
     within, others = f"{100 * WITHIN:g} %", ", ".join(others)
     ends = sorted((one for one in moving if one.beyond is not None or not one.whole), key=_order)
     if not ends:
-        far = _at(limits, moving[0], limits.most) + _brackets(_gap(limits, moving[0], limits.most))
+        far = _at(limits, moving[0], limits.most, True) + _brackets(_gap(limits, moving[0], limits.most))
         told = f"{others} and {final} change" if others else f"{final} changes"
         return "" if limits.lost else f"{name} may reach {far}: {told} by less than {within}"
     least, *_, last = *ends, ends[-1]
@@ -194,11 +244,21 @@ def _brackets(*parts: str) -> str:
     return f" ({told})" if told else ""
 
 
-def _at(limits: Limits, one: Allowed, value: float | None = None) -> str:
-    """A value of the key, that of a limit unless given, with two digits or what its cases resolve."""
-    value = one.value if value is None else value
+def _at(limits: Limits, one: Allowed, value: float | None = None, down: bool = False) -> str:
+    """A value of the key, that of a limit unless given, with two digits or what its cases resolve; down: rounded down,
+    as a limit is."""
+    value, down = (one.value, True) if value is None else (value, down)
     unit, scale = _unit(limits.key, value, one.inside)
-    return f"{plain(value * scale, _digits(limits.key, one))} {unit}".strip()
+    digits = _digits(limits.key, one)
+    return f"{plain(_down(value * scale, digits) if down else value * scale, digits)} {unit}".strip()
+
+
+def _down(value: float, digits: int) -> float:
+    """The largest number of so many digits that is no larger than the value but for round-off."""
+    if not value:
+        return value
+    step = 10.0**(floor(log10(abs(value)) + 1e-9) - digits + 1)
+    return floor(value / step + 1e-6) * step
 
 
 def _where(limits: Limits, one: Allowed) -> str:
@@ -209,7 +269,8 @@ def _where(limits: Limits, one: Allowed) -> str:
 def _gap(limits: Limits, one: Allowed, value: float | None = None) -> str:
     """What an angle opens over the patch, as `_at` writes it; "" for another key, and where the size of the patch is
     not known."""
-    value = float(f"{one.value if value is None else value:.{_digits(limits.key, one)}g}")
+    digits = _digits(limits.key, one)
+    value = float(f"{_down(one.value if value is None else value, digits):.{digits}g}")
     side = (limits.over or {}).get(OPENS.get(limits.key["name"], ("", ""))[1])
     if not side or not value:
         return ""
@@ -258,8 +319,9 @@ def table(limits: Limits, measures: dict) -> str:
             far = "in no case" if one.whole else \
                 f"not up to {at(one.inside)}; the cases with larger values do not show where this change is reached"
         by = f"{100 * WITHIN:g} %" if abs(one.change) < 1 else "double"
-        first = short(one.first, measures[one.name][2], 4, zero_below(one.name))
-        rows.append([linked(label(one.name), one.name), escape(first), _change(one.changed), by, escape(far)])
+        first = short(one.name, one.first, measures[one.name][2], 4)
+        rows.append([linked(label(one.name), one.name), escape(first), _change(one.changed), by,
+                     f"<td class=soft>{escape(far)}</td>"])
     several = int(np.sum(np.asarray(key["values"], float) == np.min(np.asarray(key["values"], float)))) > 1
     least = (" Other keys are swept, too; each limit is the smallest limit that is found for any values of these "
              "other keys."

@@ -18,7 +18,7 @@ ENDS = {
     "no_contact": "the pieces do not touch", "not_converged": "a numerical method does not converge"}
 SLIPS = "the interface slips as a whole"  # from "stuck" to "steady"
 STATES = {  # measure: what its state is called once it has it, and once it has it no longer
-    "contact_fraction": ("the contact fraction is below 1", "the whole length is in contact"),
+    "contact_fraction": ("only part of the length is in contact", "the whole length is in contact"),
     "stick_fraction": ("the interface slips as a whole in part of the cycle", "the interface never slips as a whole"),
     "slip_amplitude": ("slip begins", "there is no slip")}
 

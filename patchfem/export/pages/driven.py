@@ -2,6 +2,7 @@
 
 import shlex
 from pathlib import Path
+from textwrap import shorten
 
 from ...core import G_N
 from ...scales import LADDERS, axis_unit
@@ -66,6 +67,11 @@ def _slide(keys: dict) -> str:
         return f"a triangle slide of ±{size(keys['amplitude'])} at {size(keys['speed'])}"
     held = f", held for {size(keys['hold'])}" if kind == "dwell" and "hold" in keys else ""
     return f"a slide of {size(keys['distance'])} at {size(keys['speed'])}{held}"
+
+
+def changed(sets: tuple) -> str:
+    """The keys that were changed beside the scene, as people read them; sets: `key=value` as given."""
+    return shorten(", ".join(f"{key} = {value}" for key, _, value in (one.partition("=") for one in sets)), 160)
 
 
 def command(path: Path, sets: tuple) -> str:

@@ -7,14 +7,15 @@ from typing import NamedTuple
 import numpy as np
 
 from ...runs.many.answers import FAILED
-from ...scales import plain, short
+from ...scales import LADDERS, plain, step_of
 from .. import missed
-from ..written import NUMBER, label
+from ..written import NUMBER, bare, label
 from . import allowed, peaks, ranked
 from .changes import changes, shown_of, varies
-from .words import joined, zero_below
+from .words import joined, short, zero_below
 
 EXACT = 1e-6  # of a value, up to which no error is told: the values are shown to four digits
+AWAY = 0.01  # of the length of the patch, from which on it is said that the centre of its pressure moves
 SETTLED = ranked.SETTLES
 FIRST = ("relative_displacement_amplitude", "loop_area", "friction_ratio_peak", "onset_level", "pressure_peak")
 
@@ -25,7 +26,8 @@ class Lead(NamedTuple):
     say. ranks, spread, peaks: as `ranked.ranks_of`, `ranked.quantiles` and `peaks.found` give them; rank, scatter,
     peak: what matters most, where nine in ten drawn cases lie, where a swept frequency has its peak, in sentences;
     left: how many cases have no answer yet, and that none has settled; least: where the motion is least; asked: the
-    measure that the sweep was asked about, "" unless it was."""
+    measure that the sweep was asked about, "" unless it was; passed: what is beyond its limit in the second case;
+    place: how the centre of the pressure moves."""
 
     missed: dict
     misses: str
@@ -42,12 +44,15 @@ class Lead(NamedTuple):
     left: str = ""
     least: str = ""
     asked: str = ""
+    passed: str = ""
+    place: str = ""
 
     def sentences(self) -> list:
         """What people read, the answer first, then whether all cases meet the tolerance, then what else is known."""
         rank = self.rank if self.scatter or not (self.limit or self.peak) else ""  # of a grid they say more
-        said = (self.limit, self.peak, self.least, rank, self.scatter, self.span, self.turns) if not self.asked else \
-            (self.rank, self.scatter, self.span, self.limit, self.peak, self.least, self.turns)
+        limits = self.limit, self.passed, self.peak, self.least
+        said = (*limits, rank, self.scatter, self.span, self.turns, self.place) if not self.asked else \
+            (self.rank, self.scatter, self.span, *limits, self.turns, self.place)
         used = self._first()
         return [one for one in (self.answer(), "" if self.missed or not used else self.misses,
                                 *(one for one in said if one not in used)) if one]
@@ -96,7 +101,8 @@ def lead_of(table: dict) -> Lead:
                 span(columns(table), trusted, settled, ranked.asked_first(FIRST, table)),
                 changes(keys, columns(table), outcome, table["grid"]), *ranks,
                 tops, joined([one for one in (peaks.sentence(tops), edge) if one]), left,
-                least(keys, columns(table), trusted, shown), table.get("first", ""))
+                least(keys, columns(table), trusted, shown), table.get("first", ""), allowed.passed(limits),
+                place(keys, columns(table), trusted, shown, table.get("patch", {})))
 
 
 def _left(table: dict, outcome: np.ndarray, known: bool) -> str:
@@ -130,7 +136,7 @@ def span(measures: dict, trusted: dict, settled: np.ndarray, names: Sequence = F
             return ""
         values, errors, unit = (part if isinstance(part, str) else np.asarray(part, float)[there]
                                 for part in measures[name])
-        low, high = (short(one, unit, 4, zero_below(name)) for one in (values.min(), values.max()))
+        low, high = (short(name, one, unit, 4) for one in (values.min(), values.max()))
         alike = there.sum() > 1  # of one case nothing runs
         ran = f"ranges from {low} to {high}" if low != high else f"is {high} throughout" if alike else f"is {high}"
         known = np.isfinite(errors) & (errors > 0) & (np.abs(values) > zero_below(name))  # 0 is known absolutely
@@ -142,6 +148,30 @@ def span(measures: dict, trusted: dict, settled: np.ndarray, names: Sequence = F
             f" in the {'only case that meets' if counts == 1 else 'cases that meet'} the tolerance"
         return f"{ranked.called(name).capitalize()}{whose} {ran}{band}."
     return ""
+
+
+def place(keys: list, measures: dict, trusted: dict, shown: dict, patch: dict) -> str:
+    """How the centre of the pressure moves from the case with the least value of the one swept key to that with the
+    largest; "" for several keys, and where it moves by less than AWAY of the length. patch: {`length` [m]}; the others
+    as of `least`."""
+    swept, name = [one for one in keys if varies(one)], "pressure_centre"
+    length, (values, *_) = patch.get("length"), measures.get(name, ((),))
+    if len(swept) != 1 or swept[0]["name"] not in shown or not length or name not in measures:
+        return ""
+    known = np.flatnonzero(np.isfinite(values) & trusted[name])
+    if known.size < 2:
+        return ""
+    key, size = swept[0]["name"], np.asarray(swept[0]["values"], float)[known]
+    first, last = (int(known[find(size)]) for find in (np.argmin, np.argmax))
+    if abs(values[last] - values[first]) < AWAY * length:
+        return ""
+    unit, scale = step_of(LADDERS["m"], length / 2)
+    begin, end, edge = (plain(float(one) * scale, 3) for one in
+                        (*(values[case] if abs(values[case]) > 1e-3 * length else 0 for case in (first, last)),
+                         length / 2))
+    low, high = (shown[key](case) for case in (first, last))
+    return (f"As {key} grows from {bare(low, high)} to {high}, the centre of the pressure moves from x = {begin} to "
+            f"{end} {unit}; the ends of the patch are at x = -{edge} and {edge} {unit}.")
 
 
 def least(keys: list, measures: dict, trusted: dict, shown: dict) -> str:
@@ -179,7 +209,7 @@ def least(keys: list, measures: dict, trusted: dict, shown: dict) -> str:
     names, best = [one["name"] for one in swept], int(order[low])
     at = ", ".join(f"{key} {shown[key](best)}" for key in names)
     before, after = (" with ".join(shown[key](int(case)) for key in names) for case in (order[low - 1], order[low + 1]))
-    told = f"{label(name).capitalize()} is least at {at}: {short(height[low], unit, 4, zero_below(name))}"
+    told = f"{label(name).capitalize()} is least at {at}: {short(name, height[low], unit, 4)}"
     peak = measures.get("peak_frequency")
     if peak is not None and np.isfinite(peak[0][best]):
         told += f", at its peak frequency of {plain(peak[0][best], 4)} Hz"

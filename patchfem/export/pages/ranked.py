@@ -6,11 +6,11 @@ import numpy as np
 
 from ...campaigns.sweeps.ranking import ranking
 from ...core import Outcome
-from ...scales import fitting, plain, short
+from ...scales import fitting, plain
 from ..written import NUMBER, label
 from . import document
 from .changes import shown_of, varies
-from .words import joined, linked, zero_below
+from .words import is_share, joined, linked, short
 
 RANKED = ("relative_displacement_amplitude", "loop_area", "equivalent_damping", "absolute_acceleration_peak",
           "friction_ratio_peak", "onset_level", "pressure_peak", "contact_fraction", "normal_stiffness",
@@ -101,7 +101,7 @@ def _trend(name: str, key: dict, middle: np.ndarray, off: np.ndarray, parts: lis
                 part = parts[top]
                 return f"{what} is {word} between {key['name']} {shown(int(part[0]))} and {shown(int(part[-1]))}."
             best = int(cases[np.argmax(sign * values[cases])])
-            value = short(values[best], unit, 3, zero_below(name))
+            value = short(name, values[best], unit, 3)
             return f"{what} is {word}, {value}, at {key['name']} {shown(best)}."
     rise = middle[-1] - middle[0]
     if abs(rise) <= off[0] + off[-1] or rise == 0:
@@ -183,7 +183,7 @@ def scatter(found: dict, of: int, settled: bool = True, names: tuple = SPREAD) -
                 "the results is not known.")
     for name in [name for name in names if name in found]:
         unit, (low, _, high), count, misses = found[name]
-        low, high = (short(one, unit, 3, zero_below(name)) for one in (low, high))
+        low, high = (short(name, one, unit, 3) for one in (low, high))
         some = [f"in the {count} that have one"] * (count < most) + \
             [f"{misses} of {count} miss the tolerance and are included with their values" if misses > 1 else
              f"1 of {count} misses the tolerance and is included with its value"] * (misses > 0)
@@ -224,7 +224,7 @@ def spread(found: dict) -> str:
     """Quantiles, as `quantiles` gives them, as a table; "" where there are none."""
     rows = []
     for name, (unit, values, count, misses) in found.items():
-        of, scale = fitting(float(np.abs(values).max()), unit)
+        of, scale = ("%", 100.0) if is_share(name) else fitting(float(np.abs(values).max()), unit)
         rows.append([linked(label(name), name), *(plain(one * scale, 4) for one in values.tolist()), escape(of),
                      str(count), str(misses)])
     if not rows:

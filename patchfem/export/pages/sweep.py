@@ -13,9 +13,9 @@ from . import allowed, document, peaks, ranked
 from .document import Section, prose
 from .drawn import BAR, SHORT, digits, drawn
 from .lead import FIRST, SETTLED, Lead, columns, lead_of
-from .words import linked, zero_below
+from .words import is_share, linked, zero_below
 
-LISTED = 400  # cases in the table; sweep.csv has them all
+LISTED, TALL = 400, 24  # cases in the table, sweep.csv has them all; rows from which on it scrolls within its frame
 
 
 def page(table: dict, told: Lead | None = None) -> str:
@@ -77,7 +77,8 @@ def _key(one: dict, cases) -> dict:
 
 def _measure(name: str, one: dict, cases, tolerance=np.nan) -> dict:
     """A measure in the unit that suits its largest value; `over`: whether a case misses its tolerance."""
-    unit, scale = axis_unit(one["values"], one["unit"]) if one["unit"] in LADDERS else (one["unit"], 1.0)
+    unit, scale = ("%", 100.0) if is_share(name) else \
+        axis_unit(one["values"], one["unit"]) if one["unit"] in LADDERS else (one["unit"], 1.0)
     some = {part: np.asarray(one[part], float)[cases] for part in ("values", "errors", "floors") if part in one}
     missed = over(some, tolerance[cases] if np.ndim(tolerance) else tolerance)
     return {"name": name, "label": label(name), "unit": "" if unit == "1" else unit, "means": one.get("means", ""),
@@ -155,7 +156,7 @@ def _cases(table: dict) -> str:
     named = "<a href=sweep.csv>sweep.csv</a>, <a href=sweep.nc>sweep.nc</a>" if table.get("tabled", True) else \
         "sweep.csv and sweep.nc (run the same command with --collect to write them)"
     files = f"<p class=soft>Every case with every measure and its error: {named}.</p>" if table.get("own", True) else ""
-    return f"{files}{document.table(heads, rows, 'wide')}{more}"
+    return f"{files}{document.table(heads, rows, 'wide long' if len(rows) > TALL else 'wide')}{more}"
 
 
 def _changes(values) -> bool:

@@ -3,7 +3,7 @@
 import re
 from collections.abc import Callable, Sequence
 from html import escape
-from math import ceil, inf, isfinite, log10, pi
+from math import ceil, floor, inf, isfinite, log10, pi
 from types import MappingProxyType
 
 from ... import scales
@@ -50,10 +50,9 @@ def units(name: str, value: float, unit: str, error: float | None = None) -> lis
 
     value, error and unit: in SI; value times scale is in the unit.
     """
-    kind = re.sub(r"_\d+$", "", name)  # of an interface after the first
-    if kind.endswith("fraction"):
+    if is_share(name):
         return [("%", 100.0)]
-    if kind.endswith("phase"):
+    if re.sub(r"_\d+$", "", name).endswith("phase"):  # of an interface after the first too
         return [DEG]
     if unit == "m s-2":
         return [("g", 1 / G)]
@@ -69,6 +68,17 @@ def texts(name: str, measure: dict, scale: float | None = None) -> tuple:
     scale = units(name, value, unit, error)[0][1] if scale is None else scale
     return scales.rounded(value * scale, None if error is None else error * scale, zero_below(name, measure) * scale,
                           unit == "1")
+
+
+def is_share(name: str) -> bool:
+    """Whether a measure is a fraction, which people read in %."""
+    return re.sub(r"_\d+$", "", name).endswith("fraction")
+
+
+def short(name: str, value: float, unit: str, digits: int) -> str:
+    """The value [SI] of a measure with so many digits in the unit that people read, 0 below its floor: `46.68 mJ`."""
+    value, unit = (100 * value, "%") if is_share(name) else (value, unit)
+    return scales.short(value, unit, digits, zero_below(name))
 
 
 def pair(name: str, measure: dict) -> str:
@@ -187,13 +197,39 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str, str], s
             said("friction_ratio_peak", "friction ratio peaks at {}")
         if whole and not released:
             of_each("loop_area", "{} dissipated per cycle")
-        of_each("contact_fraction", "{} of the length in contact")
+        of_each("contact_fraction", "{} of the length in contact" + placed(summary.get("contact")))
         if summary["kind"] == "patch":
             said("pressure_peak", "peak pressure {}")
     text = "; ".join(parts)
     if text and not whole and not released:
         text = f"in {cycles:.2g} of a cycle {text}"
     return f"{text[0].upper() + text[1:]}." if text else ""
+
+
+def placed(contact: dict | None) -> str:
+    """Where along x the contact is, as words behind its share of the length, such as `, from x = -6.35 to -3.56 mm
+    (left end)`; "" where all of the length is in contact or this is not known. contact: as `summary.contact_of` has
+    it."""
+    if not contact or not contact["stretches"]:
+        return ""
+    first, last, stretches = contact["from"], contact["to"], contact["stretches"]
+    left, right = stretches[0][0] <= first, stretches[-1][1] >= last
+    if left and right and len(stretches) == 1:
+        return ""
+    unit, scale = scales.step_of(scales.LADDERS["m"], max(abs(first), abs(last)))
+    least = min(1e-3 * (last - first), *(1e-2 * (end - begin) for begin, end in stretches if end > begin))
+    digits = max(0, -floor(log10(least * scale)))  # what tells apart both ends of the shortest part
+
+    def number(place: float) -> str:
+        return f"{round(place * scale, digits) + 0.0:.{digits}f}".rstrip("0").rstrip(".") if digits else \
+            f"{place * scale:.0f}"
+
+    count = len(stretches)
+    parts = stretches if count <= FEW else [[stretches[0][0], stretches[-1][1]]]
+    told = " and from ".join(
+        f"{number(begin)} to {number(end)} {unit}{' (left end)' * (begin <= first)}{' (right end)' * (end >= last)}"
+        for begin, end in parts)
+    return f", from x = {told}" if count <= FEW else f", in {count} stretches from x = {told}"
 
 
 def least_known(result: Result) -> str:

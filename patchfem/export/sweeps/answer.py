@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
 
 from ...disk.whole import write_text
 from ...runs.many.answers import FAILED
 from ..pages.allowed import as_json
 from ..pages.lead import Lead
 
+NONE = MappingProxyType({})
 
-def answer_of(lead: Lead, outcome: Sequence, sign: str = "") -> dict:
-    """What a sweep comes to; outcome: of each case; sign: of what the tables were written for (`sign_of`).
+
+def answer_of(lead: Lead, outcome: Sequence, sign: str = "", of: Mapping = NONE) -> dict:
+    """What a sweep comes to; outcome: of each case; sign, of: what the tables were written for (`run.sign_of`,
+    `run.signed_of`).
 
     `answer`: one sentence; `sentences`: all that is printed; `cases`: `count`, `failed`, `unfinished` (without an
     answer yet), `outcomes` {outcome: count} and `over_tolerance` {measure: {`count`, `worst`: largest error/|value|}};
@@ -27,7 +31,7 @@ def answer_of(lead: Lead, outcome: Sequence, sign: str = "") -> dict:
         "count": len(outcome), "failed": counts.get(FAILED, 0), "unfinished": counts.get("", 0), "outcomes": counts,
         "over_tolerance": lead.missed},
         "ranking": {name: [one._asdict() for one in shares] for name, shares in lead.ranks.items()},
-        "limits": as_json(lead.limits), "sign": sign}
+        "limits": as_json(lead.limits), "of": dict(of), "sign": sign}
 
 
 def write_answer(found: dict, path: Path) -> None:

@@ -108,13 +108,14 @@ class Chunks:
     """The files of a folder and the cases that they hold.
 
     names: (n,) uint64 of the cases that are wanted, in their order. `held`: (n,) place of a case's file in `files`, -1
-    where none has it.
+    where none has it. `others`: number of cases that are not wanted and have an answer.
     """
 
     folder: Path
     names: np.ndarray
     files: list = field(default_factory=list)
     held: np.ndarray = None
+    others: int = 0
 
     def look(self) -> None:
         """Find what the folder has by now."""
@@ -122,12 +123,14 @@ class Chunks:
         held = np.full(known.size, -1, np.int32)
         there = [one for one in os.scandir(self.folder) if one.name.endswith(ENDING) and not one.name.startswith(".")]
         there.sort(key=lambda one: (one.stat().st_mtime_ns, one.name))  # of a case that stands in two, the later counts
-        self.files = [Path(one.path) for one in there]
+        self.files, others = [Path(one.path) for one in there], [self.names[:0]]
         for place, path in enumerate(self.files):
             names = names_in(path)
             at = np.minimum(np.searchsorted(known, names), known.size - 1)
-            held[at[known[at] == names] if known.size else at[:0]] = place
-        self.held = held[same]
+            wanted = known[at] == names if known.size else np.zeros(names.size, bool)
+            held[at[wanted]] = place
+            others.append(names[~wanted])
+        self.held, self.others = held[same], np.unique(np.concatenate(others)).size
 
     def parts(self, numbers: np.ndarray) -> Iterator[tuple[np.ndarray, Answers]]:
         """(numbers, Answers) of those of the wanted cases that are there, file by file; a damaged file has none."""

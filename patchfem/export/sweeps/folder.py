@@ -210,6 +210,18 @@ class Folder:
         """Whether the folder holds the tables of a sweep that came to its end."""
         return read_answer(self.target / "sweep.json").get("cases", {}).get("unfinished") == 0
 
+    def refuse_another(self, of: dict) -> None:
+        """PatchfemError where the tables of the folder are those of another scene or of other keys, which a resumed
+        sweep would replace; of: as of `run.signed_of`."""
+        held = read_answer(self.target / "sweep.json").get("of", of)
+        if held == of:
+            return
+        keys = [one.get("keys", []) if isinstance(one, dict) else [] for one in (held, of)]
+        what = "other keys" + f" ({', '.join(map(str, keys[0]))})" * bool(keys[0]) if keys[0] != keys[1] else \
+            "another scene or of another version of patchfem"
+        raise PatchfemError(f"{self.shown}: this folder contains a sweep of {what}; name another folder with -o, or "
+                            "run without --resume to replace that sweep")
+
     def there(self, numbers: np.ndarray, keep: str = "none") -> np.ndarray:
         """Those of the cases that have an answer, and the files of each that `keep` asks for."""
         numbers = np.asarray(numbers, int)

@@ -58,6 +58,10 @@ def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable
     """
     shared, keep = place.shard is not None, place.kept(len(cases))
     with Folder(place.target, cases.names(asked), shared) as folder:
+        if place.resume:
+            folder.refuse_another(signed_of(asked, cases))
+            if folder.chunks.others and folder.whole() and say is not None:
+                say(_left_out(folder.chunks.others))
         wanted = _part(len(cases), place.shard)
         there = folder.there(wanted, keep)
         if not (place.resume or shared):
@@ -89,6 +93,19 @@ def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable
             write_tables(asked, cases, total, folder, place.page, sign="" if died else sign)
         folder.tidy(not place.resume, keep)
     return total
+
+
+def signed_of(asked: Asked, cases: Cases) -> dict:
+    """What a sweep is of, by which `--resume` knows it: the sign of its scene, and its keys."""
+    return {"scene": asked.digest(), "keys": [axis.key for axis in cases.axes]}
+
+
+def _left_out(count: int) -> str:
+    """That a resumed sweep names fewer values than the folder has answers."""
+    one = count == 1
+    return (f"note: {count} case{'s' * (not one)} of this folder {'is' if one else 'are'} not among the values of this "
+            f"sweep and will not be in its tables; the results of {'this case' if one else 'these cases'} stay in "
+            "chunks/; to include them, run again with --resume and name all values")
 
 
 def _so_far(asked: Asked, cases: Cases, folder: Folder, found: Answers, page: bool) -> None:
@@ -186,7 +203,8 @@ def write_tables(asked: Asked, cases: Cases, found: Answers, folder: Folder, pag
         write_page(table, lead, folder.target)
     else:
         (folder.target / WHOLE).unlink(missing_ok=True)
-    write_answer(answer_of(lead, table["outcome"], sign), folder.target / "sweep.json")  # the last: it signs the others
+    write_answer(answer_of(lead, table["outcome"], sign, signed_of(asked, cases)),
+                 folder.target / "sweep.json")  # the last: it signs the others
 
 
 def _part(count: int, shard: tuple | None) -> np.ndarray:

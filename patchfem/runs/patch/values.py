@@ -94,14 +94,18 @@ def _values(patch: Patch) -> dict:
 
 def _on_edges(patch: Patch) -> dict:
     """The values that hang on where the contact ends."""
-    x, normal, force = patch.x, patch.pieces.normal, patch.pressure.sigma_n * patch.pieces.interface.weight
-    found, active = contact_ends(patch), patch.active
-    stretches = edges.intervals(x, force, found)
+    x, normal, found, active = patch.x, patch.pieces.normal, contact_ends(patch), patch.active
+    stretches = stretches_of(patch, found)
     return {"contact_fraction": float(np.diff(stretches).sum() / np.ptp(x)),
             "contact_half_width": float(stretches[-1, 1] - stretches[0, 0]) / 2,
             "normal_stiffness": edges.stiffness(normal, active, np.ones(x.size), found),
             "tangential_stiffness": shear_stiffness(patch, found),
             "rotational_stiffness": edges.stiffness(normal, active, x, found)}
+
+
+def stretches_of(patch: Patch, found: list) -> np.ndarray:
+    """Stretches of the interface in contact, (k, 2) [m] by rising x, from the ends `found` of `contact_ends`."""
+    return edges.intervals(patch.x, patch.pressure.sigma_n * patch.pieces.interface.weight, found)
 
 
 def contact_ends(patch: Patch) -> list:

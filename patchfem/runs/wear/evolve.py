@@ -292,6 +292,12 @@ def save_state(path: Path, key: str, state: Worn, moments: tuple) -> None:
         os.fsync(file.fileno())
 
 
+def nothing_kept(path: Path) -> PatchfemError:
+    """That there is no state to go on from; path: of the state, in the folder that a run works in."""
+    return PatchfemError(f"{path.parent.name.removesuffix('.partial')}: this folder contains no interrupted run; run "
+                         "without --resume")
+
+
 def load_state(path: Path, key: str) -> tuple:
     """(state, moments) of a kept file. PatchfemError where it belongs to another scene or cannot be read."""
     try:
@@ -306,8 +312,7 @@ def load_state(path: Path, key: str) -> tuple:
         moments = tuple(Moment(float(row[0]), *row[1:-1], float(row[-1]), values)
                         for *row, values in zip(*columns, json.loads(str(found["values"])), strict=True))
     except FileNotFoundError:
-        raise PatchfemError(f"{path.parent.name}: this folder contains no interrupted run; run without "
-                            "--resume") from None
+        raise nothing_kept(path) from None
     except PatchfemError:
         raise
     except Exception as error:  # a damaged archive has many ways to fail

@@ -47,8 +47,9 @@ DIVIDED_BY = {"mass", "frequency", "acceleration", "stiffness", "damping", "cubi
 
 def _within(value: float, least: float) -> float:
     if value and not least <= abs(value) <= LARGEST:
-        raise ValueError(f"{value:g} in SI is outside the computable range; the value must be 0 or have a magnitude "
-                         f"from {least:g} to {LARGEST:g}")  # fmt: skip
+        allowed = f"must be 0 or have a magnitude from {least:g} to {LARGEST:g}" if least else \
+            f"must not exceed {LARGEST:g} in magnitude"
+        raise ValueError(f"{value:g} in SI is outside the computable range; the value {allowed}")
     return value
 
 

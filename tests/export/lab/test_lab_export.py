@@ -145,13 +145,18 @@ def test_exact_counts_of_complex_and_even_functions(tmp_path):
 
 @pytest.mark.parametrize("words, code, says", [
     (["-o", "a.uff", "--frame", "1"], 2, "used only with fields"), (["-o", "a.vtu", "--histories"], 2, "not as .vtu"),
-    (["-o", "nowhere/a.uff"], 4, "cannot be written"), (["-o", "nowhere/a.mat"], 4, "cannot be written"),
+    (["-o", "nowhere/a.uff", "--frame", "1"], 2, "used only with fields"),
     (["-o", "a.xlsx"], 2, "histories and loops as .uff")])
 def test_refuses_exports_of_histories_by_name(bench, tmp_path, monkeypatch, words, code, says):
     monkeypatch.chdir(tmp_path)
     answer = cli("export", bench, *words)
     assert answer.code == code and says in answer.err and "internal fault" not in answer.err
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["a.uff", "a.mat"])
+def test_always_the_folder_of_an_export_is_made(bench, tmp_path, name):
+    assert cli("export", bench, "-o", tmp_path / "new" / name).code == 0 and (tmp_path / "new" / name).is_file()
 
 
 def test_refuses_folders_without_histories(tmp_path):

@@ -221,6 +221,18 @@ def test_exact_of_several_keys_the_strongest_has_a_direction_that_chance_does_no
     assert low < 0.5 < high and np.mean((a >= low) & (a <= high)) == pytest.approx(0.2, abs=0.02)
 
 
+def test_exact_the_place_of_the_contact_is_followed_from_the_first_case_to_the_last():
+    """Of the tilted pieces: only the share in contact was told, not at which end they touch."""
+    tilt = key("contact.tilt.angle", [2e-4, 0, 1e-4], ["0.2 mrad", "0 mrad", "0.1 mrad"])
+    columns = {"pressure_centre": one(np.array([-5.78e-3, 1e-9, -5.32e-3]), unit="m")}
+    table = drawn_table([tilt], columns) | {"drawn": False, "grid": True, "patch": {"length": 12.7e-3}}
+    assert lead_of(table).place == ("As contact.tilt.angle grows from 0 to 0.2 mrad, the centre of the pressure moves "
+                                    "from x = 0 to -5.78 mm; the ends of the patch are at x = -6.35 and 6.35 mm.")
+    assert lead_of(table).place in lead_of(table).sentences()
+    columns["pressure_centre"]["values"] = np.array([1e-5, 0.0, 0.0])
+    assert lead_of(table).place == lead_of(table | {"patch": {}}).place == ""
+
+
 def test_exact_too_few_settled_cases_are_no_ranking():
     """Of 64 cases 32 failed and 31 had not settled: the answer was the amplitude of the one that had."""
     rng = np.random.default_rng(3)

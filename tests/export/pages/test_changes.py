@@ -23,7 +23,7 @@ def said(fraction, errors=0.0, outcome=None, **more) -> str:
 
 def test_exact_the_first_case_below_one_and_the_last_before_it():
     assert said([1, 1, 0.9, 0.6, 0.3]) == \
-        "As contact.tilt.angle grows: from 0.2 mrad on (not yet at 0.1) the contact fraction is below 1."
+        "As contact.tilt.angle grows: from 0.2 mrad on (not yet at 0.1) only part of the length is in contact."
     assert said([0.5, 1, 1, 1, 1]) == \
         "As contact.tilt.angle grows: from 0.1 mrad on (not yet at 0.05) the whole length is in contact."
 
@@ -31,7 +31,7 @@ def test_exact_the_first_case_below_one_and_the_last_before_it():
 def test_exact_a_case_that_its_error_leaves_open_is_neither():
     """0.99 with an error of 0.02 may be 1, and is no longer 1 for sure: both sides are named without it."""
     assert said([1, 1, 0.99, 0.6, 0.3], 0.02) == \
-        "As contact.tilt.angle grows: from 0.5 mrad on (not yet at 0.1) the contact fraction is below 1."
+        "As contact.tilt.angle grows: from 0.5 mrad on (not yet at 0.1) only part of the length is in contact."
 
 
 @pytest.mark.parametrize("fraction, errors", [([1, 1, 1, 1, 1], 0.0), ([1, 1, 0.99, 0.98, 0.99], 0.05),
@@ -42,7 +42,7 @@ def test_exact_nothing_where_nothing_changes_beyond_the_errors(fraction, errors)
 
 def test_exact_a_change_that_does_not_stay_is_first_at_its_place():
     assert said([1, 1, 0.9, 1, 0.3]) == \
-        "As contact.tilt.angle grows: first at 0.2 mrad (not yet at 0.1) the contact fraction is below 1."
+        "As contact.tilt.angle grows: first at 0.2 mrad (not yet at 0.1) only part of the length is in contact."
 
 
 def test_exact_the_order_of_the_cases_does_not_count():
@@ -76,7 +76,7 @@ def test_exact_that_slip_ends_is_told_once():
 def test_exact_failed_cases_are_passed_over():
     fraction = [1, np.nan, 0.9, 0.6, 0.3]
     assert said(fraction, outcome=["done", "failed", "done", "done", "done"]) == \
-        "As contact.tilt.angle grows: from 0.2 mrad on (not yet at 0.05) the contact fraction is below 1."
+        "As contact.tilt.angle grows: from 0.2 mrad on (not yet at 0.05) only part of the length is in contact."
 
 
 def test_exact_another_key_says_where_it_comes_first_and_last():
@@ -89,11 +89,11 @@ def test_exact_another_key_says_where_it_comes_first_and_last():
 
     start = "As contact.tilt.angle grows: from "
     assert found(load / 45) == (start + "0.5 mrad on (not yet at 0.2) with normal.load 10 N, from 1 mrad on "
-                                "with 40 N, the contact fraction is below 1.")
-    assert found(0.15) == start + "0.2 mrad on (not yet at 0.1) the contact fraction is below 1."
+                                "with 40 N, only part of the length is in contact.")
+    assert found(0.15) == start + "0.2 mrad on (not yet at 0.1) only part of the length is in contact."
     assert found(np.where(load > 15, 2.0, 0.15)) == (start + "0.2 mrad on (not yet at 0.1) with normal.load 10 N "
-                                                     "the contact fraction is below 1.")
-    some = "for 2 of 3 values of normal.load, the contact fraction is below 1."
+                                                     "only part of the length is in contact.")
+    some = "for 2 of 3 values of normal.load, only part of the length is in contact."
     assert found(np.where(load > 25, 2.0, 0.15)) == start + f"0.2 mrad on (not yet at 0.1), {some}"
     assert found(np.where(load > 25, 2.0, load / 80)) == start + f"0.2 to 0.5 mrad on (not yet at 0.1 and 0.2), {some}"
 
@@ -106,15 +106,15 @@ def test_exact_of_more_keys_only_the_combinations_are_counted():
         return changes(keys, {"contact_fraction": (np.where(tilt > limit, 0.5, 1.0), np.zeros(30))}, ["done"] * 30)
 
     start = "As contact.tilt.angle grows: from "
-    assert found(0.15) == start + "0.2 mrad on (not yet at 0.1) the contact fraction is below 1."
+    assert found(0.15) == start + "0.2 mrad on (not yet at 0.1) only part of the length is in contact."
     assert found(load * friction / 27) == (start + "0.2 to 1 mrad on (not yet at 0.1 and 0.5), depending on the other "
-                                           "2 keys, the contact fraction is below 1.")
+                                           "2 keys, only part of the length is in contact.")
     assert found(np.where(load > 25, 2.0, load * friction / 27)) == (
-        start + "0.2 to 0.5 mrad on (not yet at 0.1 and 0.2), in 4 of 6 combinations of the other 2 keys, the contact "
-        "fraction is below 1.")
+        start + "0.2 to 0.5 mrad on (not yet at 0.1 and 0.2), in 4 of 6 combinations of the other 2 keys, only part of "
+        "the length is in contact.")
     assert found(np.where((load > 15) | (friction > 0.5), 2.0, 0.15)) == (
-        start + "0.2 mrad on (not yet at 0.1), in 1 of 6 combinations of the other 2 keys, the contact fraction is "
-        "below 1.")
+        start + "0.2 mrad on (not yet at 0.1), in 1 of 6 combinations of the other 2 keys, only part of the length "
+        "is in contact.")
 
 
 @pytest.mark.parametrize("others", [1, 2, 3])
@@ -147,14 +147,14 @@ def test_exact_values_have_the_digits_that_their_spacing_resolves():
                                (np.array([1, 3.14159, 9.87654, 20, 30]), "9.87654", "3.14159")):
         one = key() | {"values": values * 1e-6, "texts": [f"{value!r} urad" for value in values.tolist()]}
         text = changes([one], {"contact_fraction": (np.array([1, 1, 0.9, 0.6, 0.3]), np.zeros(5))}, ["done"] * 5)
-        assert text == (f"As contact.tilt.angle grows: from {at} urad on (not yet at {before}) the contact fraction is "
-                        "below 1.")
+        assert text == (f"As contact.tilt.angle grows: from {at} urad on (not yet at {before}) only part of the "
+                        "length is in contact.")
 
 
 def test_exact_a_unit_stands_with_both_values_where_it_is_not_the_same():
     one = key() | {"texts": ["50 urad", "100 urad", "0.2 mrad", "0.5 mrad", "1 mrad"]}
     text = changes([one], {"contact_fraction": (np.array([1, 1, 0.9, 0.6, 0.3]), np.zeros(5))}, ["done"] * 5)
-    assert "from 0.2 mrad on (not yet at 100 urad) the" in text
+    assert "from 0.2 mrad on (not yet at 100 urad) only" in text
 
 
 def test_exact_words_do_not_grow_and_draws_have_no_lines():

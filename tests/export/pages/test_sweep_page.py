@@ -9,7 +9,7 @@ from chromium import LATER
 from page_data import data_of, own_part, unheard
 
 from patchfem.export.pages import drawn, library
-from patchfem.export.pages.document import DIGITS, Section, document, encoded
+from patchfem.export.pages.document import DIGITS, Section, document, encoded, figure
 from patchfem.export.pages.document import table as sheet
 from patchfem.export.pages.lead import lead_of, span
 from patchfem.export.pages.sweep import brief, page
@@ -416,3 +416,44 @@ def test_always_a_picture_is_one_stop_of_the_tab_key_and_obeys_keys(chromium, ta
     seen.pressed("0")
     assert seen.js(ends) == pytest.approx([low, high])
     assert seen.faults == []
+
+
+def test_exact_a_fraction_is_told_in_percent_as_a_run_tells_it():
+    """0.2193 of the length is 21.93 % in sentence, table and picture alike."""
+    values, none = np.array([1.0, 0.2193, 0.1231]), np.zeros(3)
+    assert span({"contact_fraction": (values, none, "1")}, {"contact_fraction": np.ones(3, bool)}, np.ones(3, bool),
+                ("contact_fraction",)) == "Contact fraction ranges from 12.31 % to 100 %."
+    tilt = {"name": "contact.tilt.angle", "unit": "rad", "values": np.array([0, 1e-4, 2e-4]), "log": False,
+            "texts": ["0 mrad", "0.1 mrad", "0.2 mrad"]}
+    text = page({"title": "t", "version": "0", "command": "c", "scene": "s", "grid": True, "keys": [tilt],
+                 "measures": {"contact_fraction": {"unit": "1", "means": "m", "values": values, "errors": none}},
+                 "outcome": ["done"] * 3, "messages": {}, "folders": None, "tolerance": 0.01})
+    (shown,) = data_of(text)["measures"]
+    assert shown["unit"] == "%" and shown["values"] == pytest.approx([100, 21.93, 12.31])
+    assert "contact fraction</a> [%]" in text and "<td class=n>21.93</td>" in text
+
+
+HIDDEN = """[...document.querySelectorAll('.across,.wide,figure')].filter(
+    (one) => one.scrollWidth > one.clientWidth + 1).map((one) => one.textContent.slice(0, 40))"""
+DOUBLE = """[...document.querySelectorAll('.across,.wide')].filter(
+    (one) => one.scrollHeight > one.clientHeight + 1).length"""
+
+
+def test_always_tables_and_pictures_are_whole_on_a_wide_and_on_a_narrow_page(chromium):
+    """At 1400 px the cases were cut beside empty margins; at 420 px the changes scrolled within the page, meanings and
+    halves of pictures lay outside."""
+    rows = [[name, *(f"<td class=n>{value}</td>" for value in ("1.23456", "0.00012", "1.2 .. 3.4")), "um",
+             "<td class=soft>distance by which the holders approach each other at x = 0</td>"]
+            for name in ("contact_half_width", "rotational_stiffness")]
+    heads = ("measure", ">value", ">error", ">95 %", "unit", "what it is")
+    cases = sheet(["contact.tilt.angle", "outcome", *(f">absolute acceleration fundamental {k} [um]"
+                                                             for k in range(6))],
+                       [["316.228 urad", "steady", *["15.3130 ± 0.0068"] * 6]] * 9, "wide")
+    svg = "<svg viewBox='0 0 900 300'><text x=880 y=20>x</text></svg>"
+    text = document("Where", "", [Section("a", "A", sheet(heads, rows, "wide") + sheet(
+        heads, rows, "across many") + figure(1, svg, "A picture.", "A picture")), Section("cases", "Cases", cases)])
+    wide = chromium.opened(text, 1400)
+    assert wide.js(HIDDEN) == [] and wide.js(DOUBLE) == 0 and wide.js("document.body.scrollWidth") <= 1400
+    narrow = chromium.opened(text, 420)
+    assert [one for one in narrow.js(HIDDEN) if not one.startswith("contact.tilt.angle")] == []
+    assert narrow.js(DOUBLE) == 0 and narrow.js("document.documentElement.scrollWidth") <= 420

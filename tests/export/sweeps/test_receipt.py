@@ -102,4 +102,8 @@ def test_always_a_file_that_a_sweep_names_anywhere_counts(tmp_path, monkeypatch,
     (tmp_path / "two.csv").write_text(rows.format(20), encoding="utf-8")
     if not whole:
         (tmp_path / "out" / receipt.NAME).unlink()
+    if "--set" in words:  # of all cases: the folder is that of another scene
+        told = cli("sweep", "rig.toml", *words, "--keep", "none", "-o", "out", "--resume")
+        assert told.code == 2 and "contains a sweep of another scene" in told.err
+        assert cli("sweep", "rig.toml", *words, "--keep", "none", "-o", "out").code == 0
     assert last() == pytest.approx(2 * first, rel=1e-9)
