@@ -438,7 +438,7 @@ def _figures(one: Lost) -> list:
     if one.after.y is not None:
         return [(maps(one.after.x, one.after.y, (*one.gaps, one.depth)), "Left and middle: gap between the unloaded "
                  "surfaces before and after, wear included. Right: depth lost by both pieces together between the two "
-                 "runs. Each strip is shown at its middle.",
+                 "runs. The values of a strip stand at the middle of its width.",
                  f"Maps of the gaps and of the worn depth: mean {say(one.values['worn_depth_mean'].value, 3)}")]
     x, under = one.after.x, hidden_line(one.after.x, one.depth)
     (along, mm), (up, um) = axis_unit(x, "m"), axis_unit(np.concatenate(one.gaps), "m")

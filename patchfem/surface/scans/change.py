@@ -184,9 +184,9 @@ def sentences(one: Change) -> list:
         out.append(f"{_volume(grown)} of material lie above the first scan (before wear): pile-up or deposits"
                    + (", or the two files are in the wrong order." if headline(one) == GREW else "."))
     share = 100 * float(one.found.used.sum()) / max(float(np.isfinite(one.found.depth).sum()), 1.0)
-    out.append(f"Depths are measured from the {share:.0f} % of the heights that agree up to a plane within "
-               f"{say(REACH * one.found.noise, 3)}; if these heights also wore, uniformly or as a wedge, the true "
-               "depths are larger by the wear of these heights.")
+    out.append(f"Depths are measured from the {share:.0f} % of the heights that agree within "
+               f"{say(REACH * one.found.noise, 3)} once a plane is subtracted; if these heights also wore, "
+               "uniformly or as a wedge, the true depths are larger by the wear of these heights.")
     if one.found.other is not None and not one.volumes.open:
         out.append("Another part of the scans may be unworn instead, for example where two planes meet in an edge; the "
                    "intervals cover both cases.")
