@@ -888,7 +888,7 @@ def _unmeshed(joint: Joint) -> tuple:
     return (f"{SPARSE}the interface has too few elements for a coarser mesh; {cure}",)
 
 
-SPARSE = "the errors of the curves do not include the change on a coarser mesh: "
+SPARSE = "the errors of the curves do not account for the mesh, because no coarser mesh was computed: "
 LEFT_OUT = {"balance": "harmonic balance did not converge at these amplitudes; the curve may turn back to smaller "
                        "amplitudes, or the mode may stop oscillating",
             "quasi-static": "the static curve does not reach these amplitudes",

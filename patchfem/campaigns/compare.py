@@ -12,7 +12,7 @@ from ..runs.run import run
 
 SHOWN = {  # measure: (in words, what a scene needs for it)
     "pressure_peak": ("largest pressure", "[contact]"),
-    "contact_fraction": ("part of the patch length that is in contact", "[contact]"),
+    "contact_fraction": ("fraction of the patch length that is in contact", "[contact]"),
     "normal_stiffness": ("normal stiffness K_n", "[contact]"),
     "tangential_stiffness": ("tangential stiffness K_t", "[contact.shear] or [contact.asperities]"),
     "onset_level": ("drive level at which slip begins", '[structure] and [drive] with waveform = "levels"'),

@@ -73,7 +73,7 @@ class By:
     shard: word("run only one part of the cases, such as 3/40 for the third of 40 parts; all parts write into the "
                 "same folder", "--shard") = ""
     collect: flag("run no case, only write the tables of a sweep whose cases are all done", "--collect") = False
-    device: word("processor for batches of cases, such as cpu (the only choice so far)", "--device") = "cpu"
+    device: word("processor for batches of cases, such as cpu, which is the only choice so far", "--device") = "cpu"
 
     def __post_init__(self):
         if self.device != "cpu":

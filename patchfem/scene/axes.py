@@ -179,7 +179,7 @@ def of_table(table: Any) -> tuple[list[Axis | Span], list[tuple[str, str]]]:
         if isinstance(values, list):
             values = ",".join(map(str, values))
         if not isinstance(values, str):
-            wrong.append((f"sweep.{key}", "a text of values is needed, such as \"0.1..0.6:6\""))
+            wrong.append((f"sweep.{key}", "the values must be a string, such as \"0.1..0.6:6\""))
             continue
         mistakes: list[str] = []
         _add(found, mistakes, key, values, False)

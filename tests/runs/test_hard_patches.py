@@ -296,6 +296,8 @@ def test_always_the_command_line_names_what_was_wrong(tmp_path):
     code, out, err = cli("run", path, "-o", tmp_path / "out", "--set", COARSE, "--json")
     assert code == 0 and "NaN" not in out and "Infinity" not in out and "Traceback" not in err
     assert all(np.isfinite(m["value"]) for m in json.loads(out)["measures"].values())
+    assert json.loads(out)["contact"]["stretches"] == [[0.0, 0.0]]  # one node bears all
+    assert ", at x = 0 mm; peak" in cli("run", path, "-o", tmp_path / "out", "--set", COARSE).out
     for sets, exit_code, said in ((f"contact.load_line.offset={SIZE / 2} m", 2, "contact.load_line.offset"),
                                   ("contact.load=-1 N", 2, "contact.load"),
                                   ("contact.profile.file=none.csv", 2, "none.csv")):

@@ -141,7 +141,7 @@ def test_refuses_mistakes_of_the_table_with_their_lines():
     found = mistakes(text)
     for start, says in (('"friction.static"', "sweep.friction.static: a plain number"),
                         ('"normal.lod"', "sweep.normal.lod: not a key of a scene; did you mean 'load'?"),
-                        ('"normal.load"', "sweep.normal.load: a text of values")):
+                        ('"normal.load"', "sweep.normal.load: the values must be a string")):
         line = line_of(text, start)
         assert any(one.startswith(f"a.toml:{line}: {says}") for one in found), (says, found)
     assert len(found) == 3

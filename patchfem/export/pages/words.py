@@ -217,7 +217,7 @@ def placed(contact: dict | None) -> str:
     if left and right and len(stretches) == 1:
         return ""
     unit, scale = scales.step_of(scales.LADDERS["m"], max(abs(first), abs(last)))
-    least = min(1e-3 * (last - first), *(1e-2 * (end - begin) for begin, end in stretches if end > begin))
+    least = min([1e-3 * (last - first), *(1e-2 * (end - begin) for begin, end in stretches if end > begin)])
     digits = max(0, -floor(log10(least * scale)))  # what tells apart both ends of the shortest part
 
     def number(place: float) -> str:
@@ -226,6 +226,8 @@ def placed(contact: dict | None) -> str:
 
     count = len(stretches)
     parts = stretches if count <= FEW else [[stretches[0][0], stretches[-1][1]]]
+    if count == 1 and parts[0][0] == parts[0][1]:
+        return f", at x = {number(parts[0][0])} {unit}"
     told = " and from ".join(
         f"{number(begin)} to {number(end)} {unit}{' (left end)' * (begin <= first)}{' (right end)' * (end >= last)}"
         for begin, end in parts)

@@ -59,7 +59,7 @@ def _overhang(asked, patch, fine) -> list:
     out = []
     if fine.lateral is not None and (aside := largest_slide(fine.lateral) / asked.width) > FAR:
         out.append(f"the slide across the sliding direction is {aside:.2g} of the width of the pieces, but the "
-                   "computation neglects that their edges no longer overlap")
+                   "computation assumes that the pieces still overlap over their whole width")
     lost = 1 - float(fine.load.min() / fine.load[0]) if fine.load[0] > 0 else 0.0
     if lost > 0.01:
         out.append("the upper piece slides off the pressed area: at worst the computed contact carries "

@@ -134,7 +134,7 @@ def may_hide(found: Registration, hidden: Quantity) -> str:
     bow = (f" A curvature (bow) of {say(abs(found.bend), 3)} was subtracted; this bow may come from a bent datum of "
            "the instrument or from wear.") if found.bend else ""
     tilt, most = (plain(1e6 * one, 3) for one in (abs(found.slope), 2 * hidden.value / float(found.x[-1] - found.x[0])))
-    within = "" if most == tilt else f" (up to {most} urad by its interval)"
+    within = "" if most == tilt else f" (up to {most} urad at the upper end of its interval)"
     return ("Uniform wear of any depth would give the same two traces. Wedge-shaped wear would also give the same two "
             f"traces if the worn part was mounted level for the second trace. The tilt of {tilt} urad between the "
             f"traces{within} may hide a mean worn depth of up to {say(hidden.value, 3)}: half the tilt times the "

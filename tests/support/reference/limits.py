@@ -36,7 +36,7 @@ SIZES = {  # constant -> what it bounds and how it is written
     "runs.rig.costs.MOST_STEPS": "steps per cycle of a time integration, if the tolerance determines the steps",
     "dynamics.march.capacity.MOST_STRIPS": "number of entries in a list of bonds",
     "friction.bonds.parameters.LONGEST": "estimated computing time of a run with a list of bonds [s]",
-    "runs.rig.costs.LONGEST": "estimated computing time of a motion from event to event [s]",
+    "runs.rig.costs.LONGEST": "estimated time to compute a whole motion by the event-to-event method [s]",
     "dynamics.comparison.comparison.MOST_NUMBERS": "number of values that method duhamel, newmark or euler stores",
     "dynamics.resume.MOST_KEPT": "number of samples stored before the last cycles; longer records are thinned out"}
 LEFT_OUT = f"""\

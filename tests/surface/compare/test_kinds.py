@@ -88,8 +88,8 @@ def test_exact_even_wear_has_no_limit_and_the_tilt_is_half_its_length_of_wear():
     assert one.hidden.value == pytest.approx((tilt + (one.tilt.high - one.tilt.low) / 2) * length / 2, rel=1e-9)
     text = verdicts([one])[1][0]
     assert "at most" not in text and "Uniform wear of any depth" in text and "reference mark" in text
-    found = re.search(r"([\d.]+) urad(?: by its interval\)| between the traces) may hide a mean worn depth of up to "
-                      r"([\d.]+) ([un])m", text)
+    found = re.search(r"([\d.]+) urad(?: at the upper end of its interval\)| between the traces) may hide a mean "
+                      r"worn depth of up to ([\d.]+) ([un])m", text)
     said, hidden, unit = found.groups()
     assert float(said) * 1e-6 * length / 2 == pytest.approx(float(hidden) * {"u": UM, "n": 1e-9}[unit], rel=0.01)
 
