@@ -16,11 +16,11 @@ from ...dynamics.work_check import gap
 from ...effects import has
 from ...response import run_events
 from ...response.loops import interface_loops
-from ...response.measures import REST, harmonic, window_amplitudes
+from ...response.measures import REST, harmonic
 from ...response.ringing import held_ring
 from ...response.rows import stuck_share
 from ...response.spectrum import distorted
-from ...structure.drive_sizes import largest, omega_of, sinusoidal, whole
+from ...structure.drive_sizes import largest, omega_of, sinusoidal, slowest, whole
 from ..bench import averaged
 from . import interface, strips
 from .levels import by_levels, without_part_of_cycle
@@ -29,7 +29,8 @@ from .solution import Solution, borne, mode_stiffness
 
 OF_MOTION = ("relative_displacement_amplitude", "absolute_acceleration_peak", "absolute_acceleration_fundamental",
              "acceleration_distortion")  # what is known without an interface
-CHANGES = 1e-2  # share of the tolerance by which windows may differ in a motion that has settled
+CHANGES = 1e-2  # share of the tolerance by which a motion that has settled may still change
+WINDOWS, LEAST_LOST = 3, 1e-6  # by which it is told; share of a free motion that is lost in these, at least
 
 
 def run_exact(model, numerics, patch, frames: int = 0, say=None, progress=None) -> Solution:
@@ -130,7 +131,8 @@ class Pieces(Reader):
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:
         """The Solution of a PieceRun; where its windows still change, with the motion that it settles to."""
         drive, numerics = drive or self.model.rig.drive, self.numerics
-        unsettled = still_changes(window_amplitudes(run.amplitudes, numerics.window), self.model.accuracy.tolerance)
+        unsettled = still_changes(run.amplitudes, numerics.window, self.model.accuracy.tolerance,
+                                  slowest(self.model.rig.modes) * drive.period)
         if numerics.whole and run.outcome is None and not self.rigid and not self.sticks(run) and unsettled:
             steady = settles(self.model.rig.modes, drive, self.groups, run)
             more |= {} if steady is None else {"steady": steady, "bounded": True}
@@ -151,9 +153,17 @@ def _of_strips(run, drive) -> Loop:
                 float(np.abs(window.force).max()))
 
 
-def still_changes(amplitudes, tolerance: float) -> bool:
-    """Whether amplitudes (w,) of successive windows still change by a share of the tolerance, or are too few to say."""
-    return amplitudes.size < 3 or np.ptp(amplitudes[-3:]) > CHANGES * tolerance * amplitudes[-1]
+def still_changes(extremes, window: int, tolerance: float, decay: float) -> bool:
+    """Whether a motion of extremes (c, 2) [m] per cycle may still change by a share of the tolerance, or is too short
+    to say: by what the ends of its cycles moved over the last WINDOWS of `window` cycles, over the share that its
+    slowest free motion loses in these. Where that beats slowly, ends hardly move as long as it is largest.
+
+    decay: of that free motion over a cycle [1].
+    """
+    last = np.asarray(extremes, float)[-WINDOWS * window:]
+    lost = max(-np.expm1(-decay * len(last)), LEAST_LOST)
+    return len(last) < WINDOWS * window or \
+        np.ptp(last, axis=0).max() > CHANGES * tolerance * lost * np.ptp(last[-window:]) / 2
 
 
 def settles(modes, drive, groups, done) -> tuple | None:

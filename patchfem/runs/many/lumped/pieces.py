@@ -13,9 +13,9 @@ from ....effects import has
 from ....friction.record import law_from
 from ....response import run_events
 from ....response.errors import cells_error
-from ....response.measures import ROUND, energy_balance, window_amplitudes
+from ....response.measures import ROUND, energy_balance
 from ....response.ringing import held_ring
-from ....structure.drive_sizes import largest
+from ....structure.drive_sizes import largest, slowest
 from ...rig.costs import pairs_of
 from ...rig.engines import EXACT, PIECES, engine_of
 from ...rig.pieces import RigidElements, elements_of_law, read_off, settles, still_changes
@@ -117,8 +117,8 @@ def _read(cases: list, done: list, cycles: int, window: int, steady: bool) -> Ru
         lost[k] = ring is None
         for name, value in (ring or {}).items():
             rings[name][k] = value
-        ends = window_amplitudes(one.amplitudes, window)
-        if steady and not rigid and not stuck[k] and still_changes(ends, tolerance[k]):
+        decay = slowest(model.rig.modes) * model.rig.drive.period
+        if steady and not rigid and not stuck[k] and still_changes(one.amplitudes, window, tolerance[k], decay):
             found = settles(model.rig.modes, model.rig.drive, cases[k].groups, one)
             lost[k] |= found is None
             known[:, k] = (np.nan, np.nan) if found is None else found
