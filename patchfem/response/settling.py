@@ -9,7 +9,7 @@ CLASSES = Outcome.TRANSIENT, Outcome.STEADY, Outcome.GROWS
 STEADY, GROWS = 1, 2  # their places
 LEAST = 3  # windows by which free motion is told
 MOVES = 1e-3  # of the largest speed in a run, above which an interface slips
-OF_STATED = 2.5  # times what a tail says of its own error: of 221 under Coulomb friction 12 erred more than once
+OF_STATED = 2.5  # times what a tail says of its own error: of 221 under Coulomb friction 12 erred by more than that once
 TELLS = 0.1  # share that the slowest mode must have lost over a third of the run for a beat that stays to be told
 
 

@@ -1,7 +1,7 @@
 """Warnings of measures that are known less well than the tolerance asks: the worst one, how well, and what cures it."""
 
 from collections.abc import Mapping
-from math import ceil, log, log2, log10, pi
+from math import ceil, log2, log10, pi
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -9,7 +9,6 @@ from ..core import say
 from ..effects import has
 from ..response import rows
 from ..scales import plain
-from ..structure.drive_sizes import decay_rate
 from .patch import faces, high_order, ladder, press
 from .results import notes, patch_rows
 from .rig import costs, engines
@@ -176,8 +175,6 @@ def _finer_motion(seen, wide: dict, coarse) -> str:
         return f"set accuracy.shear_modes = {min(4 * seen.extra['shear_modes'], seen.patch.x.size)}"
     if cause == "bonds":
         return _finer_bonds(seen.model.accuracy)
-    if name.endswith("_steady"):
-        return _longer(seen.model.rig, wide[name])
     balanced = seen.extra.get("harmonics")  # None where a steady motion is exact between yields
     return READ if balanced is None or name.startswith(OF_SAMPLES) else \
         notes.more_harmonics(balanced, _sharp(seen))
@@ -212,14 +209,6 @@ def _more_steps(seen, name: str, wide: dict, steps: int) -> str:
     halvings = max(1, ceil(log2(share) / order))
     exact = _stepless(model) if halvings > MOST_HALVINGS and not name.startswith(RINGS) else ""
     return exact or f"set accuracy.steps_per_cycle = {steps * 2**min(halvings, notes.FARTHEST)}"
-
-
-def _longer(rig, times: float) -> str:
-    """As many cycles as its dampers take to lower what is left of a free motion, and with it the error of what the
-    motion would settle to, `times` and by half again."""
-    rate = decay_rate(rig.modes)
-    return f"set drive.cycles = {ceil(rig.cycles + log(2 * times) * rig.drive.omega / (2 * pi * rate))}" if rate > 0 \
-        else READ
 
 
 def _to_a_sample(cycles: float, steps: int) -> str:

@@ -109,12 +109,7 @@ def test_exact_a_batch_ends_as_single_runs_do(end):
     found = alike(model)
     assert many.batch_of(model) is not None and found.outcome[0] == outcome
     assert ("relative_displacement_amplitude_steady" in found.values) == estimated
-    assert bool(found.warnings) == (end in ("settles", "remarked on"))
-    if end == "settles":  # twice the tolerance is left open; the cycles that are proposed close it
-        cycles = found.warnings[0][0].rpartition("; set drive.cycles = ")[2]
-        longer = one_by_one.solve([build(loads(changed(*pairs[1:], ("cycles = 20", f"cycles = {cycles}"))))])
-        assert 60 < int(cycles) < 100 and not longer.warnings
-        assert longer.has("relative_displacement_amplitude_steady", 0)
+    assert bool(found.warnings) == (end == "remarked on")
 
 
 @pytest.mark.parametrize("end", ENDS)
