@@ -23,9 +23,6 @@ from .press import as_patch, with_linear_skin
 from .values import peak_pressure, vertex
 
 BORDER = 3  # nodes whose means give the pressure at an end
-# least errors on a mesh that was chosen for others too: of the rise of the pressure from the node at a corner to its
-# edge; of the change from the mesh before, all of it behind a contact of FEW nodes: 15 of 80 peaks erred more
-AT_CORNER, CHANGED, FEW = 0.65, 0.4, 20
 BEYOND = 2  # cells beyond a contact on coarser cells in which the one on these may end
 
 
@@ -223,16 +220,12 @@ def pressed_together(asked: Asked, tolerance: float, pieces: list | None = None)
     with np.errstate(invalid="ignore", divide="ignore"):
         best, error = settled(known, np.array([np.broadcast_to(least.get(name, 0.0), cell.shape) for name in names]),
                               wanted, nested, edged=np.isin(names, one_by_one.EDGED))
-        if first.chosen:
-            share = np.where(np.isin(names, one_by_one.EDGED)[:, None], 0.0, np.where(fine.count <= FEW, 1.0, CHANGED))
-            error = np.maximum(error, share * np.abs(known[-1] - known[-2]))
         error = np.maximum(error, max(one_by_one.ALIKE, pair.rounding) * np.abs(known[-1]))
         values, errors = dict(zip(names, best)), dict(zip(names, error))
         peak, fraction = values["pressure_peak"], values["loaded_fraction"]
         errors["loaded_fraction"] = one_by_one.of_peak(fraction, errors["loaded_fraction"],
                                                        errors["pressure_peak"] / peak)
-        rise = np.where(fine.inside, 1.0, AT_CORNER if first.chosen else 0.0)
-        errors["pressure_peak"] = np.maximum(errors["pressure_peak"], rise * (peak - fine.top))
+        errors["pressure_peak"] = np.maximum(errors["pressure_peak"], np.where(fine.inside, peak - fine.top, 0.0))
         errors["loaded_fraction"] = one_by_one.of_peak(fraction, errors["loaded_fraction"],
                                                        errors["pressure_peak"] / peak)
     return Together(values, errors, good, fine.top, mine["approach"],
