@@ -10,7 +10,6 @@ from . import stationary
 from .settling import (
     CLASSES,
     GROWS,
-    OF_STATED,
     STEADY,
     classes,
     classify,
@@ -126,7 +125,7 @@ def settled(amplitudes, extremes, window: int, steady, limits: tuple, bounded=Fa
         value, error = np.where(none, mean, value), np.where(none, about, error)
         none = np.isnan(value) & (found == STEADY)  # no tail is seen: about the cycles of the last window
         value = np.where(none, windows_of(extremes, window)[1][:, -1], value)
-        error = np.where(none, OF_STATED * (left + np.abs(amplitudes[:, -1] - value)), error)
+        error = np.where(none, left + np.abs(amplitudes[:, -1] - value), error)
     return found, value, error
 
 

@@ -9,7 +9,6 @@ CLASSES = Outcome.TRANSIENT, Outcome.STEADY, Outcome.GROWS
 STEADY, GROWS = 1, 2  # their places
 LEAST = 3  # windows by which free motion is told
 MOVES = 1e-3  # of the largest speed in a run, above which an interface slips
-OF_STATED = 2.5  # times what a tail says of its own error: of 221 under Coulomb friction 12 erred by more than that once
 TELLS = 0.1  # share that the slowest mode must have lost over a third of the run for a beat that stays to be told
 
 
@@ -71,8 +70,8 @@ def steady_amplitudes(a, p) -> tuple:
     amplitudes, phasors: (n, w) of the last cycle of successive windows; the phasor is the drive-frequency part of the
     motion. What is left of a decaying free motion turns and shrinks by one complex factor per window, so the phasors
     are extrapolated (Aitken). The waveform, amplitude over |phasor|, settles with the size of that factor. The error is
-    OF_STATED times what that says: six times the spread of the last estimates plus twice what the waveform still
-    changes. Where this is as large as what was added there is no estimate.
+    six times the spread of the last estimates plus twice what the waveform still changes; where it is as large as what
+    was added there is no estimate.
     """
     count, w = a.shape
     if w < 5:
@@ -88,7 +87,7 @@ def steady_amplitudes(a, p) -> tuple:
     error = 6 * (ends.max(axis=1) - ends.min(axis=1)) * shape[:, -1] + 2 * np.abs(settle) * ends[:, 0] + 1e-9 * value
     added = np.abs(value - a[:, -1])
     known = moves & (error < np.maximum(added, 1e-6 * value)) & (value < 20 * a[:, -1])
-    return np.where(known, value, np.nan), np.where(known, OF_STATED * error, np.nan)
+    return np.where(known, value, np.nan), np.where(known, error, np.nan)
 
 
 def _one(found: tuple) -> tuple:

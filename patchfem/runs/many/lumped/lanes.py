@@ -65,7 +65,8 @@ ORDERLY, SHOWN = 10.0, 0.25  # a change at half the steps that falls by this sho
 MORE, SETTLED = 10, 1e-5  # times its cycles marches what has not settled; change over a tenth of these that is left
 LATE = 100  # times that change may be left at last
 PACES = 0.25, 0.25, 0.5, *(MORE - 1) * (1.0,)  # of its cycles, after which it is asked whether it has
-OF_TAIL = 7e-6  # least error of an extrapolated range over the range: 1 of 571 erred more
+# error of an extrapolated range over what the extrapolation says, and over the range at least: 1 of 571 erred more
+OF_STATED, OF_TAIL = 2.5, 7e-6
 # times twice as many cells as a run by itself has in a check of Iwan, and of its bars: 1 of 590 random cases erred more
 # than one, by 1.9
 FINER_CELLS, SHORT = 2, 2.0
@@ -548,7 +549,7 @@ def _known(history, part: int, least, near: float) -> tuple:
     ends = np.arange(count - 1, 0, -(part if count > MORE * part else window_of(part)))[::-1]
     with np.errstate(all="ignore"):
         value, error = steady_amplitudes(ranges[:, ends], history[:, ends, 2:] @ [1, 1j])
-    tail = np.maximum(error, OF_TAIL * value)
+    tail = np.maximum(OF_STATED * error, OF_TAIL * value)
     return np.where(closes, last, value), np.where(closes, np.maximum(left, least) + 1e-9 * last, tail)
 
 
