@@ -308,7 +308,8 @@ ROWS = (
     Row("relative_displacement_amplitude_steady", "m", 1e-10,
         "steady amplitude; extrapolated if the motion has not settled or may still change by more than 0.02 tolerance "
         "× amplitude"),
-    Row("peak_frequency", "Hz", 0.0, "drive frequency at which the curve of steady amplitudes has its maximum"),
+    Row("peak_frequency", "Hz", 0.0, "drive frequency, within the swept range, at which the curve of steady amplitudes "
+        "is largest; a resonance unless it is an end of that range"),
     Row("friction_ratio_end", "1", 1e-9, "friction force divided by normal load, both at the end of the slide",
         group="friction"),
     Row("friction_ratio_peak", "1", 1e-9, "largest value of friction force divided by normal load during the run",

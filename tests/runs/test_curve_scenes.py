@@ -82,3 +82,21 @@ def test_always_an_undamped_mode_has_a_hole_in_its_curve():
     at = curve["frequency"] == 143.0
     assert np.isnan(curve["amplitude"][at]).all() and curve["regime"][at] == "unbounded"
     assert np.isfinite(curve["amplitude"][~at]).all()
+
+
+@pytest.mark.parametrize("low, high, key, said", [
+    (100, 140, "drive.to = 140 Hz, the upper",
+     "above this frequency: axial has its resonance at 143 Hz; raise drive.to"),
+    (140, 100, "drive.from = 140 Hz, the upper",
+     "above this frequency: axial has its resonance at 143 Hz; raise drive.from"),
+    (75, 90, "drive.to = 90 Hz, the upper",
+     "above this frequency: axial has its resonance at 143 Hz; raise drive.to"),
+    (300, 320, "drive.from = 300 Hz, the lower",
+     "below this frequency: axial has its resonance at 143 Hz; lower drive.from"),
+    (120, 160, "", "")])
+def test_exact_a_largest_response_at_an_end_of_the_sweep_is_no_peak(low, high, key, said):
+    """One mode's flank has no peak; the mode whose flank it is lies on the named side."""
+    found = pf.run(RIG, **{"drive.from": f"{low} Hz", "drive.to": f"{high} Hz"})
+    warned = [one for one in found.warnings if "the largest response lies at" in one]
+    assert len(warned) == bool(said)
+    assert all(key in one and said in one for one in warned)

@@ -15,6 +15,7 @@ from .changes import changes, shown_of, varies
 from .words import joined, short, zero_below
 
 EXACT = 1e-6  # of a value, up to which no error is told: the values are shown to four digits
+AT = 1e-9  # of a frequency, within which two are one
 AWAY = 0.01  # of the length of the patch, from which on it is said that the centre of its pressure moves
 SETTLED = ranked.SETTLES
 FIRST = ("relative_displacement_amplitude", "loop_area", "friction_ratio_peak", "onset_level", "pressure_peak")
@@ -27,7 +28,7 @@ class Lead(NamedTuple):
     peak: what matters most, where nine in ten drawn cases lie, where a swept frequency has its peak, in sentences;
     left: how many cases have no answer yet, and that none has settled; least: where the motion is least; asked: the
     measure that the sweep was asked about, "" unless it was; passed: what is beyond its limit in the second case;
-    place: how the centre of the pressure moves."""
+    place: how the centre of the pressure moves; ends: how many curves over frequency are largest at an end."""
 
     missed: dict
     misses: str
@@ -46,6 +47,7 @@ class Lead(NamedTuple):
     asked: str = ""
     passed: str = ""
     place: str = ""
+    ends: str = ""
 
     def sentences(self) -> list:
         """What people read, the answer first, then whether all cases meet the tolerance, then what else is known."""
@@ -62,7 +64,7 @@ class Lead(NamedTuple):
         or where the main measure runs; in brackets behind it what qualifies it: cases that have no answer, have not
         settled or miss the tolerance."""
         text = joined(self._first())
-        notes = joined([one for one in (self.left, self.misses if self.missed else "") if one])
+        notes = joined([one for one in (self.left, self.misses if self.missed else "", self.ends) if one])
         if not text or not notes:
             return text or notes or self.misses
         return f"{text.rstrip('.')} ({notes[0].lower() if notes[1].islower() else notes[0]}{notes[1:].rstrip('.')})."
@@ -96,13 +98,30 @@ def lead_of(table: dict) -> Lead:
     tops, edge = (find(keys, columns(table), trusted, table["grid"]) for find in (peaks.found, peaks.edge))
     ranks = ranked.told(table, trusted, settled)
     left = _left(table, outcome, ranks[1] == ranked.too_few(table, settled))
+    inside, ends = _inside(table)
     return Lead(missed.counted(measures, tolerance), missed.sentence(measures, tolerance, where), limits,
                 allowed.sentence(limits),
                 span(columns(table), trusted, settled, ranked.asked_first(FIRST, table)),
                 changes(keys, columns(table), outcome, table["grid"]), *ranks,
                 tops, joined([one for one in (peaks.sentence(tops), edge) if one]), left,
-                least(keys, columns(table), trusted, shown), table.get("first", ""), allowed.passed(limits),
-                place(keys, columns(table), trusted, shown, table.get("patch", {})))
+                least(keys, inside, trusted, shown), table.get("first", ""), allowed.passed(limits),
+                place(keys, columns(table), trusted, shown, table.get("patch", {})), ends)
+
+
+def _inside(table: dict) -> tuple:
+    """(`columns` of a table without the peak frequencies that are ends of the swept frequencies, a sentence on how many
+    cases these are, "" where there are none)."""
+    measures, name = columns(table), "peak_frequency"
+    if name not in measures:
+        return measures, ""
+    values, errors, unit = measures[name]
+    values = np.asarray(values, float)
+    ended = np.any([np.isclose(values, end, rtol=AT, atol=0) for end in table.get("ends", ())], axis=0)
+    ended &= np.asarray(measures[FIRST[0]][0], float) > zero_below(FIRST[0])
+    count, among = int(ended.sum()), int(np.isfinite(values).sum())
+    where = f"In {count} of {among} cases" if among > 1 else "In this case"
+    said = f"{where} the largest response lies at an end of the swept frequencies, so that it may be no resonance."
+    return measures | {name: (np.where(ended, np.nan, values), errors, unit)}, said if count else ""
 
 
 def _left(table: dict, outcome: np.ndarray, known: bool) -> str:

@@ -24,7 +24,7 @@ from ..pages import sweep
 from ..pages.lead import Lead
 from ..readback import HUGE, wanted
 from ..written import NUMBER
-from .tables import facts, names_of
+from .tables import FACTS, facts, names_of
 
 WHOLE, SHORT = "report.html", "summary.json"  # what a click on a case opens: its page where it has one
 
@@ -59,9 +59,11 @@ def columns_of(cases: Cases) -> list:
 
 
 def _shared(held: dict, columns: list) -> dict:
-    """The tolerance of the cases and the size of their patch, from what all have in common and what is swept."""
-    swept = next((one["values"] for one in columns if one["name"] == "accuracy.tolerance"), np.nan)
-    return {"tolerance": held.get("tolerance", swept),
+    """The tolerance of the cases, the size of their patch and the ends [Hz] of their curves over frequency, from what
+    all have in common and what is swept."""
+    swept = {one["name"]: one["values"] for one in columns}
+    return {"tolerance": held.get("tolerance", swept.get("accuracy.tolerance", np.nan)),
+            "ends": tuple(held.get(f"drive_{end}", swept.get(f"drive.{end}", np.nan)) for end in ("from", "to")),
             "patch": {name: float(held[f"patch_{name}"]) for name in ("length", "width") if f"patch_{name}" in held}}
 
 
@@ -164,8 +166,7 @@ def _table(folder: Path, rows: list, keys: list, file) -> dict:
     text, sets = str(file.attrs["scene"]), json.loads(str(file.attrs["sets"]))
     overs = [] if "case" in file.dimensions else [word for one in columns for word in
                                                   ("--over", f"{one['name']}={','.join(dict.fromkeys(one['texts']))}")]
-    held = {name: float(file.attrs[name]) for name in ("tolerance", "patch_length", "patch_width")
-            if name in file.attrs}
+    held = {name: float(file.attrs[name]) for name in FACTS if name in file.attrs}
     title = tomllib.loads(text).get("title") or folder.resolve().name
     wanted(isinstance(title, str) and isinstance(sets, list), "sweep.nc: the scene or the --set stored in this file "
                                                               "cannot be read")
@@ -210,6 +211,8 @@ def joined(tables: list, names: list) -> dict:
                 f"# {name}\n{table['scene']}" for name, table in zip(names, tables)),
             "tolerance": np.concatenate([np.broadcast_to(table.get("tolerance", np.nan), count)
                                          for table, count in zip(tables, counts)]),
+            "ends": tuple(np.concatenate([np.broadcast_to(table.get("ends", (np.nan, np.nan))[end], count)
+                                          for table, count in zip(tables, counts)]) for end in (0, 1)),
             "grid": all(table["grid"] for table in tables), "keys": columns, "measures": measures,
             "outcome": [one for table in tables for one in table["outcome"]],
             "messages": {number + start: why for table, start in zip(tables, shift.tolist())

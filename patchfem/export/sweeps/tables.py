@@ -28,6 +28,8 @@ from ..summary import versions
 BLOCK = 4000  # cases whose texts are made at once
 TRIED = 3  # cases that are asked for what all have in common
 ORDER = {name: place for place, name in enumerate((*STATIC, *rows.TABLE))}
+FACTS = {"tolerance": ("accuracy", "tolerance"), "patch_length": ("contact", "length"),
+         "patch_width": ("contact", "width"), "drive_from": ("drive", "from"), "drive_to": ("drive", "to")}
 
 
 def names_of(found: Answers) -> list[str]:
@@ -98,7 +100,8 @@ def contents(asked: Asked, cases: Cases, found: Answers, keys: Sequence[str] = (
 
 
 def facts(asked: Asked, cases: Cases) -> dict:
-    """`tolerance` of all cases and `patch_length`, `patch_width` [m], as far as they are known and not swept."""
+    """`tolerance` of all cases, `patch_length`, `patch_width` [m] and the ends `drive_from`, `drive_to` [Hz] of the
+    swept frequencies, as far as they are known and not swept."""
     for number in range(min(len(cases), TRIED)):
         try:
             tables = tomllib.loads(asked.scene(cases.sets(number)).resolved())
@@ -108,9 +111,7 @@ def facts(asked: Asked, cases: Cases) -> dict:
     else:
         return {}
     swept = {axis.key for axis in cases.axes}
-    held = {"tolerance": ("accuracy", "tolerance"), "patch_length": ("contact", "length"),
-            "patch_width": ("contact", "width")}
-    return {name: float(str(tables[table][key]).partition(" ")[0]) for name, (table, key) in held.items()
+    return {name: float(str(tables[table][key]).partition(" ")[0]) for name, (table, key) in FACTS.items()
             if key in tables.get(table, {}) and f"{table}.{key}" not in swept}
 
 

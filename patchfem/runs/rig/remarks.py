@@ -6,6 +6,7 @@ from ...core import Outcome
 from ...core import say as length
 from ...effects import has
 from ...response.outcome import changing_note
+from ...scales import plain
 from ..patch import faces
 from ..results.notes import climbing_as_one, creeping, of_growth, unbounded_bonds, unripe, warming, work_check_warning
 from ..results.travel import travelled
@@ -14,6 +15,7 @@ from .costs import dear_elements
 from .engines import ENGINES, PIECES
 from .solution import borne
 
+AT = 1e-9  # of a frequency, within which two are one
 AS_ONE_POINT = ("the shape of the patch does not affect the motion: with pieces that are rigid in shear, a constant "
                 "load and a pressure that moves with the upper piece, the patch moves exactly as one point under the "
                 "same load; add [contact.shear] to let the patch slip part by part")
@@ -40,6 +42,41 @@ def warnings_of(run) -> list:
     out += travelled(patch, raw.response.slide) if patch is not None else ()
     return out if not model.faced else [*out, *faces.together(model, lambda face: [
         *([] if face.soft else [AS_ONE_POINT]), *travelled(face.patch, face.slide(raw.response))])]
+
+
+def peak_at_an_end(run, modes: list) -> list:
+    """The sentence, in a list, on a curve over a sweep whose largest response lies at an end of the sweep.
+
+    run: a `rig.Coupled`; modes: as `plan.modes_of` gives them.
+    """
+    found, drive = run.measures.get("peak_frequency"), run.model.rig.drive
+    at = None if found is None else at_an_end(found.value, drive.low, drive.high)
+    if at is None or not run.measures["relative_displacement_amplitude"].value > 0:
+        return []
+    upper, key = at == max(drive.low, drive.high), "drive.from" if at == drive.low else "drive.to"
+    side, move = ("above", "raise") if upper else ("below", "lower")
+    known = _beside(modes, at, upper)
+    beyond = f": {known[0]}; {move} {key} to include it" if known else ""
+    return [f"the largest response lies at {key} = {plain(at, 6)} Hz, the {'upper' if upper else 'lower'} end of the "
+            f"swept frequencies, so that it may be no resonance; a resonance may lie {side} this frequency{beyond}"]
+
+
+def at_an_end(frequency: float, *ends: float) -> float | None:
+    """The end of a sweep that a frequency is, all in Hz; None where it is neither."""
+    return next((end for end in ends if abs(frequency - end) <= AT * end), None)
+
+
+def _beside(modes: list, at: float, upper: bool) -> list:
+    """Words, in a list, on the mode that may have its resonance nearest to a frequency [Hz] on one side of it."""
+    near = []
+    for mode in modes:
+        free, stuck = mode["free_frequency"], mode["stuck_frequency"]
+        low, high = free, free if stuck is None else max(free, stuck)
+        if (high > at * (1 + AT) if upper else 0 < low < at * (1 - AT)):
+            held = f" with a free interface and {plain(high, 4)} Hz with one that sticks" if high > low else ""
+            said = f"{mode['name']} has its resonance at {plain(low, 4)} Hz{held}"
+            near.append((max(low - at, at - high, 0.0), said))
+    return [min(near)[1]] if near else []
 
 
 def notes_of(run) -> list:

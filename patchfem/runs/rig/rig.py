@@ -70,7 +70,8 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     for go in (_levelled, _settled, _started, _reasoned):
         run = go(run)
     run, decay, left_out = _decayed(run, coarse[0])
-    warned, notes = remarks.warnings_of(run), [*remarks.notes_of(run), *left_out]
+    warned = [*remarks.warnings_of(run), *remarks.peak_at_an_end(run, what.modes(what.chain))]
+    notes = [*remarks.notes_of(run), *left_out]
     if decay_rate(rig.modes) < 0 and run.rubs:
         fluttering, more = flutter.flutter_of(run)
         run, notes = replace(run, measures=run.measures | fluttering), [*notes, *more]

@@ -11,6 +11,7 @@ from patchfem.campaigns.sweeps.ranking import Share
 from patchfem.export.pages import allowed, peaks, ranked
 from patchfem.export.pages.lead import lead_of
 from patchfem.export.sweeps.page import read_table
+from patchfem.scene.starting import text_of
 
 RIG = POINT + COULOMB + SHORT
 
@@ -250,3 +251,28 @@ def test_exact_too_few_settled_cases_are_no_ranking():
     assert lead_of(table).answer().startswith("None of 64 cases settled (32 failed, 32 transient), so no ranking")
     table = table | {"outcome": ["failed"] * 40 + ["done"] * 24}
     assert "so no ranking is possible" not in "".join(lead_of(table).sentences())
+
+
+def test_exact_curves_that_are_largest_at_an_end_are_counted():
+    """Of five curves two are largest at 372 Hz, one at 300 Hz, one inside; a motionless one is not counted."""
+    height, place = np.array([4.0, 3, 0.2, 0.1, 0.0]) * 1e-3, np.array([364.0, 372, 372 * (1 + 1e-13), 300, 300])
+    loads = {**key("normal.load", [1, 2, 3, 4, 5], [f"{one} N" for one in range(1, 6)]), "unit": "N"}
+    measures = {name: {"unit": unit, "means": "", "values": values, "errors": 1e-9 * values, "floors": np.zeros(5)}
+                for name, unit, values in (("relative_displacement_amplitude", "m", height),
+                                           ("peak_frequency", "Hz", place))}
+    table = {"keys": [loads], "measures": measures, "outcome": ["steady"] * 5, "tolerance": 1e-2, "grid": True}
+    said = "n 3 of 5 cases the largest response lies at an end of the swept frequencies, so that it may be no resonance"
+    assert said in lead_of(table | {"ends": (300.0, 372.0)}).answer()
+    assert said in lead_of(table | {"ends": (np.full(5, 372.0), np.full(5, 300.0))}).answer()
+    for ends in ({}, {"ends": (200.0, 500.0)}, {"ends": (np.nan, np.nan)}):
+        assert "end of the swept" not in lead_of(table | ends).answer()
+
+
+def test_exact_the_ends_of_swept_frequencies_are_read_back(tmp_path):
+    scene = tmp_path / "damper.toml"
+    scene.write_text(text_of("damper"), "utf-8")
+    answer = cli("sweep", scene, "--set", "drive.to=372 Hz", "--over", "structure.interface[1].load=10 N,2 kN", "-o",
+                 tmp_path / "out")
+    said = "n 1 of 2 cases the largest response lies at an end of the swept frequencies"
+    assert said in answer.out
+    assert said in lead_of(read_table(tmp_path / "out")).answer()

@@ -7,12 +7,35 @@ import numpy as np
 import pytest
 from command_line import cli
 
+import patchfem as pf
 from patchfem.export.drawing.charts import histories
 from patchfem.export.drawing.pictures import draw
-from patchfem.export.pages.released import swung
+from patchfem.export.pages.released import released, swung
 from patchfem.export.pages.words import headline
 from patchfem.export.report import _histories
 from patchfem.scene.starting import text_of
+
+IWAN = """
+[structure]
+moving_mass = "1 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "100 Hz"
+damping = 0.002
+slide = 1.0
+[friction]
+law = "iwan"
+static = 0.3
+stiffness = "0.2 N/um"
+chi = -0.4
+beta = 0.5
+[normal]
+load = "20 N"
+[drive]
+kind = "free"
+displacement = "300 um"
+cycles = 60
+"""
 
 
 def test_exact_a_block_on_a_rubbing_spring_turns_where_the_closed_form_says(tmp_path):
@@ -76,3 +99,22 @@ def test_exact_the_picture_of_the_whole_run_shows_every_turn():
     assert np.allclose(early["y"][:6], 1e6 * swing) and "turning points and stops were kept" in found.caption
     whole = draw.figure(found.charts(*found.values)).axes[0].lines[0].get_ydata()
     assert np.allclose(whole[:6], 1e6 * swing)
+
+
+@pytest.mark.parametrize("cycles", [60, 200])
+def test_always_a_joint_that_still_swings_is_not_said_to_rest(cycles):
+    """Sliders of law 'iwan' always slip a little, so that the swing becomes smaller, but never ends."""
+    found = pf.run(re.sub(r"cycles = \d+", f"cycles = {cycles}", IWAN))
+    said, last = released(found), found.measures["relative_displacement_amplitude"].value
+    assert last > 50e-9 and "comes to rest" not in said
+    told = re.search(r"at the end, after \S+ \S+, still moves with an amplitude \(half peak-to-peak\) of (\S+) (nm|um)",
+                     said)
+    assert 0.99 * last < float(told[1]) * {"nm": 1e-9, "um": 1e-6}[told[2]] < 1.6 * last  # it decays in the last tenth
+
+
+def test_exact_an_output_rests_where_it_moves_by_less_than_its_error():
+    time = np.linspace(0, 1, 4001)
+    output = 1e-4 + 1e-3 * np.exp(-10 * time) * np.cos(2 * pi * 20 * time)  # at the end 0.1 to 0.05 um
+    assert "comes to rest at 100 um after" in swung(time, output)
+    assert "still moves" in swung(time, output - 1e-4)
+    assert "comes to rest" in swung(time, output - 1e-4, 2e-7) and "still moves" in swung(time, output - 1e-4, 1e-8)
