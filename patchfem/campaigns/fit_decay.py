@@ -106,7 +106,8 @@ def fit_decay(scene: Scene, to: Path, free, say=None, starts: int = 3) -> Fitted
         raise SceneError(wrong)
     amplitude, measured, error = read_curve(to)
     if 2 * amplitude.size <= len(wanted):
-        raise PatchfemError(f"{to}: {amplitude.size} amplitudes are too few to determine {len(wanted)} values")
+        raise PatchfemError(f"{to}: {amplitude.size} amplitudes are too few to determine {len(wanted)} values; at "
+                            f"least {len(wanted) // 2 + 1} are needed")
     base, apart, said, count = Base(scene), np.unique(amplitude), begin, 0
 
     @lru_cache(8)

@@ -24,7 +24,7 @@ def remarks(found: Fit, names) -> list:
         elif found.sensitivity[i] <= 1e-9 * max(float(np.max(found.sensitivity)), found.rms):
             out.append(f"{name} has no effect on the computed data, so its value is not determined")
         elif i not in told:
-            out.append(f"{name} is not determined: every value in its range fits the data")
+            out.append(f"{name} is not determined: its interval of 95 % reaches both ends of its range")
     if found.failures:
         out.append(f"{found.failures} of {found.evaluations} evaluations failed and were skipped; the first failed "
                    f"because: {found.reason}")

@@ -116,3 +116,12 @@ def test_always_a_fit_says_how_long_it_has_run(tmp_path, monkeypatch):
     assert found.found.values[0] == pytest.approx(1e6)
     said = [line for line in lines if "curves of the model computed in" in line]
     assert said[0] == "0 curves of the model computed in 0 s" and len(said) > 3
+
+
+def test_too_few_amplitudes_say_how_many_are_needed(tmp_path):
+    """An amplitude has two values, a frequency and a damping: for four keys three amplitudes are needed."""
+    path = tmp_path / "few.csv"
+    path.write_text("amplitude [m],frequency [Hz],damping [1]\n1e-6,100,0.01\n2e-6,99,0.01\n")
+    free = {**FREE, "friction.static": (0.1, 0.6), "friction.beta": (0.1, 2)}
+    with pytest.raises(PatchfemError, match="too few to determine 4 values; at least 3 are needed"):
+        fit_decay.fit_decay(pf.load(IWAN), path, [f"{key}={low}..{high}" for key, (low, high) in free.items()])

@@ -108,7 +108,7 @@ def test_exact_a_value_that_the_rows_do_not_rule_out_anywhere_has_no_interval():
     alone = fit(lambda v: v[0] - data + 1e-3 * v[1] * LINE[:20], [-5, 0], [5, 1])
     assert "cannot be determined separately" in remarks(found, "ab")[0]
     assert np.isnan(alone.intervals[1]).all() and alone.methods[1] == "none"
-    assert "b is not determined: every value in its range fits the data" in remarks(alone, "ab")
+    assert "b is not determined: its interval of 95 % reaches both ends of its range" in remarks(alone, "ab")
 
 
 def test_exact_the_best_of_several_valleys_is_found_from_a_bad_start():
