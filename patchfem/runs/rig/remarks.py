@@ -44,10 +44,10 @@ def warnings_of(run) -> list:
         *([] if face.soft else [AS_ONE_POINT]), *travelled(face.patch, face.slide(raw.response))])]
 
 
-def peak_at_an_end(run, modes: list) -> list:
+def peak_at_an_end(run, modes) -> list:
     """The sentence, in a list, on a curve over a sweep whose largest response lies at an end of the sweep.
 
-    run: a `rig.Coupled`; modes: as `plan.modes_of` gives them.
+    run: a `rig.Coupled`; modes() -> them, as `plan.modes_of` does.
     """
     found, drive = run.measures.get("peak_frequency"), run.model.rig.drive
     at = None if found is None else at_an_end(found.value, drive.low, drive.high)
@@ -55,7 +55,7 @@ def peak_at_an_end(run, modes: list) -> list:
         return []
     upper, key = at == max(drive.low, drive.high), "drive.from" if at == drive.low else "drive.to"
     side, move = ("above", "raise") if upper else ("below", "lower")
-    known = _beside(modes, at, upper)
+    known = _beside(modes(), at, upper)
     beyond = f": {known[0]}; {move} {key} to include it" if known else ""
     return [f"the largest response lies at {key} = {plain(at, 6)} Hz, the {'upper' if upper else 'lower'} end of the "
             f"swept frequencies, so that it may be no resonance; a resonance may lie {side} this frequency{beyond}"]

@@ -70,7 +70,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     for go in (_levelled, _settled, _started, _reasoned):
         run = go(run)
     run, decay, left_out = _decayed(run, coarse[0])
-    warned = [*remarks.warnings_of(run), *remarks.peak_at_an_end(run, what.modes(what.chain))]
+    warned = [*remarks.warnings_of(run), *remarks.peak_at_an_end(run, lambda: what.modes(what.chain))]
     notes = [*remarks.notes_of(run), *left_out]
     if decay_rate(rig.modes) < 0 and run.rubs:
         fluttering, more = flutter.flutter_of(run)
