@@ -32,11 +32,13 @@ def test_always_lanes_answer_a_hundred_times_the_cases_of_an_integrator_as_well_
     assert fine < coarse / 10 < 1e-4
 
 
-@pytest.mark.parametrize("name", ["elastic-plastic", "static: load x tilt"])
-def test_always_a_family_of_sweeps_is_measured_and_meets_its_tolerance(name):
+@pytest.mark.parametrize("name, count, least", [
+    ("elastic-plastic", 64, 20), ("static: load x tilt", 128, 20),
+    pytest.param("shipped rig: tilt x friction", 8, 0.5, marks=pytest.mark.slow)])
+def test_always_a_family_of_sweeps_is_measured_and_meets_its_tolerance(name, count, least):
     one, = study("speed/cases_per_second.py").families(3, (name,), 1, 0.064)
-    assert one["cases"] == (64 if name == "elastic-plastic" else 128)
-    assert one["rate"] > 20 and one["best"] == one["rate"] and one["known"] > 0.9
+    assert one["cases"] == count
+    assert one["rate"] > least and one["best"] == one["rate"] and one["known"] > 0.9
 
 
 @pytest.mark.parametrize("axis", study("speed/growth.py").AXES)
