@@ -270,18 +270,12 @@ def _parabola(m: int) -> np.ndarray:
 
 
 def _by_cubics(x, own, values) -> np.ndarray:
-    """Values (n,) at rising places own (n,) read at others x (k,) by cubics that rise and fall with the values: a slope
-    is the mean of those of both lines beside it, weighted and harmonic (Fritsch and Butland 1984)."""
-    if own.size < 2:
-        return np.interp(x, own, values)
-    k = np.clip(np.searchsorted(own, x) - 1, 0, own.size - 2)
-    span, lines = np.diff(own), np.diff(values) / np.diff(own)
-    slope, level = np.append(lines, lines[-1]), lines[1:] * lines[:-1] <= 0
-    more, less = 2 * span[1:] + span[:-1], span[1:] + 2 * span[:-1]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        slope[1:-1] = np.where(level, 0.0, (more + less) / (more / lines[:-1] + less / lines[1:]))
-    span, share = span[k], np.clip((x - own[k]) / span[k], 0, 1)
-    return _cubic((values[k], values[k + 1]), (slope[k] * span, slope[k + 1] * span), share)
+    """Values (n,) at rising places own (n,) read at others x (k,), inside them, by cubics that rise and fall with the
+    values (Fritsch and Butland 1984)."""
+    from scipy.interpolate import PchipInterpolator
+
+    x = np.clip(x, own[0], own[-1])
+    return PchipInterpolator(own, values)(x) if own.size > 1 else np.interp(x, own, values)
 
 
 def _cubic(place, speed, share):

@@ -1,10 +1,13 @@
 """Curves of steady motions over a sweep with default settings: peaks narrower than any spacing of even points."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from event_run import steady
 
 import patchfem as pf
+from patchfem.runs.rig.remarks import peak_at_an_end
 
 RIG = """
 [structure]
@@ -100,3 +103,16 @@ def test_exact_a_largest_response_at_an_end_of_the_sweep_is_no_peak(low, high, k
     warned = [one for one in found.warnings if "the largest response lies at" in one]
     assert len(warned) == bool(said)
     assert all(key in one and said in one for one in warned)
+
+
+def test_exact_an_end_beside_which_no_mode_lies_says_so():
+    mode = {"name": "mode 1", "free_frequency": 90.0, "stuck_frequency": 120.0}
+    drive = SimpleNamespace(low=100.0, high=200.0)
+    for at, said in ((200.0, "no mode of the scene has its resonance above this frequency"),
+                     (100.0, "mode 1 has its resonance at 90 Hz with a free interface and 120 Hz with one that ")):
+        measures = {"peak_frequency": SimpleNamespace(value=at),
+                    "relative_displacement_amplitude": SimpleNamespace(value=1e-6)}
+        run = SimpleNamespace(measures=measures, model=SimpleNamespace(rig=SimpleNamespace(drive=drive)))
+        one, = peak_at_an_end(run, lambda: [mode])
+        assert said in one and ("; lower drive.from" in one) == (at == 100.0)
+

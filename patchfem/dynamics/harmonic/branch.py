@@ -93,8 +93,7 @@ def _curve(modes, drives, group, parameter, how: How) -> Branch:
             return Branch(points, parameter, tuple(f / scale for f in path.folds),
                           tuple(f / scale for f in path.crossings), path.ended)
     raise NotConverged(f"harmonic balance with {LADDER[-1]} harmonics leaves out {above:.1e} of the motion, more than "
-                       "the "
-                       f"limit of {tolerance / 4:g}; raise the tolerance")
+                       f"the limit of {tolerance / 4:g}; raise the tolerance")
 
 
 def _followed(modes, drives, group, parameter, h, first, longest) -> tuple:

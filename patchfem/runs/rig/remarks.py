@@ -56,9 +56,10 @@ def peak_at_an_end(run, modes) -> list:
     upper, key = at == max(drive.low, drive.high), "drive.from" if at == drive.low else "drive.to"
     side, move = ("above", "raise") if upper else ("below", "lower")
     known = _beside(modes(), at, upper)
-    beyond = f": {known[0]}; {move} {key} to include it" if known else ""
+    beyond = f"a resonance may lie {side} this frequency: {known[0]}; {move} {key} to include it" if known else \
+        f"no mode of the scene has its resonance {side} this frequency"
     return [f"the largest response lies at {key} = {plain(at, 6)} Hz, the {'upper' if upper else 'lower'} end of the "
-            f"swept frequencies, so that it may be no resonance; a resonance may lie {side} this frequency{beyond}"]
+            f"swept frequencies, so that it may be no resonance; {beyond}"]
 
 
 def at_an_end(frequency: float, *ends: float) -> float | None:
