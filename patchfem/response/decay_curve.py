@@ -121,7 +121,9 @@ def turns_from_outside(time, place, speed) -> tuple:
             near = near - (c + near * (two + near * three)) / (two + 2 * near * three)
         return time[step] + near * span
 
-    times[np.searchsorted(times, time[k], "right")] = (found(k - 1, 1 + share) + found(k + 1, share - 1)) / 2
+    at = (found(k - 1, 1 + share) + found(k + 1, share - 1)) / 2
+    between = (at >= time[k]) & (at <= time[k + 1])  # round-off may lay a turn at the sample before it
+    times[np.searchsorted(times, time[k])[between]] = at[between]
     return times, places
 
 

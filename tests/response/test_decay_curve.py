@@ -11,7 +11,15 @@ from scipy.optimize import brentq
 
 import patchfem as pf
 from patchfem.campaigns.backbone import backbone
-from patchfem.response.decay_curve import DecayCurve, _slope, _slopes, curve_of, of_turns, turns
+from patchfem.response.decay_curve import (
+    DecayCurve,
+    _slope,
+    _slopes,
+    curve_of,
+    of_turns,
+    turns,
+    turns_from_outside,
+)
 from patchfem.runs.patch.result import solve_all
 from patchfem.runs.rig import decays
 from patchfem.runs.rig.decays import decay_of, left_by_mesh
@@ -272,3 +280,28 @@ def test_exact_errors_of_the_mesh_are_interpolated_where_no_static_motion_is_fou
     lost = np.arange(5)
     found, said = left_by_mesh(model, patch, coarse, a, lambda laws: 0)
     assert not found.any() and said == "no static curve of the mode was found at these amplitudes"
+
+
+@pytest.mark.parametrize("begin", [0.0, 100.0])
+def test_exact_a_turn_at_which_the_force_jumps_is_told_from_outside(begin):
+    """Two parabolas that meet at their crests, of accelerations 1 and 3: the cubic across the jump is bent by it."""
+    crests = begin + np.array([0.2537, 0.7421])
+    time = begin + np.arange(0.0, 1.0, 0.02)
+    place, speed = np.empty(time.size), np.empty(time.size)
+    for crest, sign, part in zip(crests, (1, -1), (time < begin + 0.5, time >= begin + 0.5)):
+        off = time[part] - crest
+        rate = np.where(off < 0, 1.0, 3.0)
+        place[part], speed[part] = -sign * rate * off**2 / 2, -sign * rate * off
+    near, exact = (one(time, place, speed)[0] for one in (turns, turns_from_outside))
+    inner = np.array([int(np.argmin(np.abs(near - crest))) for crest in crests])
+    assert np.abs(near[inner] - crests).min() > 2e-4
+    np.testing.assert_allclose(exact[inner], crests, rtol=0, atol=1e-12 + 1e-13 * begin)
+
+
+def test_always_a_turn_that_round_off_lays_at_its_sample_stays_there():
+    """The last turn of samples at large times, whose speed is 0 to round-off: no later turn is taken for it."""
+    time, speed = 100 + 1e-3 * np.arange(6), np.array([1.0, 1.0, 1e-11, -1.0, -1.0, -1.0])
+    place = np.array([0.0, 1e-3, 1.5e-3, 1e-3, 0.0, -1e-3])
+    found, same = turns_from_outside(time, place, speed), turns(time, place, speed)
+    assert found[0].size == same[0].size == 1 and time[2] <= found[0][0] <= time[3]
+    np.testing.assert_array_equal(found[1], same[1])
