@@ -338,4 +338,4 @@ def _change(share: float) -> str:
     """A relative change in percent, 0 below 1e-6 %; from ten times on as a factor."""
     if abs(share) < 1e-8:  # the last digits of both values
         return "0 %"
-    return f"{100 * share:+.3g} %" if share < 9 else f"&times; {1 + share:.3g}"
+    return f"{100 * share:+.3g} %" if share < 9 else f"&times; {plain(1 + share, 3)}"
