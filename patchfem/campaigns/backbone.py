@@ -69,6 +69,8 @@ BESIDE = 1.15  # the release over the largest amplitude: the first swings still 
 HIGHER, BELOW = 3, 0.8  # releases from higher up; share of the smallest amplitude down to which coarser runs come, too
 FARTHEST, SWINGS = 8.0, 3.0  # of a start, a higher one at most; free swings within which a decay shows itself
 FINER = 3  # doublings of the steps of a decay
+RINGS, HEARD = 0.1, 1e-3  # of a decay's amplitude, motion of other modes from which it is no more its own, is told
+HOLDS = 0.999  # of its stiffness without slip, that of a contact in whose motion no modes are coupled by slip
 TOLD, WITH_COARSER = 20.0, 2.0  # seconds, from which a decay is told beforehand; times its own, with its coarser runs
 
 
@@ -78,7 +80,8 @@ UNKNOWN = ('the friction loop of bonds has a closed form only with reading = "st
 
 class Curve(NamedTuple):
     """One way: amplitude (k,) [m] at the output, frequency (k,) [Hz] and damping ratio (k,) [1] with their errors, loss
-    of the contact per cycle (k,) [J], NaN where it is not known; notes: sentences on its errors."""
+    of the contact per cycle (k,) [J], NaN where it is not known; notes: sentences on its errors; others: of a decay,
+    the motion of other modes over its amplitude (k,), NaN where it is not known."""
 
     amplitude: np.ndarray
     frequency: np.ndarray
@@ -87,10 +90,11 @@ class Curve(NamedTuple):
     damping_error: np.ndarray
     loss: np.ndarray
     notes: tuple = ()
+    others: np.ndarray | None = None
 
     def at(self, pick) -> "Curve":
         """Some of its points: bools (k,)."""
-        return Curve(*(part[pick] for part in self[:6]), self.notes)
+        return Curve(*(part[pick] for part in self[:6]), self.notes, None if self.others is None else self.others[pick])
 
 
 class Backbone(NamedTuple):
@@ -659,12 +663,74 @@ def _decayed(joint: Joint, amplitudes, progress=None) -> Curve:
         found = engine.run(what, how, joint.patch, 0, None, None)
     if not known.any():
         raise NotConverged("the free decay gave no frequency and damping at these amplitudes")
+    others = _others(joint, found, np.where(known, amplitudes, np.nan))
+    rings = known & (others > 0) & (amplitudes <= amplitudes[others > RINGS].max(initial=0.0))
+    known &= ~rings
+    if not known.any():
+        raise NotConverged("at these amplitudes the free decay is no longer a motion of this mode alone: the motion of "
+                           f"other modes is more than {100 * RINGS:.0f} % of its amplitude")
     mesh, why = decays.left_by_mesh(joint.model, joint.patch, joint.coarse, amplitudes, lambda laws: joint.mode)
     error = np.fmax(error, mesh) + reading
     notes = decays.without_slip_between_nodes({"method decay": why}, lambda: engine.in_space(
         what, how, joint.patch, joint.coarse, found))
+    if rings.any():
+        notes = [*notes, f"method decay: when the decay has fallen to {say(amplitudes[rings][-1], 3)}, the motion of "
+                         f"other modes is more than {100 * RINGS:.0f} % of its amplitude; from there on the values "
+                         f"with slip are left out ({rings.sum()} amplitude{'s' * bool(rings.sum() > 1)}), because they "
+                         "do not describe this mode alone"]
+    unknown = known & np.isnan(others)
+    if unknown.any() and joint.modes.omega.size > 1:
+        notes = [*notes, f"method decay: how much other modes move in the decay is not known at {unknown.sum()} of "
+                         f"{known.sum()} amplitudes, because harmonic balance gave no free motion to compare with"]
     return Curve(amplitudes, best[0], error[0], best[1], error[1], np.full(amplitudes.size, np.nan),
-                 tuple(notes)).at(known)
+                 tuple(notes), others).at(known)
+
+
+def _others(joint: Joint, found, amplitudes) -> np.ndarray:
+    """Motion of other modes in a Solution over its amplitude (k,) where it has the amplitudes (k,) [m]: the distance of
+    its modal coordinates and of their rates over omega from those of the balance's free motion of that amplitude, both
+    where they turn and over their motion along the held shape. 0 where all contacts hold: the motion along the held
+    shape is then free of other modes, whatever rings (as long as no slide is larger than one in which the balance
+    finds no slip). NaN where one of them is not known."""
+    out, motion, shape = np.full(amplitudes.size, np.nan), found.response, joint.held[1]
+    asked = np.flatnonzero(np.isfinite(amplitudes))
+    if shape.size == 1 or _rigid(joint.model):
+        return out
+    try:
+        _refuse(joint, "balance")
+        group = _group(joint, joint.patch)
+        free = _motions(group, joint, amplitudes[asked], LADDER[0])
+    except (NotConverged, PatchfemError):
+        return out
+    held = np.max([np.where(_holds(group, one), np.abs(one.slides[:, 1]), 0.0) for one in free if one is not None] or
+                  [np.zeros(len(group.rows))], axis=0)
+    read, (times, _) = _read(joint, found), turns(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
+    for column, one in zip(asked, free):
+        if one is None:
+            continue
+        time = times[np.argmin(np.abs(times - np.interp(-np.log(amplitudes[column]), -np.log(read.amplitude),
+                                                        read.time)))]
+        k = int(np.clip(np.searchsorted(motion.time, time), 1, motion.time.size - 1))
+        two = slice(k - 1, k + 1)
+        cubic = CubicHermiteSpline(motion.time[two], motion.modal[two], motion.modal_rate[two])
+        place, rate = cubic(time), cubic(time, 1) / one.omega
+        if (np.hypot(group.rows @ place, group.rows @ rate) <= held).all():
+            out[column] = 0.0
+            continue
+        turn = 1j * np.arange(one.modal.shape[0])[:, None] * one.modal
+        beside = [np.apply_along_axis(synthesis, 0, part, SAMPLES) for part in (one.modal, turn)]
+        side = np.sign(place @ shape)
+        top_of = int(np.argmax(side * (beside[0] @ shape)))
+        own, other = abs(place @ shape), side * float(beside[0][top_of] @ shape)
+        out[column] = np.hypot(*(np.linalg.norm(part / own - there[top_of] / other)
+                                 for part, there in zip((place, rate), beside)))
+    return out
+
+
+def _holds(group: Group, one) -> np.ndarray:
+    """Whether each interface (i,) has its stiffness without slip in a free motion, bools."""
+    force, slide = one.forces[:, 1], one.slides[:, 1]
+    return np.real(force * np.conj(slide)) >= HOLDS * group.stiffness() * np.abs(slide)**2
 
 
 def _come_down(joint: Joint, amplitudes, progress=None) -> tuple:
@@ -893,7 +959,7 @@ LEFT_OUT = {"balance": "harmonic balance did not converge at these amplitudes; t
                        "amplitudes, or the mode may stop oscillating",
             "quasi-static": "the static curve does not reach these amplitudes",
             "decay": "at these amplitudes the free decay, or a coarser decay computed as a check, gave no frequency "
-                     "and damping"}
+                     "and damping, or the decay was no longer a motion of this mode alone"}
 
 
 def _gaps(wanted, curves: dict) -> list:
@@ -947,7 +1013,9 @@ def _differences(curves: dict) -> list:
                 times = getattr(one, what)[k] / beside[k]
                 by = f"where the value by {way} is {times:.2g} times the value by balance" if times >= 2 else \
                     f"by {100 * share[k]:.2g} %"
+                also = "" if one.others is None or not one.others[k] > HEARD else \
+                    f"; the motion of other modes in the decay is {100 * one.others[k]:.2g} % of its amplitude"
                 out.append(f"the values of {what} by {way} and by balance differ most at the amplitude "
                            f"{say(one.amplitude[k], 3)}, {by}: "
-                           f"{why.format(lost)}")
+                           f"{why.format(lost)}{also}")
     return out
