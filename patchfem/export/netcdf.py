@@ -47,13 +47,12 @@ LONG = {
     "unloaded_gap": ("m", "gap of the unloaded surfaces, wear included"),
 }
 
-BETWEEN = {"relative_displacement": "displacement of the first mass of an interface relative to the second",
-           "relative_velocity": "velocity of the first mass of an interface relative to the second",
+BETWEEN = {"relative_displacement": "displacement of the first mass of an interface relative to its second mass",
+           "relative_velocity": "velocity of the first mass of an interface relative to its second mass",
            "friction_force": "friction force of an interface, positive when it opposes positive slip",
            "normal_load": "normal load on an interface",
-           "lateral_displacement": "displacement of the first mass of the lateral pair of an interface relative to the "
-                                   "second",
-           "lateral_velocity": "velocity of the first mass of the lateral pair of an interface relative to the second",
+           "lateral_displacement": "lateral displacement of the first mass of an interface relative to its second mass",
+           "lateral_velocity": "lateral velocity of the first mass of an interface relative to its second mass",
            "lateral_force": "friction force on the lateral pair of an interface, positive when it opposes positive "
                             "slip of this pair"}
 

@@ -47,7 +47,8 @@ def past_onset(kind: str, length: float | None = None) -> Callable[[Level], bool
 
 def no_onset(kind: str, length: float | None = None) -> str:
     """The reason why a run of levels has no onset; arguments as in `past_onset`."""
-    what = {"slip": "slips", "gauge": f"has an amplitude at the output above {say(length)}" if length else ""}.get(
+    far = f"has an amplitude of more than {say(length)} at the output" if length else ""
+    what = {"slip": "slips", "gauge": far}.get(
         kind, f"has an acceleration whose third harmonic is more than {DISTORTED:g} of its first harmonic")
     return f"no level of the rising sequence {what}"
 

@@ -122,7 +122,7 @@ def test_exact_the_page_of_limits_says_what_a_scene_is_answered():
         except SceneError as error:
             words, number = cell.split()
             line = said.split(f"\n{number}. ")[1].split("\n")[0]
-            told = re.sub(f"(law )?'{law}'", "the law of this row", str(error).rpartition(": ")[2], count=1)
+            told = re.sub(f"(law )?'{law}'", "the friction law of this row", str(error).rpartition(": ")[2], count=1)
             assert words == "no" and line.rpartition(": ")[2] == told
     assert cells["coulomb", "`exact`"] == "yes" and cells["tanh", "`exact`"].startswith("no")
 

@@ -246,7 +246,7 @@ cycles = 12
 def test_a_release_says_what_its_errors_leave_out_of_the_mesh():
     result, said = pf.run(BEHIND_BONDS), "the errors of ring_frequency and ring_damping and of the decay curve include "
     (note,) = [one for one in result.notes if one.startswith("the errors of")]
-    assert note.startswith(said + "the change on a coarser mesh, but no estimate of the energy that is lost in slip")
+    assert note.startswith(said + "the change on a coarser mesh, but not the energy that is lost in slip")
     assert note.endswith("because the hysteresis loop of this friction law is not known without a computation in time")
     assert np.isfinite(result.extra["decay"].damping_error).any()
     assert not [one for one in pf.run(CROWNED, **{"drive.cycles": 10}).notes if one.startswith("the errors of")]

@@ -103,7 +103,8 @@ def test_exact_onset_by_a_gauge_is_where_the_output_passes_its_length():
     below, above = (alone((onset.value + way * onset.error) / G_N).measures[NAME].value for way in (-1, 1))
     assert below < 2.54e-6 < above < 1.03 * 2.54e-6
     never = run(plan(loads(text.replace('onset = "slip"', 'onset = "gauge"\nonset_length = "1 m"')))).measures
-    assert never["onset_level"].reason == "no level of the rising sequence has an amplitude at the output above 1 m"
+    assert never["onset_level"].reason == \
+        "no level of the rising sequence has an amplitude of more than 1 m at the output"
 
 
 @pytest.mark.share(0)

@@ -383,7 +383,8 @@ def spectra(found, frequency: float | None) -> list:
     if frequency is not None:
         top = float(np.interp(frequency, hertz, gain)) * scale
         marks.append(mark("dots", "warm", "peak", x=[frequency], y=[top], errors=[0.0], shape="circle"))
-    out.append(chart("H1: displacement over acceleration of the base", along, axis("size", f"{unit}/g", True), marks))
+    out.append(chart("H1: displacement of the output divided by base acceleration", along,
+                     axis("size", f"{unit}/g", True), marks))
     return out
 
 

@@ -62,7 +62,7 @@ def _split(cutoff: float | None) -> str:
         return ("This table describes all waves of the trace. If [contact.profile] takes the same trace, split the "
                 "trace with --cutoff; otherwise the long waves count twice.")
     return (f"This table describes only waves below the cut-off of {say(cutoff)}. If [contact.profile] takes the same "
-            "trace, the longer waves shape the gap, so that no wave counts twice.")
+            "trace, the gap follows the longer waves, so that no wave counts twice.")
 
 
 def _steep(one) -> float:

@@ -329,10 +329,10 @@ def verdict(one: Lost) -> tuple:
         head += (f"; of the {say(mean.value, 3)}, {say(unseen.value, 3)} is {_kind(ends)} that a {seen} alone could "
                  "not show")
     place, volume = place_of(one.after, np.argmax(one.depth)), one.values["worn_volume"]
-    told = [f"Worn volume {' '.join(shown(volume)[::2])}; {say(float(one.depth.max()), 3)} at the deepest place, "
-            f"{place}; both pieces together; {one.after.cycles:.6g} cycles of wear"
+    told = [f"Worn volume of both pieces together: {' '.join(shown(volume)[::2])}; largest worn depth: "
+            f"{say(float(one.depth.max()), 3)}, {place}; after {one.after.cycles:.6g} cycles of wear"
             f"{_since(one.after)}"
-            f"{f', {one.before.cycles:.6g} before' if one.before.cycles else ''}."]
+            f"{f' (the surface before: {one.before.cycles:.6g} cycles)' if one.before.cycles else ''}."]
     for name in ("contact_fraction", "pressure_peak", "loop_area"):
         sides = [each.measure(name) for each in (one.before, one.after)]
         if None not in sides:

@@ -148,8 +148,8 @@ def without_slip_between_nodes(whys: dict, ways) -> list:
     out = []
     for why in dict.fromkeys(filter(None, whys.values())):
         whose = " and of ".join(name for name, one in whys.items() if one == why)
-        lacks = "the change on a coarser mesh, but no estimate of the energy that is lost in slip too small for both " \
-            "meshes" if any(one.of == "mesh" for one in ways()) else "no error of the mesh"
+        lacks = "the change on a coarser mesh, but not the energy that is lost in slip too small for either mesh to " \
+            "resolve" if any(one.of == "mesh" for one in ways()) else "no error of the mesh"
         out.append(f"the errors of {whose} include {lacks}, because {why}")
     return out
 

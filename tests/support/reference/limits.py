@@ -150,7 +150,7 @@ def _cell(sentences: tuple, notes: dict, law: str) -> str:
 def _plain(sentence: str, law: str) -> str:
     """A sentence without the name of the law that was tried."""
     form = rf"(?:law )?'{law.partition(',')[0]}'(?: of (?:order [\d.]+|reading '\w+'))?(?=[ :;,]|$)"
-    return re.sub(form, "the law of this row", sentence, count=1)
+    return re.sub(form, "the friction law of this row", sentence, count=1)
 
 
 def _said(notes: dict) -> str:
