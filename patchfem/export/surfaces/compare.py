@@ -47,11 +47,11 @@ DRAWN = 1_000_000  # heights that a histogram and an Abbott curve are drawn from
 NOTE = ("All intervals are 95 % intervals. The intervals of shift, depth and area hold for the measured place and "
         "come from the noise of the unworn heights. A track or worn part begins where the flank that is fitted to its "
         "depths leaves the unworn surface. The flank is a parabola, or a step where a step fits clearly better. The "
-        "intervals of both ends, of the width and of the mean depth within hold for flanks that leave the surface at an angle or in a "
-        "step, as those of a parabola or a box do; a flank that runs out flat begins farther outside than its interval "
-        "says. The intervals of ratios hold for the whole surface and assume Gaussian heights with the same statistics "
-        "everywhere. If both traces are of the same place, their heights vary together, and the intervals are "
-        "narrower.")
+        "intervals of both ends, of the width and of the mean depth within hold for flanks that leave the surface at "
+        "an angle or in a step, as those of a parabola or a box do; a flank that runs out flat begins farther outside "
+        "than its interval says. The intervals of ratios hold for the whole surface and assume Gaussian heights with "
+        "the same statistics everywhere. If both traces are of the same place, their heights vary together, and the "
+        "intervals are narrower.")
 
 
 def shown(one: Quantity) -> tuple:
