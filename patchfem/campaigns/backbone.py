@@ -12,6 +12,7 @@ from functools import partial
 from typing import NamedTuple
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 from scipy.interpolate import CubicHermiteSpline
 
 from ..core import NotConverged, PatchfemError, Start, say
@@ -61,6 +62,8 @@ SAMPLES = 4096  # of a cycle of a static loop, and that a largest motion is read
 SLIDES = 60  # tries of the slides whose static motion has the amplitudes that are asked for
 CLOSE = 1e-7  # of an amplitude, within which a free motion is at it
 PLAIN, BALANCED = (1e-6, 1e-3, 4), 8  # amplitudes [m] of a linear rig; steps to the damping that keeps it swinging
+BEATS = 8  # half swings on both sides of one, among which what other modes change is largest
+EQUAL = 1e-7  # of a half swing, by which two that follow each other differ where nothing slips
 SIZED, SLOW = 8, 0.1  # steps to a motion that has the amplitude asked for; least slope of both amplitudes that is taken
 SHORT, LONGEST = 50, (12800, 3200)  # cycles of a first decay; of the longest, of one mode and where several ring
 TURNED = 102400  # of the longest of one mode behind elements, of which the turns alone are kept
@@ -803,14 +806,35 @@ def _start(joint: Joint, amplitude: float) -> Start:
 
 def _read(joint: Joint, found, turns=turns) -> DecayCurve:
     """The curve of a Solution, by its `turns`; beside other modes it turns when the part of the motion along the held
-    shape does, which rings least."""
+    shape does, which rings least. Where its swings last equally long nothing slips: the part along the held shape is
+    then the mode's own motion, whatever else rings at the output."""
     motion, shape = found.response, joint.held[1]
     if shape.size == 1:
         return curve_of(of_turns(*turns(motion.time, motion.output, motion.output_rate)))
     times, places = turns(motion.time, *(part @ shape for part in (motion.modal, motion.modal_rate)))
-    if times.size:
-        places = CubicHermiteSpline(motion.time, motion.output, motion.output_rate)(times)
-    return curve_of(of_turns(times, places))
+    if times.size < 3:
+        return curve_of(of_turns(times, places))
+    sizes = np.abs(np.diff(CubicHermiteSpline(motion.time, motion.output, motion.output_rate)(times)))
+    equal = np.abs(np.diff(last := np.diff(times))) <= EQUAL * last[1:]
+    holds = np.append(True, equal) & np.append(equal, True)
+    at_output = curve_of(of_turns(times, places, sizes))
+    own = joint.reach / (shape @ shape) * np.abs(np.diff(places))
+    alone = curve_of(of_turns(times, places, np.where(holds, own, sizes)))
+    left = _coupled(joint) * np.abs(alone.damping - at_output.damping)
+    left = sliding_window_view(np.pad(left, BEATS), 2 * BEATS + 1).max(axis=1) if left.size else left
+    return alone._replace(damping_error=alone.damping_error + left,
+                          frequency_error=alone.frequency_error + left * alone.frequency)
+
+
+def _coupled(joint: Joint) -> float:
+    """The share of what other modes change at the output that they change in the motion along the held shape, by the
+    dampers that couple them: at most 1."""
+    modes, shape, omega = joint.modes, joint.held[1], joint.held[0] or joint.modes.omega[joint.mode]
+    shape, others = shape / np.linalg.norm(shape), np.delete(modes.omega, joint.mode)
+    pulled, output = (part - shape * (shape @ part) for part in (modes.dampers @ shape, modes.output))
+    apart = np.abs(others - omega**2 / np.maximum(others, omega)).min()
+    seen = np.linalg.norm(output) / joint.reach
+    return float(np.clip(np.linalg.norm(pulled) / max(apart * seen, 1e-300), 0.0, 1.0))
 
 
 def _with_errors(joint: Joint, what: Model, how, found, amplitudes) -> tuple:

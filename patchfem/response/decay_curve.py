@@ -127,14 +127,14 @@ def turns_from_outside(time, place, speed) -> tuple:
     return times, places
 
 
-def of_turns(times, places) -> HalfSwings:
+def of_turns(times, places, size=None) -> HalfSwings:
     """Half swings between the turns (k,) [s], (k,) [m] of a computed motion, as far as each is smaller than the one
-    before and no round-off of the first."""
-    size = np.abs(np.diff(places))
-    ends = np.flatnonzero((np.diff(size, prepend=np.inf) >= 0) | (size <= FAINT * size.max(initial=0.0)))
-    count = int(ends[0]) if ends.size else size.size
+    before and no round-off of the first; size (k - 1,) [m]: theirs at another point than the places."""
+    own = np.abs(np.diff(places))
+    ends = np.flatnonzero((np.diff(own, prepend=np.inf) >= 0) | (own <= FAINT * own.max(initial=0.0)))
+    count = int(ends[0]) if ends.size else own.size
     still = np.zeros(count)
-    return HalfSwings((times[1:] + times[:-1])[:count] / 2, size[:count], still, still)
+    return HalfSwings((times[1:] + times[:-1])[:count] / 2, (own if size is None else size)[:count], still, still)
 
 
 def curve_of(swings: HalfSwings) -> DecayCurve:

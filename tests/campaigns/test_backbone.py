@@ -376,7 +376,7 @@ def test_exact_a_decay_goes_on_where_the_contact_holds(two):
     found = backbone(pf.build(text), "", a, ("decay",))
     one = found.curves["decay"]
     assert one.amplitude.size == 13 and not any("have a result" in note for note in found.notes)
-    still = one.amplitude < 2e-6
+    still = one.amplitude < (1e-4 if two else 2e-6)  # the other mode rings there: up to 2e-4 of the damping ratio
     if two:
         own, shape, phi = np.array([1, 4.7]) * OMEGA, np.diag([0.004, 0.006 * 4.7]) * OMEGA, np.array([1, 0.8])
         stiff = np.diag(own**2) + 3e5 / 0.5 * np.outer(phi, phi)
@@ -391,7 +391,7 @@ def test_exact_a_decay_goes_on_where_the_contact_holds(two):
     for value, error, truth in ((one.damping, one.damping_error, zeta),
                                 (one.frequency, one.frequency_error, omega / (2 * np.pi))):
         assert (np.abs(value - truth) <= error + 1e-6 * truth)[still].all()
-    assert (one.damping_error < 0.2 * one.damping)[still].all()
+    assert (one.damping_error < (1e-4 if two else 0.2) * one.damping)[still].all()
 
 
 NEAR = shaken(PLASTIC.replace("1 mm", "0.1 mm")).replace("[drive]", """[[structure.mode]]
@@ -475,7 +475,7 @@ def test_errors_say_what_they_leave_out_of_the_mesh():
     a = [1e-6, 2e-6]
     found, few = (backbone(pf.build(one), "", a, ("decay",)) for one in (BEHIND_BONDS, BEHIND_BONDS.replace(*FEW)))
     (said,), (unmeshed, bare) = ([note for note in one.notes if "the errors of" in note] for one in (found, few))
-    assert said.startswith("the errors of method decay include the change on a coarser mesh, but no estimate of the")
+    assert said.startswith("the errors of method decay include the change on a coarser mesh, but not the energy that")
     assert said.endswith("because the hysteresis loop of this friction law is not known without a computation in time")
     assert unmeshed.endswith("too few elements for a coarser mesh; leave out contact.element_size")
     assert bare.startswith("the errors of method decay include no error of the mesh, because the hysteresis loop of")
