@@ -66,7 +66,8 @@ class Sweep:
     """A sine whose frequency runs from `low` to `high` [Hz] (either way) in `duration` [s] and stays there.
 
     acceleration [m s-2], or, with `displacement` [m], X omega(t)^2. logarithmic: a constant factor per time instead of
-    constant Hz/s. The phase is the integral of the frequency: sin(2 pi int f dt).
+    constant Hz/s. The phase is the integral of the frequency: sin(2 pi int f dt). starts: the number of frequencies
+    with which a curve of steady motions over it begins, None for as many as a whole curve has.
     """
 
     low: float
@@ -76,6 +77,7 @@ class Sweep:
     displacement: float | None = None
     logarithmic: bool = False
     moving: bool = True
+    starts: int | None = None
 
     @property
     def segments(self) -> tuple:

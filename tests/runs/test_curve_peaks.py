@@ -13,9 +13,11 @@ from patchfem.core import BaseSine
 from patchfem.export.pages import peaks
 from patchfem.response.outcome import goes_on, settled
 from patchfem.response.settling import CLASSES, steady_amplitudes, windows_of
+from patchfem.runs.rig.steady import curves
 from patchfem.runs.rig.steady.curves import Followed, Shown
 from patchfem.runs.rig.steady.top import highest
 from patchfem.scene.starting import text_of
+from patchfem.structure.drives import Sweep
 
 LAWS = ("none", "coulomb", "elastic-plastic", "chain", "iwan", "bouc-wen")
 FIRST, COUNT = 71_000_000, 30
@@ -238,3 +240,32 @@ def test_exact_a_step_to_where_it_settles():
         number, value, error = settled(windows_of(extremes, 10)[0], extremes, 10, tail, (1e-2, 0.0, 10 / 60))
         assert CLASSES[number[0]] == "steady" and goes_on(value, error, windows_of(extremes, 10)[0][:, -1], 1e-2)[0]
         assert abs(value[0] - 1) <= error[0] < 0.01
+
+
+def test_exact_a_run_that_checks_a_curve_looks_near_its_top_alone():
+    """Down to 0.8 of the peak and a quarter of that way beyond; another peak of that height, or a short curve, is
+    searched as a whole."""
+    f = np.linspace(50, 250, 201)
+    curve = {"frequency": f, "amplitude": 1 / (1 + ((f - 140) / 10)**2)}
+    near = curves.around_the_top(sweep := Sweep(50.0, 250.0, 10.0), curve, 140.0)
+    assert (near.low, near.high, near.duration) == pytest.approx((131.0, 149.0, 10.0)) and near.starts == curves.FEW
+    back = curves.around_the_top(Sweep(250.0, 50.0, 10.0), {name: each[::-1] for name, each in curve.items()}, 140.0)
+    assert (back.low, back.high) == pytest.approx((149.0, 131.0))
+    two = curve | {"amplitude": curve["amplitude"] + 0.85 / (1 + ((f - 220) / 5)**2)}
+    assert curves.around_the_top(sweep, two, 140.0) is None
+    assert curves.around_the_top(sweep, curve | {"amplitude": np.ones(201)}, 140.0) is None
+    assert curves.at_an_end(curve, 50.0) and curves.at_an_end(curve, 250.0) and not curves.at_an_end(curve, 140.0)
+
+
+def test_a_curve_that_is_checked_near_its_top_has_the_errors_of_a_whole_one(monkeypatch):
+    law, text, low, high, force = scene(71_000_008)
+    assert law == "iwan"
+    text += f'[drive]\nkind = "force"\nwaveform = "sweep"\nfrom = "{low!r} Hz"\nto = "{high!r} Hz"\n' \
+        f'rate = "1 Hz/s"\n{force}[accuracy]\nmethod = "harmonic"\n'
+    near, seen = pf.run(text).measures, []
+    monkeypatch.setattr(curves, "around_the_top", lambda *given: seen.append(given))
+    whole = pf.run(text).measures
+    assert seen
+    for name in (*MAIN, "peak_frequency"):
+        assert near[name].value == whole[name].value
+        assert near[name].error == pytest.approx(whole[name].error, rel=0.5)

@@ -14,6 +14,7 @@ from ...response.outcome import settle, without_bars
 from ...response.rows import judged
 from ...response.settling import slip_period
 from ...structure.drive_sizes import decay_rate, sinusoidal
+from ...structure.drives import Sweep
 from ..patch import faces
 from ..results.result import FRAMES, Result, on_a_mesh_of_known_error, without_errors
 from ..results.travel import outcome_on_piece
@@ -25,6 +26,7 @@ from .numerics import choose
 from .solution import Solution, curve_measures
 
 ENDED = (Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES)  # of a run before its time
+OTHER = 0.1  # of an amplitude, by which that of a coarser run may be another peak's
 FINEST = 1e-12  # error of a step below which round-off rules
 
 
@@ -202,7 +204,9 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
 
     def solve(variant):
         meant = replace(model, rig=model.rig.richer) if variant.numerics.richer else model
-        return go(meant, replace(variant.numerics, whole=False), variant.patch)
+        how = replace(variant.numerics, whole=False)
+        near = _at_the_top(meant, found, lambda narrow: go(narrow, how, variant.patch))
+        return near or go(meant, how, variant.patch)
 
     meshed = [*engine.in_space(model, numerics, patch, coarse, found), *engine.in_modes(model, numerics, patch)]
     space, spent = estimate(solve, found.values, meshed, made)
@@ -235,6 +239,24 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
         numerics = numerics.finer()
         found = go(model, numerics, patch, frames, say)
         seconds["march"] = found.seconds
+
+
+def _at_the_top(model, found: Solution, go) -> Solution | None:
+    """The Solution of a coarser or richer run of a curve over frequency, computed in the neighbourhood of the largest
+    amplitude that was found; None where there is no curve, or where its own largest lies elsewhere."""
+    if "at_error" not in found.extra or not isinstance(model.rig.drive, Sweep) or model.rig.bends:
+        return None
+    from .steady.curves import around_the_top, at_an_end
+
+    drive = around_the_top(model.rig.drive, found.extra["curve"], found.extra["at"].omega / (2 * np.pi))
+    if drive is None:
+        return None
+    name = "relative_displacement_amplitude"
+    near = go(replace(model, rig=replace(model.rig, drive=drive)))
+    if "at_error" not in near.extra or at_an_end(near.extra["curve"], near.extra["at"].omega / (2 * np.pi)) \
+            or abs(near.values[name] / found.values[name] - 1) > OTHER:
+        return None
+    return near
 
 
 class Passes:

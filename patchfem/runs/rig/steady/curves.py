@@ -16,6 +16,8 @@ SHOWN = {"amplitude": "relative_displacement_amplitude", "acceleration_peak": "a
 READ = 1e-9  # relative error of what an exact engine reads off a motion that it is given
 LAST = 1e-12  # of the first harmonic: round-off of the third
 POINTS = 121  # of a curve over frequency, before its bends ask for more
+FALLEN, NARROW, FEW = 0.8, 0.75, 7  # of a peak, down to which its neighbourhood reaches and above which no other is; of
+# a whole curve, a neighbourhood that is worth it; points with which its curve begins
 SHARE = 0.01  # by which straight lines between points of a curve may miss it
 
 
@@ -100,9 +102,37 @@ def starts_of(modes, drive) -> np.ndarray:
     between, where a peak may be narrower than their spacing."""
     space = np.geomspace if drive.logarithmic else np.linspace
     ends, own = sorted((drive.low, drive.high)), modes.omega / (2 * np.pi)
-    places = np.union1d(space(*ends, POINTS), own[(own > ends[0]) & (own < ends[1])])
+    places = np.union1d(space(*ends, drive.starts or POINTS), own[(own > ends[0]) & (own < ends[1])])
     places = places[np.append(True, np.diff(places) > 1e-9 * places[1:])]
     return places if drive.low < drive.high else places[::-1]
+
+
+def around_the_top(drive, curve: dict, at: float):
+    """A Sweep over the neighbourhood of the largest amplitude of a curve, at a frequency `at` [Hz], for a run that
+    checks it; curve: columns of `curve_columns`. None where another peak is nearly as high, or the curve is short.
+
+    It reaches to where the curve has fallen to FALLEN of the largest amplitude, and a quarter of that way beyond.
+    """
+    order = np.argsort(curve["frequency"], kind="stable")
+    places, heights = curve["frequency"][order], np.nan_to_num(curve["amplitude"][order])
+    best = int(np.argmin(np.abs(places - at)))
+    low = heights < FALLEN * heights[best]
+    before, after = np.flatnonzero(low[:best]), np.flatnonzero(low[best:])
+    first, last = (before[-1] if before.size else 0), (best + after[0] if after.size else len(places) - 1)
+    outside = np.delete(heights, slice(first, last + 1))
+    if heights[best] <= 0 or outside.max(initial=0.0) > FALLEN * heights[best]:
+        return None
+    a, b = places[first], places[last]
+    ends = np.clip([a - (b - a) / 4, b + (b - a) / 4], places[0], places[-1])
+    if not 0 < ends[1] - ends[0] < NARROW * (places[-1] - places[0]):
+        return None
+    low, high = ends if drive.low < drive.high else ends[::-1]
+    return replace(drive, low=float(low), high=float(high), starts=FEW)
+
+
+def at_an_end(curve: dict, at: float) -> bool:
+    """Whether a frequency `at` [Hz] is the first or the last of a curve's."""
+    return not np.min(curve["frequency"]) < at < np.max(curve["frequency"])
 
 
 def largest_of(points) -> int:
