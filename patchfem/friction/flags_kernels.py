@@ -10,7 +10,7 @@ from ..compiled.inner import INNER, LEAN, njit
 FAST = {"reassoc", "contract", "arcp"}
 SET_VALUED = False  # whether a law holds without a stretch
 # of a law in lanes: whether its slope has a kink at no stretch; whether its stretch follows the slide alone, `after`;
-# whether its force changes within a layer of the speed, `parts`
+# whether its force changes within a layer of the speed, `layer`
 BENDS = FOLLOWS = LAYERS = False
 
 
@@ -51,10 +51,10 @@ def after(k, z, square, dx, way):
 
 
 @njit(error_model="numpy", forceinline=True, **LEAN)
-def parts(k, v, v1, h):
-    """The `parts` of laws without a layer: 1."""
-    return 1.0
+def layer(k, h):
+    """The `layer` of laws whose force changes with no speed: none."""
+    return 0.0, 0.0, inf
 
 
 __all__ = ["BENDS", "FAST", "FOLLOWS", "INNER", "LAYERS", "LEAN", "SET_VALUED", "after", "closed", "gives", "knee",
-           "longest", "middle", "parts"]
+           "layer", "longest", "middle"]

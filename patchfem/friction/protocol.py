@@ -32,7 +32,8 @@ A law of one stretch z may march in lanes (`dynamics.lanes`): flowing(k, z, v, w
 `way`, slopes of the force over z and v) is all of it without an array or a branch, so that cases stand side by side; k
 are its numbers, in the UNITS. BENDS says that dz/dq has a kink at z = 0; FOLLOWS that z follows the slide in closed
 form: after(k, z, square, dx, way) -> (z, mean square of the stretches, work) after a slide dx; LAYERS that the force
-changes within a layer of the speed, through which a step h from the speed v to v1 goes in parts(k, v, v1, h) parts.
+changes within a layer of the speed: layer(k, h) -> (force beyond it, speed at its edge, change of the speed in a part
+of a step h through it).
 """
 
 from typing import NamedTuple

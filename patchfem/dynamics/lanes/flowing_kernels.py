@@ -46,6 +46,7 @@ OWN_STATE, KEPT = 4, 2  # the friction and the mean square move on as a motion s
 PARTS = 4  # of a step: a reversal and a kink on either side of it
 CORRECTED = 2  # times, by Newton, is the place of an event, which a cubic over a kink misses by the second order
 FINEST = 64  # parts of a step through a layer
+CLEAR = 2.0  # times the friction, by which the other forces exceed it where the speed of a step goes one way
 SHARE, HALVINGS = 0.5, 24  # irreversible share of the slide from which it slips; of the part of a step where it begins
 
 
@@ -154,8 +155,9 @@ def ahead(room, i, s0, c0, s1, c1, reads):
     (x1, v1, f1, z1, q1), work = run(room, i, state, way, (s0, room[MIDDLE * LANES + i] * (s0 + s1), s1),
                                      room[H * LANES + i])
     if friction.LAYERS:
-        event = friction.parts(numbers(room, i), state[1], v1, room[H * LANES + i]) > 1.0 or (
-            reads and (state[1] * v1 <= 0.0))
+        _, edge, width = friction.layer(numbers(room, i), room[H * LANES + i])
+        near = 0.0 if state[1] * v1 < 0.0 else min(abs(state[1]), abs(v1))
+        event = (near < edge and abs(v1 - state[1]) > width) or (reads and state[1] * v1 <= 0.0)
     else:
         event = way * v1 < 0.0 or ((reads or friction.BENDS) and state[3] * z1 < 0.0) or (reads and (
             v1 == 0.0 or sticking(state[1], way, state[3], room, i) != sticking(v1, way, z1, room, i)))
@@ -207,25 +209,67 @@ def furthest(x, v, x1, v1, h):
     return cubic(x, x1, h * v, h * v1, u) if friction.LAYERS and v * v1 < 0.0 else x1
 
 
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def onward(s, c, t):
+    """(sine, cosine) an angle t of up to a fifth after these, to 1e-9."""
+    t2 = t * t
+    cosine = 1 + t2 * (-1 / 2 + t2 * (1 / 24 - t2 * (1 / 720)))
+    sine = t * (1 + t2 * (-1 / 6 + t2 * (1 / 120 - t2 * (1 / 5040))))
+    return s * cosine + c * sine, c * cosine - s * sine
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def by_speed(room, i, state, s, c, end):
+    """(angle, state at its end as of `run`, friction work) until the speed is `end`, by Runge and Kutta's rule over the
+    speed, in which the force of a layer is known beforehand; s, c: sine and cosine of the drive at the begin."""
+    x, v, f, z, q = state
+    k, push, damp, square = numbers(room, i), room[P * LANES + i], room[D * LANES + i], room[W * LANES + i]
+    half = (end - v) / 2
+    middle, part = v + half, half / 3
+    fm, fe = friction.flowing(k, z, middle, 1.0)[0], friction.flowing(k, z, end, 1.0)[0]
+    r = 1 / (push * s - damp * v - square * x - f)
+    r1 = 1 / (push * onward(s, c, half * r)[0] - damp * middle - square * (x + half * v * r) - fm)
+    r2 = 1 / (push * onward(s, c, half * r1)[0] - damp * middle - square * (x + half * middle * r1) - fm)
+    r3 = 1 / (push * onward(s, c, 2 * half * r2)[0] - damp * end - square * (x + 2 * half * middle * r2) - fe)
+    mean = 2 * (r1 + r2)
+    return part * (r + mean + r3), (x + part * (v * r + middle * mean + end * r3), end, fe, z, q), \
+        part * (f * v * r + fm * middle * mean + fe * end * r3)
+
+
 @njit(error_model="numpy", **LEAN)
 def through(room, i, s0, c0, s1, c1, h):
-    """`advance` of a law with a layer of speeds, in as many like parts as this asks for; adds to the sums of the step
-    what the trapezoidal rule leaves of them, and folds the peaks and the loop of the parts."""
-    k, state, work, u = numbers(room, i), begun(room, i), 0.0, 1.0
+    """`advance` of a law with a layer of speeds, in parts that follow it: of the speed, where this goes one way however
+    large the friction is, else like parts of the step. Adds to the sums of the step what the trapezoidal rule leaves
+    of them beside its ends, and folds the peaks and the loop of the parts."""
+    k, state, work, u, at = numbers(room, i), begun(room, i), 0.0, 1.0, 0.0
     push, out, base = room[P * LANES + i], room[OUT * LANES + i], room[BASE * LANES + i]
     damp, square = room[D * LANES + i], room[W * LANES + i]
-    v = state[1]
-    (_, v1, _, _, _), _ = run(room, i, state, 1.0, (s0, room[MIDDLE * LANES + i] * (s0 + s1), s1), h)
-    count = int(min(max(friction.parts(k, v, v1, h), 0.0), FINEST - 1.0)) + 1
-    part, s, c = h / count, s0, c0
-    half_sine, half_cosine = sin(part / 2), cos(part / 2)
+    most, edge, width = friction.layer(k, h)
+    begin = state[1]
+    free = push * s0 - damp * begin - square * state[0]
+    begins, side = free - state[2], 1.0 if free > 0.0 else -1.0
+    flies = side * free > CLEAR * most + h * abs(push * c0 - damp * begins - square * begin)
+    count = FINEST
+    if not flies:
+        (_, v1, _, _, _), _ = run(room, i, state, 1.0, (s0, room[MIDDLE * LANES + i] * (s0 + s1), s1), h)
+        near = 0.0 if begin * v1 < 0.0 else min(abs(begin), abs(v1))
+        count = int(min(abs(v1 - begin) / width, FINEST - 1.0)) + 1 if near < edge else 1
+    s, c, a = s0, c0, begins
     xe, powers, squares = nan, 0.0, 0.0
     for n in range(count):
-        middle, side = s * half_cosine + c * half_sine, c * half_cosine - s * half_sine
-        s2, c2 = middle * half_cosine + side * half_sine, side * half_cosine - middle * half_sine
-        after, done = run(room, i, state, 1.0, (s, middle, s2), part)
+        v, rest, last = state[1], h - at, n == count - 1
+        part, follows, after, done = 0.0, flies and not last and side * v < edge, state, 0.0
+        if follows:
+            end = -side * edge if side * v < -edge else v + side * width
+            part, after, done = by_speed(room, i, state, s, c, end)
+            follows = 0.0 < part < rest
+        if not follows:
+            part, last = rest if flies or last else h / count, flies or last
+            drive = (s, onward(s, c, part / 2)[0], s1 if last else onward(s, c, part)[0])
+            after, done = run(room, i, state, 1.0, drive, part)
+        s2, c2 = (s1, c1) if last else onward(s, c, part)
         (x, v, f, _, _), (x1, v1, f1, _, _) = state, after
-        a, a1 = push * s - damp * v - square * x - f, push * s2 - damp * v1 - square * x1 - f1
+        a1 = push * s2 - damp * v1 - square * x1 - f1
         if room[READS * LANES + i] > 0.0:
             r, r1 = part * rise(v, a, 1.0, 0.0, room, i, 0), part * rise(v1, a1, 1.0, 0.0, room, i, 3)
             best = highest(out * a + base * s, out * a1 + base * s2,
@@ -237,14 +281,18 @@ def through(room, i, s0, c0, s1, c1, h):
             room[TURNED * LANES + i] += area
             room[PASSED * LANES + i] += abs(area)
         if v * v1 <= 0.0 and v != 0.0:
-            at = zero(v, v1, part * a, part * a1)
-            u, xe = (n + at) / count, cubic(x, x1, part * v, part * v1, at)
-        powers += (s * v + s2 * v1) / (2 * count)
-        squares += (v * v + v1 * v1) / (2 * count)
-        work, state, s, c = work + done, after, s2, c2
-    v, (x1, v1, f1, z1, q1) = room[V * LANES + i], state
-    room[IN * LANES + i] += powers - (s0 * v + s1 * v1) / 2
-    room[LOST * LANES + i] += squares - (v * v + v1 * v1) / 2
+            share = zero(v, v1, part * a, part * a1)
+            u, xe = (at + share * part) / h, cubic(x, x1, part * v, part * v1, share)
+        # Hermite's rule of the integral of a part
+        powers += part * (s * v + s2 * v1 + part / 6 * (c * v + s * a - c2 * v1 - s2 * a1)) / 2
+        squares += part * (v * v + v1 * v1 + part / 3 * (v * a - v1 * a1)) / 2
+        work, at, state, s, c, a = work + done, at + part, after, s2, c2, a1
+        if last:
+            break
+    v, (x1, v1, f1, z1, q1) = begin, state
+    # the ends of the trapezoidal rule are those of the whole run
+    room[IN * LANES + i] += powers / h + h / 12 * (c1 * v1 + s1 * a - c0 * v - s0 * begins) - (s0 * v + s1 * v1) / 2
+    room[LOST * LANES + i] += squares / h + h / 6 * (v1 * a - v * begins) - (v * v + v1 * v1) / 2
     room[FELT * LANES + i], room[SQUARE * LANES + i], room[WORK * LANES + i] = f1, q1, work
     turned = xe == xe
     way = 1.0 if v1 > 0.0 else -1.0 if v1 < 0.0 else -room[WAY * LANES + i]

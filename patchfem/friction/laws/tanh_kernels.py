@@ -23,7 +23,7 @@ from ..flags_kernels import (
 from .exponential_kernels import decay
 
 __all__ = ["BENDS", "FOLLOWS", "LAYERS", "SET_VALUED", "after", "at_end", "begin", "closed", "commit", "finish",
-           "flowing", "gives", "knee", "longest", "mean", "middle", "parts", "rate", "shown", "state"]
+           "flowing", "gives", "knee", "layer", "longest", "mean", "middle", "rate", "shown", "state"]
 
 UNITS, LAYERS = "N s/m", True  # of the numbers k of the law in lanes; as of `flags_kernels`
 REACH = 5.0  # times v_0, to which the layer of the speed is taken
@@ -46,11 +46,10 @@ def flowing(k, z, v, way):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def parts(k, v, v1, h):
-    """How many parts of a step h from the speed v to v1 follow the layer of speeds in which tanh is not +-1; the finer
-    the step, the finer they are."""
-    near = 0.0 if v * v1 < 0.0 else min(abs(v), abs(v1))
-    return abs(v1 - v) * k[1] / max(SHARP * h, FINE) if near * k[1] < REACH else 1.0
+def layer(k, h):
+    """(force beyond the layer of speeds in which tanh is not +-1, the speed to which it is taken, the change of the
+    speed in a part of a step h that follows it: the finer the step, the less)."""
+    return k[0], REACH / k[1], max(SHARP * h, FINE) / k[1]
 
 
 @njit(error_model="numpy", **LEAN)

@@ -147,6 +147,46 @@ def test_exact_a_kink_is_found_inside_a_step(exponent, monkeypatch):
         assert first.t[-1] == h or abs(room[at.SLIP_HIGH * at.LANES] - bend[0]) < 3e-9
 
 
+@pytest.mark.parametrize("push, limit, begin", [(1, 0.3, (-0.9, 0.06)), (1, 0.05, (1.2, 0.001)), (1, 0.5, (0.3, 0.1))])
+def test_order_a_layer_is_crossed_within_a_step(push, limit, begin, monkeypatch):
+    """A speed that falls through the layer of tanh in one step, fast and hardly against the friction: motion, work of
+    the friction, slide at the turn and what the sums of power and of squares of the speed gain, against SciPy; and so
+    much better in half the step that the order shows."""
+    flowing, speed, errors = plain("patchfem.dynamics.lanes.flowing_kernels"), 0.002, []
+    monkeypatch.setattr(flowing, "friction", plain("patchfem.friction.laws.tanh_kernels"))
+    damp, square, angle = 0.1, 1.3, 3.6
+
+    def rates(t, y):
+        force = limit * np.tanh(y[1] / speed)
+        sine = np.sin(angle + t)
+        return y[1], push * sine - damp * y[1] - square * y[0] - force, force * y[1], sine * y[1], y[1]**2
+
+    def turns(t, y):
+        return y[1]
+
+    side = 1.0 if rates(0, (*begin, 0, 0, 0))[1] < 0 else -1.0
+    begin = (begin[0], side * begin[1])
+    for h in (0.1, 0.05):
+        s0, c0, s1, c1 = np.sin(angle), np.cos(angle), np.sin(angle + h), np.cos(angle + h)
+        room = np.zeros(at.LANES * (at.OWN + flowing.OWN_STATE))
+        for place, value in ((at.X, begin[0]), (at.V, begin[1]), (at.WAY, side), (at.P, push), (at.D, damp),
+                             (at.W, square), (at.H, h), (at.MIDDLE, 0.5 / np.cos(h / 2)),
+                             *enumerate((limit, 1 / speed), at.FIRST_OF_LAW)):
+            room[place * at.LANES] = value
+        flowing.begin(room, 0)
+        found = flowing.advance(room, 0, s0, c0, s1, c1, h)
+        want = solve_ivp(rates, (0, h), (*begin, 0, 0, 0), events=turns, method="DOP853", rtol=1e-12, atol=1e-14)
+        x, v, work, power, squares = want.y[:, -1]
+        a0, a1 = rates(0, (*begin, 0))[1], rates(h, (x, v, 0))[1]
+        ends = h / 2 * np.array([s0 * begin[1] + s1 * v, begin[1]**2 + v * v]) \
+            - h * h / 12 * np.array([c1 * v + s1 * a1 - c0 * begin[1] - s0 * a0, 2 * (v * a1 - begin[1] * a0)])
+        gains = h * room[[at.IN * at.LANES, at.LOST * at.LANES]] + ends
+        turn = want.y_events[0][0, 0] if want.y_events[0].size else x
+        errors.append(np.abs(np.array([found[0], found[1], found[8], room[flowing.WORK * at.LANES], *gains])
+                             - [x, v, turn, work, power, squares]).max())
+    assert errors[0] < 3e-5 and errors[1] < errors[0] / 8
+
+
 @pytest.mark.share(0)
 @pytest.mark.parametrize("law, size, most", [(FLOWS[0], 0.005, 1e-5), (FLOWS[1], 0.0033, 1e-4),
                                              (FLOWS[2], 0.0033, 2e-4)])
