@@ -1,13 +1,13 @@
 """The batch of lanes: lumped cases of one law side by side, with bars from half the steps.
 
-A case of a law of a stretch (tanh, Bouc-Wen, LuGre, bonds of a constant length) marches by a quarter of the steps too,
-which shows how its errors fall. Such a case and one of Iwan march by twice the steps where their bars miss the
-tolerance: what they said before tells the errors then. A case of Iwan or of the elastic-plastic law that has not
-settled marches on. What rings in a stick that lasts all the time is told in closed form behind one spring, else by a
-fit. A case goes to the exact batch `lumped`, or under a law of a stretch to a run of its own, where a bar still misses
-its tolerance, rings in shorter sticks are to be told, or a motion grows. Where these contradict one of a few (under a
-law of a stretch twice: by its steps and by as many again), more are checked; where more than 3 in 100 are contradicted,
-every case of the batch is exact, else those are.
+Where the bars of a case of a law of a stretch (tanh, Bouc-Wen, LuGre, bonds of a constant length) miss the tolerance,
+it marches by a quarter of the steps too, which shows how its errors fall. Such a case and one of Iwan march by twice
+the steps where their bars still miss it: what they said before tells the errors then. A case of Iwan or of the elastic-
+plastic law that has not settled marches on. What rings in a stick that lasts all the time is told in closed form behind
+one spring, else by a fit. A case goes to the exact batch `lumped`, or under a law of a stretch to a run of its own,
+where a bar still misses its tolerance, rings in shorter sticks are to be told, or a motion grows. Where these
+contradict one of a few (under a law of a stretch twice: by its steps and by as many again), more are checked; where
+more than 3 in 100 are contradicted, every case of the batch is exact, else those are.
 """
 
 from collections.abc import Callable, Sequence
@@ -269,40 +269,54 @@ def answered(models: Sequence[Model], cases: tuple, steps, exactly: Callable) ->
 def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
     """(Answers of models, (n,) which must be run otherwise, steps a cycle (n,) of each, furthest (n,) [m] their output
     was) from steps (n,) on that many more are made of where bars miss the tolerance; all that march by the same steps
-    do so together, those for whose errors it is too. What a coarser mesh changes is told by the fewest steps, and by
-    more where that is so much that steps are too long for its start."""
+    do so together, those for whose errors it is too. Where the change at half the steps is too large under a law of a
+    stretch, a quarter of them tells how it falls. What a coarser mesh changes is told by the fewest steps, and by more
+    where that is so much that steps are too long for its start."""
     found, exact, steps = Answers.blank(len(models)), np.zeros(len(models), bool), steps.copy()
     reach = np.zeros(len(models))
     law, cycles, meshed = kind_of(models[0]), group(models[0])[0], {}
-    shares = (2, 4) if march.flows(law) else (2,)
-    fewest, coarser = steps // shares[-1], {}
-    now = int(fewest.min())
+    fewest, known, flows = steps // 2, {}, march.flows(law)
+    now, finest = int(fewest.min()), SMOOTH[-1] if flows or law in march.MASING else 0
 
     def tell_mesh(places, fine: dict) -> None:
         rough = _measured(law, *_of(cases[2], places), cycles, now)[0]
         for name, error in _of_mesh(fine, rough).items():
             meshed.setdefault(name, np.zeros(len(models)))[places] = error
 
+    def measured(places, count: int) -> tuple:
+        seen = _measured(law, *_of(cases[:2], places), cycles, count)
+        for name, column in seen[0].items():
+            known.setdefault(count, {}).setdefault(name, np.full(len(models), np.nan))[places] = column
+        return seen
+
+    def tell(places, seen: tuple, *shares: int) -> np.ndarray:
+        fewer = [_of(known[now // share], places) for share in shares]
+        some_cases = *_of(cases[:2], places), _of(meshed, places)
+        answers, exact[places], wide = _marched(some(models, places), some_cases, now, seen, fewer)
+        lumped.take_out(found, places)  # what fewer steps said
+        found.place(places, answers)
+        return wide
+
     while (steps >= now).any():
         here = np.flatnonzero((fewest <= now) & (steps >= now))
+        ready = np.flatnonzero(steps[here] == now)
         if here.size:
-            part, ready = _of(cases, here), np.flatnonzero(steps[here] == now)
-            seen, places = _measured(law, *part[:2], cycles, now), here[ready]
-            coarser[now] = here, seen[0]
+            seen, places = measured(here, now), here[ready]
             tells = fewest[here] == now
             if meshed and ready.size:
                 tells[ready] |= _wild(_of(seen[0], ready), _of(meshed, places))
             if cases[2] is not None and tells.any():
                 tell_mesh(here[tells], _of(seen[0], tells))
-        if here.size and ready.size:
-            fewer = [_of(values, np.searchsorted(whose, places)) for whose, values in (
-                coarser[now // share] for share in shares)]
-            answers, exact[places], finer = _marched(some(models, places), (*_of(part, ready)[:2], _of(meshed, places)),
-                                                     now, _of(seen, ready), fewer)
-            lumped.take_out(found, places)  # what fewer steps said
-            found.place(places, answers)
+        if ready.size:
             reach[places] = np.abs(seen[3][ready]).max(axis=(1, 2))
-            steps[places[finer]] = 2 * now
+            wide = tell(places, _of(seen, ready), 2)
+            if flows and wide.any():
+                if (lack := places[wide & (2 * fewest[places] == now)]).size:
+                    measured(lack, now // 4)
+                wide[wide] = tell(places[wide], _of(seen, ready[wide]), 2, 4)
+            if 2 * now <= finest:
+                steps[places[wide]] = 2 * now
+            exact[places[wide]] = 2 * now > finest
         now *= 2
     return found, exact, steps, reach
 
@@ -324,19 +338,14 @@ def _of(found, places):
 
 
 def _marched(models: Sequence[Model], cases: tuple, steps: int, seen: tuple, coarser: list) -> tuple:
-    """(Answers of models that marched by so many steps a cycle; (n,) which must be run otherwise, and which by twice
-    the steps); arguments as of `runs_of`."""
-    law, least, window = kind_of(models[0]), np.zeros(len(models), bool), window_of(group(models[0])[0])
+    """(Answers of models that marched by so many steps a cycle; (n,) which must be run otherwise, and for which so many
+    steps are too few); arguments as of `runs_of`."""
+    window, wide_of = window_of(group(models[0])[0]), partial(too_wide, models, meshed=cases[2])
     runs, exact, lost = runs_of(models, cases, steps, seen, coarser)
-    more, wide_of = (law in march.MASING or march.flows(law)) and 2 * steps <= SMOOTH[-1], partial(too_wide, models,
-                                                                                                  meshed=cases[2])
-    found, alone, _ = batch_answers(models, runs, {"engine": "exact", "window_cycles": window},
-                                    wide_of if more else None)
+    found, alone, _ = batch_answers(models, runs, {"engine": "exact", "window_cycles": window}, wide_of)
     chosen = {"engine": "lanes", "steps_per_cycle": steps, "window_cycles": window}
     found.numerics.update(dict.fromkeys(range(len(models)), chosen))
-    wide = wide_of(found) | lost | alone
-    finer = wide if more else least
-    return found, (exact | wide | (found.outcome == "grows")) & ~finer, finer
+    return found, exact | (found.outcome == "grows"), wide_of(found) | lost | alone
 
 
 def exactly(models: Sequence[Model], say, finer: int = 0) -> Answers:
@@ -417,7 +426,7 @@ def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tup
     tolerance, = columns_of(models, lambda model: (model.accuracy.tolerance,))
     runs = Runs(cycles, window, values | rings, book, extremes, phasors[:, ends], stuck, nowhere, errors, 1e-9, np.inf,
                 stuck & (rise > tolerance * values["friction_force_peak"]), steady, again=False)
-    ended = np.isfinite(found.motion[:, at.X] + sum(one["friction_work"] for one in coarser))
+    ended = np.isfinite(found.motion[:, at.X] + coarser[0]["friction_work"])
     return runs, exact, faint | ~ended
 
 
