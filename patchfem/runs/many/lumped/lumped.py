@@ -54,7 +54,7 @@ def group(model: Model) -> tuple:
 
 def solve(models: Sequence[Model], say=None, finer: int = 0) -> Answers:
     """Answers of models of one group; a case that needs it is run by itself. finer: how often twice the cells of a
-    density are taken, in a check, for which a ring need not be told."""
+    density are taken, in a check, for which a ring need not be told, and which takes no more where bars are wide."""
     found = Answers.blank(len(models))
     for first in range(0, len(models), TOGETHER):
         part = models[first:first + TOGETHER]
@@ -72,8 +72,8 @@ def _solved(models, say, pairs: int, check: bool = False) -> Answers:
     finer = ~resolved & ~runs.lost if pairs else np.zeros(len(models), bool)
     alone &= ~finer & ~(runs.lost & check)
     for cases, solve_again in ((np.flatnonzero(alone).tolist(), lambda these: one_by_one.solve(these, say)),
-                               (np.flatnonzero(finer).tolist(),
-                                lambda these: _solved(these, say, max(0, pairs - 2), check))):
+                               ([] if check else np.flatnonzero(finer).tolist(),
+                                lambda these: _solved(these, say, max(0, pairs - 2)))):
         if cases:
             take_out(found, cases)
             found.place(cases, solve_again([models[case] for case in cases]))
