@@ -276,7 +276,7 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
     reach = np.zeros(len(models))
     law, cycles, meshed = kind_of(models[0]), group(models[0])[0], {}
     fewest, known, flows = steps // 2, {}, march.flows(law)
-    now, finest = int(fewest.min()), SMOOTH[-1] if flows or law in march.MASING else 0
+    now, finest = int(fewest.min()), SMOOTH[-1]
 
     def tell_mesh(places, fine: dict) -> None:
         rough = _measured(law, *_of(cases[2], places), cycles, now)[0]
