@@ -49,6 +49,7 @@ KINDS = {"coulomb": "rigid", "elastic-plastic": "yielding", "iwan": "masing", "t
          "nonlocal": "friction.laws.stretch_kernels"}
 MARCH_ON = "yielding", *march.MASING  # whose motions march on until they settle
 SMOOTH, CALM = (128, 256, 512, 1024, 2048), 0.5  # steps of a cycle under a law of a stretch, its rate in a step then
+LAYER = 0.5  # of the rate at which a speed settles in the layer of tanh, from which on bars ask for more steps
 PASSES = 0.75  # of the time in which a slide that turns passes the speed of Stribeck, over that of a rate
 RINGING = 512  # steps of a cycle under a law of a stretch from which a ring that is not found is none
 RATES = ((5.0, 96), (10.0, 192), (20.0, 384))  # fastest motion over the drive, and the steps of a cycle it asks for
@@ -60,7 +61,7 @@ OF_STRETCH = 3.0  # of the change under a law of a stretch: by 2, 12 of 500 tanh
 OF_FIT = 5.0  # of the error of the fit of a ring, whose samples err alike by the steps of the march
 HELD = 1e-12  # relative change of a force that its limit holds
 OF_LOOP = 4e-10  # least error of the area of a loop over its largest force and slide, what round-off leaves of none
-OF_MIDDLE = 1e-6  # of the amplitude, by which its middle errs behind sliders or a stretch, of which no event is missed
+OF_MIDDLE = 1e-6  # of the amplitude, by which its middle errs but under Coulomb's law: no other event is missed
 ORDERLY, SHOWN = 10.0, 0.25  # a change at half the steps that falls by this shows a high order, and is so much of it
 MORE, SETTLED = 10, 1e-5  # times its cycles marches what has not settled; change over a tenth of these that is left
 LATE = 100  # times that change may be left at last
@@ -162,6 +163,7 @@ def _rate(model: Model) -> tuple:
     rate = damper
     if model.friction.law == "tanh":
         rate = model.limits(model.point.load)[0] / model.friction.reference_speed * scale + damper
+        rate = np.where(rate > CALM * SMOOTH[-1] / (2 * np.pi) * omega, np.inf, LAYER * rate)
     if model.friction.law == "lugre":  # its peak of force lasts while the slide turns, as long as its speed is that low
         turns = np.abs(modes.slide[0] * modes.base[0]) * largest(model.rig.drive)
         rate = np.maximum(damper, PASSES * turns / model.friction.stribeck_speed)
@@ -276,7 +278,8 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
     reach = np.zeros(len(models))
     law, cycles, meshed = kind_of(models[0]), group(models[0])[0], {}
     fewest, known, flows = steps // 2, {}, march.flows(law)
-    now, finest = int(fewest.min()), SMOOTH[-1]
+    now, smooth = int(fewest.min()), flows or law in march.MASING
+    finest = (SMOOTH if smooth else RATES[-1])[-1]
 
     def tell_mesh(places, fine: dict) -> None:
         rough = _measured(law, *_of(cases[2], places), cycles, now)[0]
@@ -314,9 +317,9 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
                 if (lack := places[wide & (2 * fewest[places] == now)]).size:
                     measured(lack, now // 4)
                 wide[wide] = tell(places[wide], _of(seen, ready[wide]), 2, 4)
-            if 2 * now <= finest:
-                steps[places[wide]] = 2 * now
-            exact[places[wide]] = 2 * now > finest
+            more = wide & (2 * now <= finest) & (smooth | ~exact[places])
+            steps[places[more]] = 2 * now
+            exact[places[wide]] = ~more[wide]
         now *= 2
     return found, exact, steps, reach
 
@@ -661,7 +664,7 @@ def bars(values: dict, changes: dict, law: str = "") -> dict:
             size = np.maximum(size, 1e-3 if law in march.MASING else 1e-4)
         if name == "drift_per_cycle":
             size = np.abs(values[MAIN[0]])
-        least = OF_MIDDLE if smooth and name == "drift_per_cycle" else OF_SIZE
+        least = OF_MIDDLE if law not in ("", "rigid") and name == "drift_per_cycle" else OF_SIZE
         with np.errstate(invalid="ignore"):  # a share of nothing is no chance
             chance = 0.0 if name in ("normal_load", *GAPS) else np.nan_to_num((OF_TYPICAL * typical + least) * size,
                                                                               posinf=np.inf)
