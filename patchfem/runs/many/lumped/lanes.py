@@ -57,7 +57,9 @@ OF_TABLE = ((10.0, 96), (20.0, 192), (40.0, 384), (80.0, 768))  # the same behin
 # of the change at half the steps, of that of the main measures, and of the measure itself, as both marches can miss an
 # event alike: 2 of 4077 random cases had an error beyond
 OF_CHANGE, OF_TYPICAL, OF_SIZE = 2.0, 1.0, 2e-5
-OF_STRETCH = 3.0  # of the change under a law of a stretch: by 2, 12 of 500 tanh cases erred more, by 1.6 in the middle
+# of the change under a law of a stretch but bonds: by 2, 12 of 500 tanh cases erred more, by 1.6 in the middle, 1 of
+# 900 with bonds
+OF_STRETCH = 3.0
 OF_FIT = 5.0  # of the error of the fit of a ring, whose samples err alike by the steps of the march
 HELD = 1e-12  # relative change of a force that its limit holds
 OF_LOOP = 4e-10  # least error of the area of a loop over its largest force and slide, what round-off leaves of none
@@ -657,6 +659,7 @@ def bars(values: dict, changes: dict, law: str = "") -> dict:
         shares[:, np.isnan(shares).all(axis=0)] = 0.0
         typical = np.nanmedian(shares, axis=0)
     out, smooth = {}, law in march.MASING or march.flows(law)
+    times = OF_STRETCH if march.flows(law) and law != KINDS["nonlocal"] else OF_CHANGE
     for name, change in changes.items():
         size = first_harmonic(values) if name == "equivalent_stiffness" else 1.0 if TABLE[name].term is not None \
             and name not in GAPS and name != "drift_per_cycle" else np.abs(values[name])
@@ -671,7 +674,7 @@ def bars(values: dict, changes: dict, law: str = "") -> dict:
         if name == APART[0] and not smooth:  # the limit holds it
             chance = np.where(change <= HELD * size, 0.0, chance)
         with np.errstate(over="ignore"):  # of a march that ran away by half the steps
-            out[name] = np.maximum((OF_STRETCH if march.flows(law) else OF_CHANGE) * np.nan_to_num(change), chance)
+            out[name] = np.maximum(times * np.nan_to_num(change), chance)
     return out | _rounded(values, out)
 
 
