@@ -1,13 +1,13 @@
 """The batch of lanes: lumped cases of one law side by side, with bars from half the steps.
 
 Where the bars of a case of a law of a stretch (tanh, Bouc-Wen, LuGre, bonds of a constant length) miss the tolerance,
-it marches by a quarter of the steps too, which shows how its errors fall. Such a case and one of Iwan march by twice
-the steps where their bars still miss it: what they said before tells the errors then. A case of Iwan or of the elastic-
-plastic law that has not settled marches on. What rings in a stick that lasts all the time is told in closed form behind
-one spring, else by a fit. A case goes to the exact batch `lumped`, or under a law of a stretch to a run of its own,
-where a bar still misses its tolerance, rings in shorter sticks are to be told, or a motion grows. Where these
-contradict one of a few (under a law of a stretch twice: by its steps and by as many again), more are checked; where
-more than 3 in 100 are contradicted, every case of the batch is exact, else those are.
+it marches by a quarter of the steps too, which shows how its errors fall. A case marches by twice the steps where its
+bars still miss it: what it said before tells the errors then. A case of Iwan or of the elastic-plastic law that has not
+settled marches on. What rings in a stick that lasts all the time is told in closed form behind one spring, else by a
+fit. A case goes to the exact batch `lumped`, or under a law of a stretch to a run of its own, where a bar still misses
+its tolerance, rings in shorter sticks are to be told, or a motion grows. Where these contradict one of a few (under a
+law of a stretch twice: by its steps and by as many again), more are checked; where more than 3 in 100 are contradicted,
+every case of the batch is exact, else those are.
 """
 
 from collections.abc import Callable, Sequence
