@@ -27,8 +27,9 @@ CORNERS = 5  # of them, whose own ladders are climbed where a patch slips part b
 ROUNDS = 4  # of the search for the contacts
 MOST_NODES = 400  # of the finest interface
 FASTEST = 3.0  # order by which errors of static measures fall at most: meshes too coarse by it are not tried
-# times the cells that a case asks of its coarsest mesh: the first that are enough are taken, found by halves
-START = (4.0, 2.8, 2.0, 1.7, 1.4, 1.2, 1.0)
+# times the cells that a case asks of its coarsest mesh: tried from the longest on, whose meshes take least time, but for
+# those that are still too long by what the last try says
+START = (4.0, 2.8, 2.0, 1.5, 1.0)
 CLOSE = 2.0  # ratio of the cells of neighbouring cases up to which one band holds what lies between them
 
 
@@ -58,17 +59,21 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None
     common = min(halvings.values(), default=0)  # what all of them halve are levels of the ladder
     layout = _layout([*cases, *swept], not (every and all_), {key: one - common for key, one in halvings.items()})
     # a contact that moves on the way, or slips part by part, has measures that its first state tells nothing of
-    shares, fitting = START[-1:] if asked.sweeps or slips else START, None
-    while shares and layout is not None:
-        share = shares[(len(shares) - 1) // 2]
-        levels, missed_by = _climbed(cases, grids.grids_of(asked, layout.times(share)), tolerance, share > START[-1],
-                                     grids.LEAST_LEVELS + common)
-        if missed_by <= 1 or share == START[-1]:
-            fitting, shares = levels, tuple(one for one in shares if one > share)
-        else:
-            enough = share * missed_by**(-1 / FASTEST)  # times the cells, above which no mesh meets it
-            shares = tuple(one for one in shares if one < share and one <= max(enough, START[-1]))
-    return fitting and with_digest(fitting)
+    shares, own = START[-1:] if asked.sweeps or slips else START, None
+    if layout is None:
+        return None
+    while True:
+        share, shares = shares[0], shares[1:]
+        bodies = grids.grids_of(asked, layout.times(share))
+        if shares:
+            own = own or grids.grids_of(asked, layout)
+            if bodies[0].x.size >= own[0].x.size:  # both have the most columns
+                continue
+        levels, missed_by = _climbed(cases, bodies, tolerance, bool(shares), grids.LEAST_LEVELS + common)
+        if missed_by <= 1 or not shares:
+            return with_digest(levels)
+        enough = share * missed_by**(-1 / FASTEST)  # times the cells, above which no mesh meets it
+        shares = tuple(one for one in shares if one <= max(enough, START[-1]))
 
 
 def with_digest(levels) -> Meshes:
@@ -183,8 +188,8 @@ def _filled(layouts: list) -> list:
 
 def _climbed(cases: list, bodies, tolerance: float, once: bool, least: int) -> tuple:
     """Levels of nested meshes from the coarsest `bodies`, fine to coarse, up to one on which every case meets the
-    tolerance, or the dearest that is worth it; and the largest error over the tolerance of the first case that misses
-    it, 0 where none does. once: no more than the `least` levels."""
+    tolerance, or the dearest that is worth it; and the largest error over the tolerance where a case misses it: of
+    those that press together, where all these meet it of the first other one. once: no more than the `least` levels."""
     pairs, tolerance = [], cases[0].mesh_tolerance or tolerance
     while True:
         pairs.insert(0, condensed(cases[0], *bodies))
@@ -192,8 +197,10 @@ def _climbed(cases: list, bodies, tolerance: float, once: bool, least: int) -> t
         if len(pairs) < least:
             continue
         known = missed_on(cases, pairs, tolerance)
-        missed_by = next((by for one, seen in zip(cases, known) if (
-            by := _missed(one, pairs, tolerance) if seen is None else seen) > 1), 0.0)
+        missed_by = max((by for by in known if by is not None), default=0.0)
+        if missed_by <= 1:
+            missed_by = next((by for one, seen in zip(cases, known) if seen is None and (
+                by := _missed(one, pairs, tolerance)) > 1), missed_by)
         dear = bodies[0].x.size > MOST_NODES or grids.seconds_of(bodies) > grids.SPENT[cases[0].still]
         if missed_by <= 1 or once or dear:
             return [(pair.grid, None if pair.upper is pair.piece else pair.upper_grid) for pair in pairs], missed_by
