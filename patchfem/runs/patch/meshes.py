@@ -27,8 +27,8 @@ CORNERS = 5  # of them, whose own ladders are climbed where a patch slips part b
 ROUNDS = 4  # of the search for the contacts
 MOST_NODES = 400  # of the finest interface
 FASTEST = 3.0  # order by which errors of static measures fall at most: meshes too coarse by it are not tried
-# times the cells that a case asks of its coarsest mesh: tried from the longest on, whose meshes take least time, but for
-# those that are still too long by what the last try says
+# times the cells that a case asks of its coarsest mesh: tried from the longest on, whose meshes take least time, but
+# for those that are still too long by what the last try says
 START = (4.0, 2.8, 2.0, 1.5, 1.0)
 CLOSE = 2.0  # ratio of the cells of neighbouring cases up to which one band holds what lies between them
 
