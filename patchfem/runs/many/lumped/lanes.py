@@ -62,6 +62,8 @@ OF_CHANGE, OF_TYPICAL, OF_SIZE = 2.0, 1.0, 2e-5
 OF_STRETCH = 3.0
 OF_FIT = 5.0  # of the error of the fit of a ring, whose samples err alike by the steps of the march
 HELD = 1e-12  # relative change of a force that its limit holds
+NO_LOOP, OF_A_LOOP = 1e-6, ("slip_amplitude", "loop_area", "friction_work")  # of the largest force times slide: a case
+# with less of a loop sticks, and how it changes says nothing of the amplitude and the force
 OF_LOOP = 4e-10  # least error of the area of a loop over its largest force and slide, what round-off leaves of none
 OF_MIDDLE = 1e-6  # of the amplitude, by which its middle errs but under Coulomb's law: no other event is missed
 ORDERLY, SHOWN = 10.0, 0.25  # a change at half the steps that falls by this shows a high order, and is so much of it
@@ -275,7 +277,8 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
     was) from steps (n,) on that many more are made of where bars miss the tolerance; all that march by the same steps
     do so together, those for whose errors it is too. Where the change at half the steps is too large under a law of a
     stretch, a quarter of them tells how it falls. What a coarser mesh changes is told by the fewest steps, and by more
-    where that is so much that steps are too long for its start."""
+    where that is so much that steps are too long for its start, or where the case sticks, as what then is left of the
+    third harmonic hangs on both."""
     found, exact, steps = Answers.blank(len(models)), np.zeros(len(models), bool), steps.copy()
     reach = np.zeros(len(models))
     law, cycles, meshed = kind_of(models[0]), group(models[0])[0], {}
@@ -309,7 +312,8 @@ def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
             seen, places = measured(here, now), here[ready]
             tells = fewest[here] == now
             if meshed and ready.size:
-                tells[ready] |= _wild(_of(seen[0], ready), _of(meshed, places))
+                own = _of(seen[0], ready)
+                tells[ready] |= _wild(own, _of(meshed, places)) | ~_loops(own)
             if cases[2] is not None and tells.any():
                 tell_mesh(here[tells], _of(seen[0], tells))
         if ready.size:
@@ -376,6 +380,8 @@ def too_wide(models, found: Answers, meshed: dict | None = None) -> np.ndarray:
             continue  # an extrapolation errs alike at finer steps, and in the exact engine
         of_mesh = (meshed or {}).get(name.removesuffix("_steady"), 0.0)
         floors = np.fmax(found.floors[name], tolerance * larger_term(name, found.values))
+        if name == "equivalent_damping":  # it is the loop over an energy, and no better known
+            floors = np.fmax(floors, found.floors["loop_area"] * _of_loop(found.values))
         out |= found.errors[name] - of_mesh > tolerance * np.abs(values) + floors
     return out
 
@@ -466,9 +472,9 @@ def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
     if law == "yielding":
         _of_springs(cases, c, found, held & rings & marched, out)
         return *out, rings & ~held, faint
-    # nothing rings in what repeats
-    may = (rings & marched & (march.own_of(law, found.motion, "EVER") > 0)) if law in march.MASING else \
-        stays(cases, found) & (stuck | rings)
+    # nothing rings in what repeats, but a start may be left in a stick of all cycles
+    may = (rings & marched & (march.own_of(law, found.motion, "EVER") > 0)) | (stays(cases, found) & stuck) \
+        if law in march.MASING else stays(cases, found) & (stuck | rings)
     untold, told = may & ~held, may & held
     strides = steps / (PER_PERIOD * np.sqrt(np.maximum(cases.square + cases.spring, 1.0)))
     strides = 2 ** np.log2(np.maximum(strides, 1.0)).astype(int)  # each case by its own, whatever stands beside it
@@ -654,8 +660,9 @@ def bars(values: dict, changes: dict, law: str = "") -> dict:
     law: as of `dynamics.lanes`; one of sliders or of a stretch misses no event, and no limit holds its force.
     """
     with np.errstate(all="ignore"):
-        shares = np.array([np.where(changes[name] > 0, changes[name] / np.abs(values[name]), np.nan) for name in MAIN
-                           if name in values])
+        loops = _loops(values)
+        shares = np.array([np.where((changes[name] > 0) & (loops | (name not in OF_A_LOOP)),
+                                    changes[name] / np.abs(values[name]), np.nan) for name in MAIN if name in values])
         shares[:, np.isnan(shares).all(axis=0)] = 0.0
         typical = np.nanmedian(shares, axis=0)
     out, smooth = {}, law in march.MASING or march.flows(law)
@@ -675,12 +682,24 @@ def bars(values: dict, changes: dict, law: str = "") -> dict:
             chance = np.where(change <= HELD * size, 0.0, chance)
         with np.errstate(over="ignore"):  # of a march that ran away by half the steps
             out[name] = np.maximum(times * np.nan_to_num(change), chance)
+    for name in ("loop_area", "equivalent_damping"):  # a small difference is as unsure as it is large
+        out[name] = np.where(loops, out[name], np.fmax(out[name], np.abs(values[name])))
     return out | _rounded(values, out)
 
 
 def _rounded(values: dict, errors: dict) -> dict:
     """Errors of the measures of a loop of no area, which are no smaller than those that round-off leaves."""
-    least, loop = OF_LOOP * values["friction_force_peak"] * np.abs(values[MAIN[0]]), values["loop_area"]
-    share = np.divide(np.abs(values["equivalent_damping"]), np.abs(loop), out=0 * loop, where=loop != 0)
+    least = OF_LOOP * values["friction_force_peak"] * np.abs(values[MAIN[0]])
     return {name: np.fmax(errors[name], least * part) for name, part in (("loop_area", 1.0),
-                                                                         ("equivalent_damping", share))}
+                                                                         ("equivalent_damping", _of_loop(values)))}
+
+
+def _loops(values: dict) -> np.ndarray:
+    """(n,) whether a case has a loop, and not a small difference of what goes to and fro as it sticks."""
+    return np.abs(values["loop_area"]) > NO_LOOP * values["friction_force_peak"] * np.abs(values[MAIN[0]])
+
+
+def _of_loop(values: dict) -> np.ndarray:
+    """equivalent_damping over loop_area (n,) [1/J]; 0 without a loop."""
+    loop = values["loop_area"]
+    return np.divide(np.abs(values["equivalent_damping"]), np.abs(loop), out=0 * loop, where=loop != 0)
