@@ -61,3 +61,19 @@ def test_always_what_a_coarser_mesh_changes_is_not_told_by_steps_too_long_for_it
     mine = [case for case in range(12) if found.numerics[case]["engine"] == "lanes"]
     bars, wanted = (one.errors["loop_area"][mine] for one in (found, ones))
     assert len(mine) > 6 and (bars < 2 * wanted + 1e-2 * ones.values["loop_area"][mine]).all()
+
+
+def test_always_a_patch_that_sticks_is_answered_in_lanes():
+    """Its loop is a small difference, which changes by more than itself with the steps; the amplitude does not."""
+    base = base_of(pf.load(PATCH))
+    sets = [{"drive.acceleration": "50 m/s^2", "friction.static": static, "contact.tilt.angle": f"{tilt} rad"}
+            for static, tilt in ((0.57, 3.7e-6), (0.54, 1.2e-6), (0.59, 4e-6))]
+    models = meshes.meshed([pf.build(base.changed(assignments(one))) for one in sets])
+    found, ones = tabled.solve(models), sheared.solve(models)
+    assert all(one["engine"] == "lanes" for one in found.numerics.values())
+    assert list(found.outcome) == list(ones.outcome) == 3 * ["stuck"]
+    for name in ("relative_displacement_amplitude", "friction_force_peak", "ring_frequency"):
+        apart = np.abs(found.values[name] - ones.values[name])
+        assert (apart <= found.errors[name] + ones.errors[name]).all()
+        steps = found.errors[name] - 1.1 * ones.errors[name]  # those of the exact batch are of the mesh alone
+        assert (steps <= models[0].accuracy.tolerance * np.abs(ones.values[name]) + found.floors[name]).all()
