@@ -2,6 +2,6 @@
 
 In: two `Profile`, or two `Areal` and a direction. Out: a `Comparison`: shift, tilt and scale, worn depth and area where
 unworn valleys or flanks give a common reference, ratios of amplitude and slope, each with its 95 % interval, and what
-they prove in words. Read `compare` first, then `same`, `place`, `registration`, `depth`, `tracks`, `shallow`,
-`verdict`.
+they prove in words. Read `compare` first, then `same`, `place`, `registration`, `rivals`, `depth`, `tracks`,
+`shallow`, `verdict`.
 """

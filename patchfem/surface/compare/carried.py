@@ -132,7 +132,7 @@ def told(by: Carried) -> str:
 def may_hide(found: Registration, hidden: Quantity) -> str:
     """What may hide where nothing carries the registration, and what would settle it, as a sentence."""
     bow = (f" A curvature (bow) of {say(abs(found.bend), 3)} was subtracted; this bow may come from a bent datum of "
-           "the instrument or from wear.") if found.bend else ""
+           f"the instrument or from wear{bow_as_wear(found)}.") if found.bend else ""
     tilt, most = (plain(1e6 * one, 3) for one in (abs(found.slope), 2 * hidden.value / float(found.x[-1] - found.x[0])))
     within = "" if most == tilt else f" (up to {most} urad at the upper end of its interval)"
     return ("Uniform wear of any depth would give the same two traces. Wedge-shaped wear would also give the same two "
@@ -140,6 +140,12 @@ def may_hide(found: Registration, hidden: Quantity) -> str:
             f"traces{within} may hide a mean worn depth of up to {say(hidden.value, 3)}: half the tilt times the "
             f"length.{bow} To tell wear from no wear, measure an unworn flank beside the rubbed part, or a reference "
             "mark, in both traces.")
+
+
+def bow_as_wear(found: Registration) -> str:
+    """The area under a bow that sags, as words: two thirds of the sag times the length."""
+    area = found.bend * float(found.x[-1] - found.x[0]) * 2 / 3
+    return f" that took {plain(1e12 * area, 3)} um^2 between both ends" if area > 0 else ""
 
 
 def median_of_five(rest) -> np.ndarray:

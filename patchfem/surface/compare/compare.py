@@ -18,6 +18,7 @@ from .flanks import Flanks, flanks_of
 from .place import Match
 from .ratios import BEYOND, Size, at_step, bridged, likeness, loose, of_noise, ratio, scattered, size_along, size_of
 from .registration import Registration, gain_of, register
+from .rivals import bow_or_scar, undecided
 from .same import Place, found_place
 from .shallow import on_flanks, shallow_of
 from .specks import without_specks
@@ -148,7 +149,9 @@ def _placed(place: Place, direction: str, band: tuple, removed: tuple) -> Compar
     if identical(before, after):  # but for round-off the fit finds no shift and no tilt
         found = replace(found, shift=0.0, slope=0.0)
     by, visible = carried(found), None
-    if not by.by and not raised(found):
+    if undecided(found):
+        by = by._replace(by="")
+    elif not by.by and not raised(found):
         visible = shallow_of(found)
         if visible is not None and visible.span is not None:
             found, by = on_flanks(found, visible.span)
@@ -161,8 +164,9 @@ def _placed(place: Place, direction: str, band: tuple, removed: tuple) -> Compar
         tracks = tracks_of(found, worn_depth.neighbours(found), band[1])
         worn = replace(worn, largest=_deepest(found, worn.largest, tracks.sizes.get("depth_floor")))
     else:
-        worn = worn_depth.nowhere("no part of the traces is known to be unworn, so uniform, wedge-shaped or bow-shaped "
-                                  "wear cannot be told from no wear", worn.deposited if raised(found) else 0.0)
+        worn = worn_depth.nowhere(
+            bow_or_scar(found) if undecided(found) else "no part of the traces is known to be unworn, so uniform, "
+            "wedge-shaped or bow-shaped wear cannot be told from no wear", worn.deposited if raised(found) else 0.0)
     pieces = pieces_of(found, tracks, band[1])
     flat = pieces_of(found, tracks, band[1], True)
     by = outside(by, worn.extent)

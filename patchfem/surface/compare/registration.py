@@ -5,9 +5,10 @@ valleys. Only heights within the noise of w = 0 enter the fit; a least-squares l
 mean of the worn depth away with the tilt.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
@@ -27,8 +28,19 @@ BENT, GROWN = 0.8, 0.5  # of the noise that a bend, or heights that grew, must l
 ALL = 0.8  # of the differences, at most, that one factor of the heights leaves
 SIDES = 20  # parts of the trace whose low depths show a bend
 ROUNDS, EIGHTHS = 100, 8
+ENDS = 0.05, 0.02  # share of the length of a flank that tells two readings apart, and of one that is too short for that
+LEAST, BOTH = 40, 16  # samples of a flank, and of a mean that shows the foot of a scar
+NOISIER, COLLINEAR = 1.3, 30.0  # noise of one reading over that of the other, and chi-squared of an end off its line
+FILLED, FEW = 0.7, 0.01  # share of unworn heights in a flank, and of heights between the flanks that stand above them
 DIGITS = 1e-5  # of the height: least noise that is counted with
 LEVELS, EACH, TAILS, QUIETEST = 8, 64, 4.0, 0.3  # levels of roughness, heights of one, its deviations, least of noise
+
+
+class Rival(NamedTuple):
+    """found: the other `Registration`; told_apart: whether the flanks show that it is the less likely one."""
+
+    found: "Registration"
+    told_apart: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +56,8 @@ class Registration:
     of rest; doubt: change of offset, slope and shift where the deeper half of the unworn heights alone makes the fit,
     as slight wear of the higher half would bring it about; bend [m]: sag of the second against the first in the middle
     of the trace that was taken out, 0 where none was; track: first and last sample of a track that is shallower than
-    the noise, each with the lowest and highest likely (`shallow`), None without one.
+    the noise, each with the lowest and highest likely (`shallow`), None without one; rival: another registration that
+    explains the traces too (`flanked`), None without one.
     """
 
     shift: float
@@ -61,6 +74,7 @@ class Registration:
     doubt: np.ndarray
     bend: float = 0.0
     track: tuple | None = None
+    rival: "Rival | None" = None
 
     @property
     def errors(self) -> tuple:
@@ -71,6 +85,11 @@ class Registration:
         """Standard deviation of pull @ (offset, slope, shift): that of the noise, and a doubt beyond twice as much."""
         noise = float(pull @ self.covariance @ pull)
         return float(np.sqrt(noise + max((pull @ self.doubt) ** 2 - 4 * noise, 0.0)))
+
+    @property
+    def agreed(self) -> float:
+        """Share of the heights that agree in both traces, in one reading of them or in the other."""
+        return float(max(one.used.mean() for one in (self, self.rival.found if self.rival else self)))
 
     @cached_property
     def loudest(self) -> float:
@@ -131,7 +150,86 @@ def register(before: Profile, after: Profile, shift: float, lowest: float = LOWE
     if best is None:
         raise PatchfemError(f"{after.source}: fewer than {FEWEST} heights of this trace lie on the valleys of "
                             f"{before.source}, so there is no common reference")
+    return _with_flanks(fit, best)
+
+
+def _with_flanks(fit, best: Registration) -> Registration:
+    """The registration with its rival, the line through both ends, where its own ends are worn or grew.
+
+    A bow and a scar over most of the trace look alike but for the flanks of the scar: these lie on one straight line,
+    and a bow would have to wear them off to just that line. A floor of most heights and its flanks look like flanks
+    that grew. Flanks of a twentieth of the length each, straight and on one line within the noise, tell both apart.
+    Shorter ones do not: the registration stays, with the line as its rival.
+    """
+    if best.bend < 0 or all(unworn_ends(best)):
+        return best
+    line = _line_of_ends(fit, best, ENDS[0])
+    if line is not None and _is_straight(line, ENDS[0]):
+        return replace(line, rival=Rival(best, True))
+    if best.bend == 0 or _kinked(best):
+        line = _line_of_ends(fit, best, ENDS[1])
+        return replace(best, rival=Rival(line, False)) if line is not None and _is_straight(line, ENDS[1]) else best
     return best
+
+
+def _line_of_ends(fit, best: Registration, share: float) -> Registration | None:
+    """The fit that starts from a share of the length at each end, with the stretch and the noise of another fit; None
+    where worn heights do not lie between the ends."""
+    fit.side, noise = 1, max(best.noise, fit.least)
+    state = np.array([0.0, 0.0, best.shift, best.stretch[0] if best.stretch[2] else 0.0, 0.0])
+    for turn in range(ROUNDS):
+        seen = fit.rest(state)
+        used = _ends_of(seen[0].size, share) if turn < 4 else _flat(seen[0], noise)
+        if used.sum() < FEWEST:
+            return None
+        new = fit.improved(state, seen, used, 2 if turn < 2 else 3)
+        small, state = np.abs(new - state) <= 1e-9 * fit.scales, new
+        if turn > 4 and small.all():
+            break
+    line = fit.found(state, best.stretch, used=_flat(fit.rest(state)[0], noise))
+    between = np.asarray(line.rest)[~_ends_of(line.rest.size, share)]
+    worn = between.mean() > REACH * noise and (between < -2 * REACH * noise).mean() < FEW
+    return line if worn and line.noise < NOISIER * noise else None
+
+
+def _flat(rest, noise: float) -> np.ndarray:
+    """Unworn heights (n,) without the feet of a scar, where means of `BOTH` neighbours stand out but single heights do
+    not: three standard deviations of such a mean."""
+    worn = np.convolve(rest, np.full(BOTH, 1 / BOTH), "same") > 3 * noise / np.sqrt(BOTH)
+    return (np.abs(rest) <= REACH * noise) & ~(np.convolve(worn, np.ones(BOTH), "same") > 0.5)
+
+
+def _ends_of(count: int, share: float) -> np.ndarray:
+    """Samples (count,) of a share of them at each end."""
+    many, at = max(int(share * count), min(LEAST, count // 4)), np.arange(count)
+    return (at < many) | (at >= count - many)
+
+
+def _is_straight(line: Registration, share: float) -> bool:
+    """Whether both ends are unworn and lie on one line: own lines and bows of theirs leave hardly less."""
+    for part in np.split(np.flatnonzero(_ends_of(line.rest.size, share)), 2):
+        rest, every = np.asarray(line.rest)[part], np.ones(part.size, bool)
+        base = np.linalg.qr(np.vander(np.linspace(-1, 1, part.size), 3, True))[0]
+        own = base.T @ rest
+        left = rest - base @ own
+        if line.used[part].mean() < FILLED or own @ own > COLLINEAR * together(left, every) * float(np.mean(left**2)):
+            return False
+    return True
+
+
+def _kinked(bent: Registration) -> bool:
+    """Whether a straight end leaves a bow: worn the more the nearer to the end, straight once the bow is put back."""
+    along = np.linspace(-1, 1, bent.rest.size)
+    for side in (1, -1):
+        rest, put_back = np.asarray(bent.rest)[::side], (np.asarray(bent.rest) - bent.bend * along**2)[::side]
+        first = int(np.argmax(np.convolve(bent.used[::side], np.ones(LEAST), "valid") > FILLED * LEAST))
+        if first < FEWEST or not rest[:first // 2].mean() > rest[first // 2:first].mean():
+            continue
+        x = np.arange(first)
+        off = put_back[:first] - np.polyval(np.polyfit(x, put_back[:first], 1), x)
+        if np.median(np.abs(off)) * 1.4826 < NOISIER * bent.noise:
+            return True
+    return False
 
 
 def _as_given(fit, grown: Registration, bent: bool) -> Registration:
@@ -160,7 +258,7 @@ def _inside_out(one: Registration, other: Registration) -> bool:
 def unworn_ends(found: Registration) -> tuple:
     """Whether the first and the last twentieth of a registration are unworn."""
     count = max(found.rest.size // 20, min(40, found.rest.size))
-    return tuple(bool(found.used[part].mean() > 0.7) for part in (slice(None, count), slice(-count, None)))
+    return tuple(bool(found.used[part].mean() > FILLED) for part in (slice(None, count), slice(-count, None)))
 
 
 def _straight(fit, state, used) -> Registration | None:
@@ -302,10 +400,12 @@ class _Fit:
         new[:free] += step
         return new
 
-    def found(self, state, stretch: tuple, free: int = 3) -> Registration:
+    def found(self, state, stretch: tuple, free: int = 3, used=None) -> Registration:
+        """The registration of a state; used: its unworn heights where they are known."""
         rest, gradient, inside = self.rest(state)
         self.state = state
-        noise, used = _unworn(self.side * rest, self.least)
+        noise, unworn = _unworn(self.side * rest, self.least)
+        used = unworn if used is None else used
         part = gradient[used, :free]
         inverse = np.linalg.pinv(part.T @ part, rcond=1e-14, hermitian=True)
         spread = float(np.mean(rest[used] ** 2)) / KEPT

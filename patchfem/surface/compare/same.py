@@ -129,7 +129,7 @@ def _told(before: Profile, after: Profile, shift: float) -> Place:
         return Place(None, None, why + "hardly any heights of the traces agree; is the shift right?")
     if abs(found.shift - shift) > alone(first) * step:
         return Place(None, None, why + f"the traces do not match: the best fit has a shift of {say(found.shift)}")
-    if not (_quiet(found, TOLD) and found.used.mean() > SHARE):
+    if not (_quiet(found, TOLD) and found.agreed > SHARE):
         return Place(None, None, why + _apart(found) + ", which is no better than chance; is the shift right?")
     return Place(None, found)
 
@@ -146,7 +146,7 @@ def _about_line(x, z) -> float:
 def _same(found: Registration, match: Match) -> bool:
     """Whether the unworn heights of a registration are so many and so alike that the place is the same."""
     quiet = match.clear > CLEAR and _quiet(found, WHITE)
-    return _alike(found, match) or (quiet and bool(found.used.mean() > SHARE))
+    return _alike(found, match) or (quiet and found.agreed > SHARE)
 
 
 def _alike(found: Registration, match: Match, most: float = np.inf) -> bool:
@@ -156,7 +156,7 @@ def _alike(found: Registration, match: Match, most: float = np.inf) -> bool:
     """
     height = min(_height(found), most)
     same = any(found.noise < noise * height and match.clear > clear for noise, clear in ENOUGH)
-    return same and bool(found.used.mean() > SHARE)
+    return same and found.agreed > SHARE
 
 
 def _quiet(found: Registration, most: float) -> bool:

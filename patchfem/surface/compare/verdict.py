@@ -7,11 +7,13 @@ from ..areal import Areal
 from ..profile import Profile
 from ..quantity import SIDE, Quantity
 from ..scans import change as scans
-from .carried import may_hide, told
+from .carried import bow_as_wear, may_hide, told
 from .compare import Comparison, compared_files, directions_of, identical
+from .rivals import other_reading, undecided
 from .shallow import would_show
 
 EXCHANGED, ELSEWHERE = scans.GREW, scans.ELSEWHERE
+OPEN = "a scar or a bent datum, both are possible"
 DEPOSITED = 0.05  # of the worn area, what may stand above without a word
 NEAR = 1e-6  # a ratio that close to one is one but for round-off
 
@@ -53,6 +55,8 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
         headline = f"{areal}; {said}"
     elif areal == ELSEWHERE or any(_elsewhere(one) for one in parts):
         headline = f"{ELSEWHERE}; {headline}"
+    if any(undecided(one.registration) for one in parts):
+        headline = f"{OPEN}; {'no change detected in the waves' if headline == 'no change shown' else headline}"
     if any(_gain(one, "") and word != "no change shown" for one, word in zip(parts, words)):
         headline += ", all heights by the same factor, as an error in the instrument's gain would do"
     over = _over(parts) if parts[0].change is None else scans.over(parts[0].change)
@@ -62,7 +66,8 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
         out.insert(0, "The heights of both scans are the same; was the same file given twice?")
     for one, word, name in zip(parts, words, names):
         if not isinstance(one.before, Areal):
-            out += [*_variant(one, name), _worn(one, name), *_no_place(one, name), *_reference(one)]
+            out += [*_variant(one, name), _worn(one, name), *_no_place(one, name), *_reference(one),
+                    *other_reading(one.registration)]
         if one.sizes or not isinstance(one.before, Areal):
             out += [_amplitude(one.amplitude_ratio, word, name), _slope(one.slope_ratio, name), *_gain(one, name)]
         else:
@@ -176,7 +181,7 @@ def _worn(one: Comparison, name: str) -> str:
                  "are deposits, or the two files are in the wrong order." if one.exchanged else
                  f" {1e12 * one.worn.deposited:.3g} um^2 of material lie above the first trace (before wear): there "
                  "are deposits or pile-up.")
-    if one.reference == "place" and not one.carried.by:
+    if one.reference == "place" and not one.carried.by and not undecided(one.registration):
         seen = "" if one.visible is None else f" {would_show(one.visible)}"
         return f"Worn depth{name}: no wear detected.{above}{seen} {may_hide(one.registration, one.hidden)}"
     if mean.value is None:
@@ -208,7 +213,7 @@ def _reference(one: Comparison) -> list:
     out, bend = [told(one.carried)], one.registration.bend
     if bend:
         out.append(f"A curvature (bow) of {say(abs(bend), 3)} over the common length was subtracted, because a bent "
-                   "datum and wear of that shape look alike.")
+                   f"datum and wear{bow_as_wear(one.registration)} look alike.")
     return out
 
 

@@ -1,0 +1,72 @@
+"""A scar over most of the trace: its unworn flanks tell it from a bent datum and from flanks that grew.
+
+Traces of 4 mm at 1 um, Rq 0.4 um with waves of 0.25 um, noise 20 nm, shift 20 um. The rule was built on seeds 0 to 9.
+"""
+
+import re
+
+import numpy as np
+import pytest
+from pairs import UM
+from scipy.ndimage import gaussian_filter1d
+
+from patchfem.core import frozen_array
+from patchfem.surface.compare.compare import compared
+from patchfem.surface.compare.verdict import verdicts
+from patchfem.surface.profile import Profile
+
+HELD_OUT = 7002
+MM = 1e-3
+
+
+def worn_pair(seed: int, depth, bow: float = 0.0) -> tuple:
+    """(comparison, worn area [m2]) of a surface and of the same less depth(x [m]) [m], with a sag [m] of the datum."""
+    random, x = np.random.default_rng(seed), (np.arange(4200) - 100) * UM
+    parts = [size * part / part.std() for size, part in
+             ((0.4 * UM, gaussian_filter1d(random.standard_normal(x.size), 8)),
+              (0.25 * UM, gaussian_filter1d(random.standard_normal(x.size), 300)))]
+    z, lost = sum(parts), depth(x)
+    after = z - lost + bow * ((x - 2 * MM) / (2 * MM)) ** 2
+    traces = [Profile(frozen_array(x[100:4100]), frozen_array(one + 20e-9 * random.standard_normal(4000)), name)
+              for one, name in ((z[100:4100], "before"), (after[80:4080], "after"))]
+    return compared(*traces), float(lost[(x >= 0) & (x < 3.98 * MM)].sum() * UM)
+
+
+def scar(width: float, power: int, depth: float = 0.6 * UM):
+    return lambda x: depth * np.clip(1 - np.abs((x - 2 * MM) / (width / 2)) ** power, 0, None)
+
+
+@pytest.mark.parametrize("width, power", [(3.3, 2), (3.5, 2), (3.5, 20)])
+def test_always_flanks_tell_a_wide_scar_from_a_bow_and_from_grown_flanks(width, power):
+    found, true = worn_pair(HELD_OUT, scar(width * MM, power))
+    assert found.worn.area.value == pytest.approx(true, rel=0.03)
+    assert abs(found.worn.area.value - true) < found.worn.area.high - found.worn.area.low  # twice the interval
+    headline, said = verdicts([found])
+    assert headline.startswith("worn, no change") and any("Other reading" in one for one in said)
+
+
+def test_always_flanks_too_short_to_tell_leave_both_readings_with_their_numbers():
+    found, true = worn_pair(HELD_OUT, scar(3.7 * MM, 2))
+    assert found.worn.area.value is None and found.worn.extent is None and not found.tracks.sizes
+    headline, said = verdicts([found])
+    assert headline.startswith("a scar or a bent datum, both are possible")
+    line = found.registration.rival.found
+    assert line.rest.mean() * np.ptp(line.x) == pytest.approx(true, rel=0.05)
+    told = re.search(r"datum bent by ([\d.]+) nm .* wore off ([\d.]+) um\^2, ([\d.]+) nm on average", said[0])
+    assert float(told[1]) == pytest.approx(found.registration.bend * 1e9, rel=0.01)
+    assert float(told[2]) == pytest.approx(true * 1e12, rel=0.05)
+
+
+def test_always_a_flat_floor_beside_short_flanks_has_its_other_reading_told():
+    found, true = worn_pair(HELD_OUT, scar(3.7 * MM, 20))
+    said = " ".join(verdicts([found])[1])
+    assert "Other reading: if the ends of the traces are unworn" in said
+    line = found.registration.rival.found
+    assert line.rest.mean() * np.ptp(line.x) == pytest.approx(true, rel=0.05)
+
+
+@pytest.mark.parametrize("depth, bow", [(lambda x: 0 * x, 0.5 * UM), (lambda x: 0 * x, 0.0),
+                                        (scar(0.7 * MM, 2), 0.5 * UM), (lambda x: -scar(0.7 * MM, 2)(x), 0.0),
+                                        (lambda x: scar(0.7 * MM, 2)(x + 1.9 * MM), 0.5 * UM)])
+def test_exact_a_bow_a_narrow_track_an_edge_and_a_deposit_have_no_rival(depth, bow):
+    assert worn_pair(HELD_OUT + 1, depth, bow)[0].registration.rival is None
