@@ -241,10 +241,16 @@ def with_faces(data: Contents, faces) -> Contents:
     return data.also(out, places)
 
 
+EDGE_PEAK = ("how far wear_pressure_peak stands above all pressures more than two nodes inside the contact, where it "
+             "is that of a node at the edge of the contact, else 0; such a peak has an error of this size")
+
+
 def with_wear(data: Contents, history: dict, units: dict) -> Contents:
     """The contents with the measures over the cycles of wear: history name -> (j,), with `cycle`; units by name."""
     out = {f"wear_{name}": ("wear_cycle", values, {"units": units[name], "long_name": name.replace("_", " ")})
            for name, values in history.items() if name in units}
+    if (known := history.get("pressure_peak_at_edge")) is not None:
+        out["wear_pressure_peak_at_edge"] = ("wear_cycle", known, {"units": "Pa", "long_name": EDGE_PEAK})
     count = {"units": "1", "long_name": "cycles of wear so far"}
     return data.also(out, {"wear_cycle": ("wear_cycle", history["cycle"], count)})
 

@@ -150,7 +150,19 @@ def _wear(data: dict) -> Picture | None:
     return Picture(charts.wear, (data["x"], *profiles, history),
                    f"Wear of the patch over {history['cycle'][-1]:.6g} cycles: pressure and worn depth of both "
                    f"pieces together{', means over the width' if depth.ndim == 3 else ''}, and measures of patch and "
-                   "motion divided by their values on the unworn patch. All other pictures show the worn patch.")
+                   "motion divided by their values on the unworn patch. All other pictures show the worn patch."
+                   f"{_edge_peaks(history)}")
+
+
+def _edge_peaks(history: dict) -> str:
+    """Which peak pressures of a wear history are those of a node at the edge of the contact, as a sentence."""
+    above = np.asarray(history.get("pressure_peak_at_edge", ()))
+    if not (above > 0).any():
+        return ""
+    cycles = ", ".join(f"{one:.6g}" for one in np.asarray(history["cycle"])[above > 0])
+    most = scales.short(float(above.max()), "Pa", 2)
+    return (f" After {cycles} cycles the peak pressure is that of a node at the edge of the contact; it stands up to "
+            f"{most} above all pressures farther inside and has an error of this size.")
 
 
 def _worn_map(data: dict) -> Picture | None:

@@ -29,12 +29,16 @@ FIRST = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_
 
 
 class Finding(NamedTuple):
-    """What warnings and cures are told by: measures by name, patch and `extra` as a Result has them."""
+    """What warnings and cures are told by: measures by name, patch and `extra` as a Result has them.
+
+    climbed: the patch before wear on the meshes of its ladder, fine to coarse: this patch chose the mesh of a worn one.
+    """
 
     model: object
     measures: dict
     patch: object = None
     extra: Mapping = MappingProxyType({})
+    climbed: tuple = ()
 
 
 def beyond_tolerance(seen: Finding, coarse=()) -> list:
@@ -150,7 +154,7 @@ def _climbing(seen, coarse) -> float | None:
     if not any(coarse) or asked.meshes is not None:
         return TIGHTER * tolerance
 
-    return ladder.climbs_at(asked, [seen.patch, *coarse], asked.mesh_tolerance or tolerance)
+    return ladder.climbs_at(asked, seen.climbed or [seen.patch, *coarse], asked.mesh_tolerance or tolerance)
 
 
 def _finer_motion(seen, wide: dict, coarse) -> str:

@@ -59,7 +59,7 @@ def run(what, say=None, progress=None, per_point: bool = False, estimate: bool =
 def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool, kept: KeptState | None) -> Result:
     begin, model = perf_counter(), what.model
     seconds, warnings, notes = {}, list(model.source.remarks), list(model.source.notes)
-    patch, coarse = None, (None, None)
+    patch, coarse, climbed = None, (None, None), ()
     if model.rig is not None:
         warnings += engines.knobs_idle(model, what.engine)
     if model.patch is not None:
@@ -90,7 +90,7 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
     else:
         evolved, here = None, what
         if model.wear is not None and patch is not None:
-            key = kept and state_key(model, patch, kept.version)
+            key, climbed = kept and state_key(model, patch, kept.version), (patch, *coarse)
             evolved = evolve.evolved_with(kept, key, model, patch, coarse[:2], progress)
             progress = None  # it has told of all cycles
             patch, coarse = evolved.patch, evolved.coarse
@@ -117,14 +117,15 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
             result = measures.worn(replace(result, plan=what), evolved, estimate)
     if what.compile_seconds and estimate:
         compiled.ran(memory.compiled_kind(model, what.engine, what.unknowns))
-    return _whole(result, notes, begin, coarse)
+    return _whole(result, notes, begin, coarse, climbed)
 
 
-def _whole(result: Result, notes: list, begin: float, coarse=()) -> Result:
-    """The result with its time since `begin`, its notes, and words that name no folder."""
+def _whole(result: Result, notes: list, begin: float, coarse=(), climbed=()) -> Result:
+    """The result with its time since `begin`, its notes, and words that name no folder; climbed: the patch before wear
+    on the meshes of its ladder, fine to coarse, where the result is that of a worn one."""
     result.seconds["total"], model = perf_counter() - begin, result.plan.model
     apart = "strip" if model.patch is not None else "interface"
-    wide = beyond_tolerance(Finding(model, result.measures, result.patch, result.extra), coarse)
+    wide = beyond_tolerance(Finding(model, result.measures, result.patch, result.extra, climbed), coarse)
     warned, noted = result.warnings + wide, [*notes, *result.extra.get("notes", [])]
     warned, noted = (without_folders(texts, model.source.path) for texts in (warned, noted))
     return replace(result, measures=with_meanings(result.measures, apart), warnings=warned,

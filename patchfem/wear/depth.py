@@ -7,6 +7,7 @@ C + diag(rate cycles): the same complementarity problem, better conditioned, sta
 """
 
 from collections.abc import Callable
+from math import ceil
 
 import numpy as np
 
@@ -70,4 +71,5 @@ def refuse_explicit(cycles: float, critical: float) -> None:
     if cycles > critical:
         raise PatchfemError(f"a jump of {cycles:.4g} cycles by the explicit scheme is longer than the stability "
                             f"limit of {critical:.4g} cycles, beyond which every second node lifts off; leave "
-                            "wear.scheme out, or raise wear.jumps", "wear.scheme")
+                            f"wear.scheme out, or take at least {ceil(cycles / critical)} times as many wear.jumps",
+                            "wear.scheme")

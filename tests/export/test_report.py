@@ -353,3 +353,11 @@ def test_exact_a_stress_without_bound_is_named_where_it_is_the_largest(cell, sai
     data["bodies"]["mises"][1][cell] = 1e9
     caption = report.picture("bodies", data).caption
     assert "largest stress in a cell is 1 GPa" in caption and (said in caption if said else "bound" not in caption)
+
+
+def test_exact_a_fraction_that_is_extrapolated_is_told_from_the_places_of_the_finest_mesh():
+    """59.2 % from x = -1.724 to 1.724 of 6 mm were two answers, as these ends give 57.5 %."""
+    contact = {"from": -3e-3, "to": 3e-3, "stretches": [[-1.724e-3, 1.724e-3]]}
+    assert words.placed(contact, 0.592) == (", from x = -1.724 to 1.724 mm on the finest mesh (57.5 %; the fraction "
+                                            "before is extrapolated from all meshes)")
+    assert words.placed(contact, 1.724 / 3) == words.placed(contact) == ", from x = -1.724 to 1.724 mm"

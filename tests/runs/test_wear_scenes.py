@@ -2,6 +2,7 @@
 
 import io
 import json
+import re
 
 import h5py
 import numpy as np
@@ -17,9 +18,11 @@ from patchfem.closed_forms import hertz_half_width, hertz_peak
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity.elasticity import assemble, interface_compliance
+from patchfem.export import netcdf, report
 from patchfem.model.model import build
 from patchfem.runs.patch.result import solve_all
 from patchfem.runs.wear import evolve
+from patchfem.runs.wear.measures import edge_peak
 from patchfem.scene.scene import loads
 from patchfem.wear.jumps import Wearing, after
 from patchfem.wear.jumps import start as unworn
@@ -32,6 +35,28 @@ SOFT_RIG = TILTED + SHEAR + NONLOCAL + MODE + \
     '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 100\n'
 LONG = WEAR.replace("135723", "1e9").replace("1e-14", "1e-13")
 THIN_COAT = TILTED + COULOMB + SINE + LONG  # the coating is gone before the last of its cycles
+WORN_CROWN = '''[contact]
+length = "6 mm"
+width = "8 mm"
+height = "5 mm"
+load = "800 N"
+substrate = "Ti-8Al-1Mo-1V"
+[contact.crown]
+radius = "200 mm"
+[accuracy]
+tolerance = {tolerance}
+[slide]
+kind = "sine"
+amplitude = "40 um"
+frequency = "10 Hz"
+cycles = 3
+[wear]
+coefficient = "1e-14 m^2/N"
+cycles = 100000
+[friction]
+law = "coulomb"
+static = 0.6
+'''
 LOOSE = '[accuracy]\ntolerance = 2e-2\n'
 
 
@@ -231,9 +256,39 @@ def test_exact_plan_names_the_jumps_and_what_they_share():
     assert rig.seconds > plain.seconds and not any("wear" in line for line in plain.verdict)
 
 
+def test_exact_a_peak_at_the_edge_of_the_contact_is_told_from_one_inside():
+    """The element at an edge that moves between nodes takes what its neighbours should (4.9 of 36 MPa once)."""
+    inside, edge = np.array([0, 0, 12, 25, 28, 31, 30, 27, 21, 0.0]), np.array([0, 0, 36, 24, 28, 31, 30, 27, 21, 0.0])
+    assert edge_peak(inside) == 0 and edge_peak(edge) == 36 - 31
+    assert edge_peak(edge[2:]) == 0  # the contact ends with the piece: the pressure may rise there
+    assert edge_peak(np.array([0, 3.0, 5.0, 0])) == edge_peak(np.zeros(9)) == 0  # nothing lies inside
+
+
+def test_exact_the_file_and_the_page_mark_peaks_at_the_edge():
+    found = {"cycle": np.array([0.0, 5e4, 1e5]), "pressure_peak": np.array([9e7, 4e7, 3e7]),
+             "pressure_peak_at_edge": np.array([0.0, 4.87e6, 0.0])}
+    held = netcdf.with_wear(netcdf.Contents(), found, {"pressure_peak": "Pa"}).variables
+    assert held["wear_pressure_peak_at_edge"][1][1] == 4.87e6 and "wear_pressure_peak" in held
+    assert "After 50000 cycles the peak pressure is that of a node at the edge" in report._edge_peaks(found)
+    assert "stands up to 4.9 MPa above" in report._edge_peaks(found)
+    assert report._edge_peaks(found | {"pressure_peak_at_edge": np.zeros(3)}) == ""
+
+
+def test_exact_the_tolerance_of_a_warning_leads_to_a_finer_mesh_under_wear():
+    """The patch before wear chooses the mesh; by the worn one the warning named a tolerance that led to the same."""
+    text = WORN_CROWN.format(tolerance=1e-2)
+    found = ran(text)
+    told = [one for one in found.warnings if "finer mesh" in one]
+    nodes, tolerance = re.search(r"\((\d+) interface nodes\).*accuracy\.tolerance = (\S+) for", told[0]).groups()
+    assert int(nodes) == found.patch.x.size
+    asked = build(loads(WORN_CROWN.format(tolerance=tolerance), "s.toml")).patch
+    assert solve_all(asked, float(tolerance))[0].x.size > int(nodes)
+
+
 def test_refuses_what_wear_does_not_go_with():
     text = TILTED + COULOMB + SINE + WEAR
-    assert "scheme 'explicit' needs" in only(text + 'scheme = "explicit"\n')
+    for automatic in ("", 'jumps = "auto"\n'):  # this value ended in a TypeError, and the message proposed it
+        assert "scheme 'explicit' needs a number of jumps" in only(text + 'scheme = "explicit"\n' + automatic)
     assert any("wear" in line for line in mistakes(TILTED + WEAR))
     free = POINT + COULOMB + MODE + '[drive]\nkind = "free"\ndisplacement = "1 mm"\ncycles = 5\n' + WEAR
     assert "steady motion" in only(free)

@@ -23,6 +23,7 @@ WORKSHOP = {  # as scales.LADDERS
     "Pa": (("psi", INCH**2 / LBF), ("ksi", 1e-3 * INCH**2 / LBF)),
     "N m-1": (("lbf/in", INCH / LBF), ("klbf/in", 1e-3 * INCH / LBF))}
 GROUPS = ("motion", "friction", "energy", "patch", "wear")
+SAME = 2e-3  # of the fraction in contact, by which it and the places of the contact may differ without a word
 FEW = 3  # interfaces that are all told of first
 NO_SLIP = 1e-15  # m, the last digits of a slide
 WHOLE_RUN = "over the whole run"
@@ -197,7 +198,8 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str, str], s
             said("friction_ratio_peak", "friction ratio peaks at {}")
         if whole and not released:
             of_each("loop_area", "{} dissipated per cycle")
-        of_each("contact_fraction", "{} of the length in contact" + placed(summary.get("contact")))
+        of_each("contact_fraction", "{} of the length in contact" + placed(
+            summary.get("contact"), measures.get("contact_fraction", {}).get("value")))
         if summary["kind"] == "patch":
             said("pressure_peak", "peak pressure {}")
     text = "; ".join(parts)
@@ -206,10 +208,10 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str, str], s
     return f"{text[0].upper() + text[1:]}." if text else ""
 
 
-def placed(contact: dict | None) -> str:
+def placed(contact: dict | None, fraction: float | None = None) -> str:
     """Where along x the contact is, as words behind its share of the length, such as `, from x = -6.35 to -3.56 mm
     (left end)`; "" where all of the length is in contact or this is not known. contact: as `summary.contact_of` has
-    it."""
+    it. fraction: in contact, which may be extrapolated to finer meshes where the places are those of the finest one."""
     if not contact or not contact["stretches"]:
         return ""
     first, last, stretches = contact["from"], contact["to"], contact["stretches"]
@@ -228,10 +230,13 @@ def placed(contact: dict | None) -> str:
     parts = stretches if count <= FEW else [[stretches[0][0], stretches[-1][1]]]
     if count == 1 and parts[0][0] == parts[0][1]:
         return f", at x = {number(parts[0][0])} {unit}"
+    share = sum(end - begin for begin, end in stretches) / (last - first)
+    here = "" if fraction is None or abs(share - fraction) <= SAME * fraction else \
+        f" on the finest mesh ({100 * share:.3g} %; the fraction before is extrapolated from all meshes)"
     told = " and from ".join(
         f"{number(begin)} to {number(end)} {unit}{' (left end)' * (begin <= first)}{' (right end)' * (end >= last)}"
         for begin, end in parts)
-    return f", from x = {told}" if count <= FEW else f", in {count} stretches from x = {told}"
+    return f", from x = {told}{here}" if count <= FEW else f", in {count} stretches from x = {told}{here}"
 
 
 def least_known(result: Result) -> str:

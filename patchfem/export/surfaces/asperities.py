@@ -22,7 +22,7 @@ def data_of(told: Told | None, cutoff: float | None) -> dict | None:
     except PatchfemError as error:
         return out | {"reason": str(error)}
     out |= {"radius": one.radius, "density": one.density, "height_deviation": one.deviation, "stiffness": _steep(one),
-            "notes": [told.doubt] * bool(told.doubt)}
+            "notes": [*told.walls, *[told.doubt] * bool(told.doubt)]}
     try:
         return out | {"stiffness_half_sampled": None if told.coarse is None else _steep(peaks_of(told.coarse))}
     except PatchfemError:
@@ -53,6 +53,7 @@ def lines_of(told: Told | None, cutoff: float | None) -> list:
             f"{_per(one['stiffness'])}; {sampled}. Waves shorter than two samples are not included.",
             f"  Persson's theory, which includes waves of all lengths, gives {_per(soft)} to {_per(stiff)}, as does "
             f'law = "exponential" with decay_length = "{decay * 1e6:.3g} um".', f"  {_split(cutoff)}",
+            *[f"  In this table {one}." for one in told.walls],
             *([f"  Not Gaussian: {told.doubt}."] if told.doubt else [])]
 
 

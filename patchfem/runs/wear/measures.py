@@ -16,6 +16,7 @@ from .slip import UNBOUNDED, of_point
 
 FRAMES = 24  # of the interface on the way
 STRIPS = 1.5  # the wear of a corner settles with the strips a little slower than to first order
+EDGE_PEAK, BESIDE = "pressure_peak_at_edge", 2  # and nodes beside an edge of the contact that the peak may stand on
 HOLDER = {"closing": "approach", "rotation": "rotation"}
 
 
@@ -233,8 +234,23 @@ def frames(found, fields: dict, period: float) -> dict:
 
 
 def history(found) -> dict:
-    """Measures over the cycles: name -> (j,), with `cycle`, of every name that all moments have."""
+    """Measures over the cycles: name -> (j,), with `cycle`, of every name that all moments have, and `EDGE_PEAK`."""
     moments = found.moments
     names = [name for name in moments[-1].values if all(name in one.values for one in moments)]
     return {"cycle": np.array([one.cycle for one in moments])} | \
-        {name: np.array([one.values[name] for one in moments], float) for name in names}
+        {name: np.array([one.values[name] for one in moments], float) for name in names} | \
+        {EDGE_PEAK: np.array([edge_peak(one.pressure) for one in moments])}
+
+
+def edge_peak(pressure) -> float:
+    """How far [Pa] the pressure (m,) at an edge of the contact stands above all that is farther inside; 0 where the
+    largest pressure is inside, or the contact ends with the piece.
+
+    A contact edge between two nodes moves as the pieces wear, and the element at the edge takes what its neighbours
+    should: such a peak errs by as much as it stands out.
+    """
+    bears, top = np.asarray(pressure) > 0, int(np.argmax(pressure))
+    inside = np.convolve(np.pad(bears, BESIDE, "edge"), np.ones(2 * BESIDE + 1), "valid") > 2 * BESIDE
+    if inside[top] or not (bears & inside).any():
+        return 0.0
+    return float(pressure[top] - np.asarray(pressure)[inside].max())

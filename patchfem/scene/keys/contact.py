@@ -80,8 +80,8 @@ class LoadLine(Table):
 class Approach(Table):
     """A prescribed approach of the holders in place of the load."""
 
-    distance: key(quantity("length", ge=0), "distance by which the holders approach each other after first touch, in "
-                  "place of a load")
+    distance: key(quantity("length", ge=0), "distance by which the holders approach each other at x = 0 in place of a "
+                  "load, counted from the first touch of the flat pieces without tilt and crown")
 
 
 class Holder(Table):

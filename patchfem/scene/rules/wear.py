@@ -20,8 +20,10 @@ def check_wear(draft: Draft, kind: str) -> None:
         draft.say("wear", "wear needs a slide: add [friction] with [slide], or with [structure] and [drive]")
     for key, words in _beside(draft, tables, kind):
         draft.say("wear", unbuilt(f"with {key}", words))
-    if draft.given("wear.scheme") and tables.wear.scheme == "explicit" and not draft.given("wear.jumps"):
-        draft.lacks("wear.jumps", "scheme 'explicit' needs this key")
+    if tables.wear.scheme == "explicit" and tables.wear.jumps == "auto":
+        draft.say("wear.jumps" if draft.given("wear.jumps") else "wear.scheme",
+                  "scheme 'explicit' needs a number of jumps, such as jumps = 1000; 'auto' chooses jumps for scheme "
+                  "'implicit' only")
     if tables.wear.friction is not None:
         _friction(draft, tables.wear.friction)
     if tables.normal is not None:

@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import PatchfemError
+from ...core import PatchfemError, say
+from ...scales import plain
 from ..profile import Profile, despiked, even, level
 from .filter import filtered
 
@@ -20,6 +21,7 @@ SUMMITS = 0.8968  # of m_0/alpha, that the heights of summits scatter less than 
 NARROWEST = 1.5  # alpha of waves of one length in all directions
 PERSSON = 0.4, 0.5  # u_0 over the rms height: Persson 2007, and Pastewka et al. 2013 by simulation
 FEWEST = 16  # samples of a trace
+FEW, MOSTLY = 0.005, 0.5  # share of the heights, and of the mean square curvature that so few of a surface do not have
 SPIKY = 0.1  # share of the samples from which they are a surface and no spikes
 ROUND = 1e-12  # of its heights, what levelling leaves of a straight line
 SKEWED, PEAKED = 0.5, 1.0  # skewness and excess kurtosis from which heights are told not to be Gaussian
@@ -54,16 +56,19 @@ class Peaks(NamedTuple):
 
 class Told(NamedTuple):
     """What a trace tells of its peaks: Moments of its samples; Moments of every second one, None where these tell
-    none; how far its heights are from Gaussian ones, a clause or ""."""
+    none; how far its heights are from Gaussian ones, a clause or ""; which heights count too much or not at all,
+    clauses (`_walls`)."""
 
     fine: Moments
     coarse: Moments | None
     doubt: str
+    walls: tuple = ()
 
     def beside(self, other: "Told") -> "Told":
         """What two rough faces tell of the gap between them."""
         coarse = self.coarse.beside(other.coarse) if self.coarse and other.coarse else None
-        return Told(self.fine.beside(other.fine), coarse, self.doubt or other.doubt)
+        return Told(self.fine.beside(other.fine), coarse, self.doubt or other.doubt,
+                    (*self.walls, *other.walls))
 
 
 def told_by(trace: Profile, cutoff: float | None = None) -> Told:
@@ -74,7 +79,9 @@ def told_by(trace: Profile, cutoff: float | None = None) -> Told:
         coarse = _moments(short, 2)
     except PatchfemError:
         coarse = None
-    return Told(fine, coarse, _uneven(short.z, fine, short.length))
+    left = int((_clean(trace).missing & ~trace.missing).sum())
+    walls = (f"{left} of {trace.z.size} heights are spikes, dropouts or dust and are left out",) if left else ()
+    return Told(fine, coarse, _uneven(short.z, fine, short.length), (*walls, *_walls(short)))
 
 
 def moments_of(trace: Profile, every: int = 1, cutoff: float | None = None) -> Moments:
@@ -90,12 +97,37 @@ def moments_of(trace: Profile, every: int = 1, cutoff: float | None = None) -> M
 
 def _short_waves(trace: Profile, cutoff: float | None) -> Profile:
     """The trace without spikes, levelled, and without waves longer than the cut-off."""
-    clean = despiked(trace)
-    tilted = even(clean if (clean.missing & ~trace.missing).mean() <= SPIKY else trace)
+    tilted = even(_clean(trace))
     flat = level(tilted)
     if flat.z.size >= FEWEST and not np.ptp(flat.z) > ROUND * np.ptp(tilted.z):
         raise PatchfemError(f"{trace.source}: the trace is flat, so it has no peaks; leave [contact.asperities] out")
     return flat if cutoff is None or cutoff >= flat.length else filtered(flat, cutoff)[1]
+
+
+def _clean(trace: Profile) -> Profile:
+    """The trace without spikes, itself where these are too many for spikes."""
+    clean = despiked(trace)
+    return clean if (clean.missing & ~trace.missing).mean() <= SPIKY else trace
+
+
+def _walls(trace: Profile) -> tuple:
+    """That a few heights make up most of the mean square curvature, as the walls of dust do, a clause with the moments
+    without them; () where not: of Gaussian heights these few make up a twentieth."""
+    bent = np.diff(trace.z, 2)**2
+    few = max(int(FEW * bent.size), 1)
+    most = np.argsort(bent)[-few:]
+    share = float(bent[most].sum()) / max(float(bent.sum()), 1e-300)
+    if share < MOSTLY:
+        return ()
+    step, there = trace.length / (trace.z.size - 1), np.ones(trace.z.size, bool)
+    worst = int(most[-1]) + 1
+    there[most + 1] = False
+    slope = np.diff(trace.z)[there[1:] & there[:-1]] / step
+    curvature = float(np.sqrt(bent[there[1:-1]].mean())) / step**2
+    return (f"{few} of {trace.z.size} heights, the sharpest at x = {say(float(trace.x[worst]))}, make up "
+            f"{100 * share:.3g} % of the mean square curvature, as dust does; without them rms_slope is "
+            f"{float(np.sqrt(np.mean(slope**2))):.4g} and rms_curvature {plain(curvature, 4)} 1/m; if they are dust, "
+            "use these values or remove the dust from the trace",)
 
 
 def _moments(trace: Profile, every: int) -> Moments:

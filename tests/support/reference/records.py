@@ -73,8 +73,9 @@ constants, measure it on your material.
                  ("name", "conductivity [W/(m K)]", "heat capacity [J/(kg K)]", "source"),
                  ("name", "yield strength [MPa]", "source"))
         return "\n\n".join([cls.HEAD.strip(), grid(heads[0], rows), "## Heat",
-                            "If a scene has `[friction.temperature]`, a note of the run gives the temperature rise of "
-                            "the faces due to friction, estimated from these values.",
+                            "If a scene has `[friction.temperature]` with an activation temperature above 0, a "
+                            "warning of the run gives the temperature rise of the faces due to friction, estimated "
+                            "from these values.",
                             grid(heads[1], warm), "## Strength",
                             "The pieces are assumed to be elastic. A note appears if the stress in a piece exceeds the "
                             "yield strength; the fifth of the height of the piece next to its fixed far face is not "

@@ -1,5 +1,6 @@
 """Peaks of a surface from the mean squares of its traces, as a scene, and as the table that `profile` prints."""
 
+import re
 import tomllib
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from command_line import cli
 from scene_texts import PIECE
 from scipy.integrate import quad
+from scipy.ndimage import gaussian_filter1d
 
 import patchfem as pf
 from patchfem.core import PatchfemError
@@ -95,6 +97,22 @@ def test_a_made_surface_has_the_peaks_of_its_traces():
     assert z[top].std() == pytest.approx(one.deviation, rel=4 / np.sqrt(2 * count))
     bend = (4 * z - sum(around[:4]))[top].mean() / 2
     assert 1 / bend == pytest.approx(one.radius, rel=0.05)  # differences over a step of a twelfth of a wave
+
+
+def test_exact_what_dust_is_left_out_of_a_table_and_what_dust_is_in_it_is_said():
+    """Five grains of eight samples are left out, a sixth lower one is taken for the surface and makes its curvature."""
+    step = 0.5e-6
+    z = gaussian_filter1d(np.random.default_rng(7).standard_normal(12001), 16)
+    z *= 0.4e-6 / z.std()
+    grains = np.zeros(z.size)
+    for k in range(6):
+        grains[1500 * (k + 1):1500 * (k + 1) + 8] = 6e-6 if k else 2.6e-6
+    clean, dusty = told_by(trace_of(z, step)), told_by(trace_of(z + grains, step))
+    assert clean.walls == () and "are left out" in dusty.walls[0]
+    said = re.search(r"make up ([\d.]+) % .* rms_slope is (\S+) and rms_curvature (\S+) 1/m", dusty.walls[-1])
+    assert dusty.fine.curvature > 5 * clean.fine.curvature and float(said[1]) > 90
+    assert float(said[2]) == pytest.approx(clean.fine.slope, rel=0.02)
+    assert float(said[3]) == pytest.approx(clean.fine.curvature, rel=0.05)
 
 
 def test_refuses_what_no_surface_has():
