@@ -41,6 +41,8 @@ width = "8 mm"
 height = "5 mm"
 load = "800 N"
 substrate = "Ti-8Al-1Mo-1V"
+[contact.upper]
+coating = {{material = "WC-Co", thickness = "60 um"}}
 [contact.crown]
 radius = "200 mm"
 [accuracy]

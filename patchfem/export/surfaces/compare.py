@@ -127,12 +127,14 @@ def data_of(parts: list, found: tuple, directions: list, pressing: Pressed | Non
 
 
 def _of_traces(one: Comparison) -> dict:
-    """What traces alone have: how they were laid on each other, the longest track, the heights left out."""
+    """What traces alone have: how they were laid on each other, the longest track and the others, the heights left
+    out."""
     if not isinstance(one.before, Profile):
         return {} if one.change is None else _of_scans(one.change)
-    sizes = {name: plain_of(each) for name, each in one.tracks.sizes.items()}
+    sizes, *others = ({name: plain_of(each) for name, each in found.items()}
+                      for found in (one.tracks.sizes, *one.tracks.others))
     return {"registration": {"shift": plain_of(one.shift), "mirrored": one.mirrored, "turned": one.turned},
-            "track": sizes or None, "removed": dict(zip(("before", "after"), one.removed))}
+            "track": sizes or None, "other_tracks": others, "removed": dict(zip(("before", "after"), one.removed))}
 
 
 def _of_scans(one: Change) -> dict:

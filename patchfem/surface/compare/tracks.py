@@ -45,11 +45,12 @@ class Valley(NamedTuple):
 
 class Tracks(NamedTuple):
     """spans: first and last sample of each track; sizes: `Quantity` of the longest one by name (`_sizes`), all of one
-    span, nothing without one; valley: the deepest new one, None without one."""
+    span, nothing without one; valley: the deepest new one, None without one; others: sizes of each other track."""
 
     spans: tuple
     sizes: Mapping = MappingProxyType({})
     valley: Valley | None = None
+    others: tuple = ()
 
 
 def tracks_of(found: Registration, together: float, longest: float) -> Tracks:
@@ -67,12 +68,18 @@ def tracks_of(found: Registration, together: float, longest: float) -> Tracks:
     valley = _valley(found, spans, longest)
     if not spans:
         return Tracks((), valley=valley)
-    widest = max(spans, key=lambda one: one[1] - one[0])
-    at = spans.index(widest)
+    widest = max(range(len(spans)), key=lambda at: spans[at][1] - spans[at][0])
+    sizes = [_sizes_at(found, spans, at, together) for at in range(len(spans))]
+    others = tuple({name: each._replace(text=each.text.replace(" the longest track", " this track"))
+                    for name, each in one.items()} for at, one in enumerate(sizes) if at != widest)
+    return Tracks(spans, sizes[widest], valley, others)
+
+
+def _sizes_at(found: Registration, spans: tuple, at: int, together: float) -> dict:
+    """Sizes of one of the tracks."""
     low = spans[at - 1][1] + 1 if at else 0
-    high = spans[at + 1][0] if at + 1 < len(spans) else rest.size
-    ends = _ends(found, widest, (low, high), together)
-    return Tracks(spans, _sizes(found, *ends, together), valley)
+    high = spans[at + 1][0] if at + 1 < len(spans) else found.rest.size
+    return _sizes(found, *_ends(found, spans[at], (low, high), together), together)
 
 
 def _ends(found: Registration, span: tuple, around_it: tuple, together: float) -> tuple:

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ...core import say
+from ...scales import plain
 from ..areal import Areal
 from ..profile import Profile
 from ..quantity import SIDE, Quantity
@@ -67,7 +68,7 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
     for one, word, name in zip(parts, words, names):
         if not isinstance(one.before, Areal):
             out += [*_variant(one, name), _worn(one, name), *_no_place(one, name), *_reference(one),
-                    *other_reading(one.registration)]
+                    *_other_tracks(one), *other_reading(one.registration)]
         if one.sizes or not isinstance(one.before, Areal):
             out += [_amplitude(one.amplitude_ratio, word, name), _slope(one.slope_ratio, name), *_gain(one, name)]
         else:
@@ -213,15 +214,31 @@ def _reference(one: Comparison) -> list:
     out, bend = [told(one.carried)], one.registration.bend
     if bend:
         out.append(f"A curvature (bow) of {say(abs(bend), 3)} over the common length was subtracted, because a bent "
-                   f"datum and wear{bow_as_wear(one.registration)} look alike.")
+                   f"datum and wear of that shape{bow_as_wear(one.registration)} look alike.")
+    return out
+
+
+def _other_tracks(one: Comparison) -> list:
+    """Each track beside the longest one, as a sentence; `compare.json` has all of their sizes."""
+    if not one.tracks.others:
+        return []
+    count = len(one.tracks.others) + 1
+    out = [f"{count} tracks were found; the first sentence and the table describe the longest one."]
+    for found in one.tracks.others:
+        area = plain(1e12 * found["area_gross"].value, 4)
+        out.append(f"Worn, too: {_sized(found)}the area lost in this track is {area} um^2.")
     return out
 
 
 def _track(one: Comparison) -> str:
     """The longest track as the begin of a sentence."""
-    found = one.tracks.sizes
     if one.flanks is not None:
         return f"a track from about x = {_span(one.flanks.start, one.flanks.end)} in the second trace (after wear); "
+    return _sized(one.tracks.sizes)
+
+
+def _sized(found: dict) -> str:
+    """A track by its sizes as the begin of a sentence; "" of none."""
     if not found:
         return ""
     ends = found["from"], found["to"]

@@ -70,3 +70,16 @@ def test_always_a_flat_floor_beside_short_flanks_has_its_other_reading_told():
                                         (lambda x: scar(0.7 * MM, 2)(x + 1.9 * MM), 0.5 * UM)])
 def test_exact_a_bow_a_narrow_track_an_edge_and_a_deposit_have_no_rival(depth, bow):
     assert worn_pair(HELD_OUT + 1, depth, bow)[0].registration.rival is None
+
+
+def test_always_each_of_two_tracks_is_told_with_its_area():
+    """Sentence and table described one of them, and nothing said that there were two."""
+    one, two = scar(0.5 * MM, 2, 0.8 * UM), scar(0.7 * MM, 2, 1.2 * UM)
+    found, true = worn_pair(HELD_OUT, lambda x: one(x + 0.8 * MM) + two(x - 0.9 * MM))
+    said = " ".join(verdicts([found])[1])
+    assert "2 tracks were found" in said and len(found.tracks.others) == 1
+    told = re.search(r"Worn, too: a track from x = (\S+) um to (\S+) mm .* lost in this track is ([\d.]+) um", said)
+    assert (float(told[1]), 1e3 * float(told[2])) == pytest.approx((970, 1470), abs=60)  # shifted by 20 um
+    small = 2 / 3 * 0.5 * MM * 0.8 * UM
+    assert 1e-12 * float(told[3]) == pytest.approx(small, rel=0.03)
+    assert found.tracks.sizes["area_gross"].value + 1e-12 * float(told[3]) == pytest.approx(true, rel=0.03)
