@@ -31,6 +31,7 @@ ROUNDS, EIGHTHS = 100, 8
 ENDS = 0.05, 0.02  # share of the length of a flank that tells two readings apart, and of one that is too short for that
 LEAST, BOTH = 40, 16  # samples of a flank, and of a mean that shows the foot of a scar
 NOISIER, COLLINEAR = 1.3, 30.0  # noise of one reading over that of the other, and chi-squared of an end off its line
+STEEPER = 1.2  # depth of the outer half of a straight end that leaves a bow, over that of its inner half
 FILLED, FEW = 0.7, 0.01  # share of unworn heights in a flank, and of heights between the flanks that stand above them
 DIGITS = 1e-5  # of the height: least noise that is counted with
 LEVELS, EACH, TAILS, QUIETEST = 8, 64, 4.0, 0.3  # levels of roughness, heights of one, its deviations, least of noise
@@ -166,10 +167,23 @@ def _with_flanks(fit, best: Registration) -> Registration:
     line = _line_of_ends(fit, best, ENDS[0])
     if line is not None and _is_straight(line, ENDS[0]):
         return replace(line, rival=Rival(best, True))
-    if best.bend == 0 or _kinked(best):
+    kinks = _kinks(best) if best.bend else 0
+    if best.bend == 0 or kinks:
         line = _line_of_ends(fit, best, ENDS[1])
-        return replace(best, rival=Rival(line, False)) if line is not None and _is_straight(line, ENDS[1]) else best
+        if line is not None and _is_straight(line, ENDS[1]):
+            return replace(best, rival=Rival(line, False))
+    if kinks == 2:
+        return replace(best, rival=Rival(_chord(fit, best), False))
     return best
+
+
+def _chord(fit, bent: Registration) -> Registration:
+    """The line through both ends, whatever lies between: a scar beside flanks of a bent datum has no other."""
+    fit.side = 1
+    state = np.array([0.0, 0.0, bent.shift, bent.stretch[0] if bent.stretch[2] else 0.0, 0.0])
+    seen = fit.rest(state)
+    used = _ends_of(seen[0].size, ENDS[1])
+    return fit.found(fit.improved(state, seen, used, 2), bent.stretch, used=used)
 
 
 def _line_of_ends(fit, best: Registration, share: float) -> Registration | None:
@@ -217,19 +231,18 @@ def _is_straight(line: Registration, share: float) -> bool:
     return True
 
 
-def _kinked(bent: Registration) -> bool:
-    """Whether a straight end leaves a bow: worn the more the nearer to the end, straight once the bow is put back."""
-    along = np.linspace(-1, 1, bent.rest.size)
+def _kinks(bent: Registration) -> int:
+    """How many straight ends leave a bow: worn the more the nearer to the end, straight once the bow is put back."""
+    along, count = np.linspace(-1, 1, bent.rest.size), 0
     for side in (1, -1):
         rest, put_back = np.asarray(bent.rest)[::side], (np.asarray(bent.rest) - bent.bend * along**2)[::side]
         first = int(np.argmax(np.convolve(bent.used[::side], np.ones(LEAST), "valid") > FILLED * LEAST))
-        if first < FEWEST or not rest[:first // 2].mean() > rest[first // 2:first].mean():
+        if first < FEWEST or not rest[:first // 2].mean() > STEEPER * rest[first // 2:first].mean() > 0:
             continue
         x = np.arange(first)
         off = put_back[:first] - np.polyval(np.polyfit(x, put_back[:first], 1), x)
-        if np.median(np.abs(off)) * 1.4826 < NOISIER * bent.noise:
-            return True
-    return False
+        count += bool(np.median(np.abs(off)) * 1.4826 < NOISIER * bent.noise)
+    return count
 
 
 def _as_given(fit, grown: Registration, bent: bool) -> Registration:

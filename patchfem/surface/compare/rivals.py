@@ -17,11 +17,11 @@ def undecided(found: Registration | None) -> bool:
 def bow_or_scar(found: Registration) -> str:
     """Why there is no worn depth where both are possible, with the numbers of both."""
     line = found.rival.found
+    scar = f"{_area(line)}, {_depth(line)} on average and {say(_deepest(line), 3)} at the deepest place"
     return (f"two readings explain both traces alike: either the datum bent by {say(found.bend, 3)} (sag over the "
-            f"common length) and {_area(found)} wore off at the ends, or the datum is straight and a scar over most "
-            f"of the trace wore off {_area(line)}, {_depth(line)} on average and {say(_deepest(line), 3)} at the "
-            "deepest place; the flanks that are common to both traces are too short to tell them apart; measure longer "
-            "flanks beside the scar, or the datum on a flat")
+            f"common length) and {_area(found)} wore off at the ends, or the ends are unworn and a scar over most of "
+            f"the trace wore off {scar}, if the datum is straight; the flanks beside the scar are too short, or not on "
+            "one straight line, to tell these readings apart; measure longer flanks, or the datum on a flat")
 
 
 def other_reading(found: Registration | None) -> list:

@@ -57,6 +57,14 @@ def test_always_flanks_too_short_to_tell_leave_both_readings_with_their_numbers(
     assert float(told[2]) == pytest.approx(true * 1e12, rel=0.05)
 
 
+@pytest.mark.parametrize("bow", [0.3 * UM, -0.3 * UM])
+def test_always_a_scar_beside_flanks_of_a_bent_datum_is_not_given_as_wear_of_its_ends(bow):
+    """The bow of both together left 33 (17 to 49) um^2 at the ends, of 1400 um^2 that wore off."""
+    found, _ = worn_pair(HELD_OUT + 2, scar(3.5 * MM, 2), bow)
+    assert found.worn.area.value is None and found.registration.rival is not None
+    assert "two readings" in verdicts([found])[1][0]
+
+
 def test_always_a_flat_floor_beside_short_flanks_has_its_other_reading_told():
     found, true = worn_pair(HELD_OUT, scar(3.7 * MM, 20))
     said = " ".join(verdicts([found])[1])
