@@ -1,15 +1,18 @@
 """How far a swept key may go: until a measure of the motion changes by 5 %, and until the largest pressure doubles.
 
-A limit stands between two cases, the last one surely within and the first one surely beyond; where these are
-neighbours, the least of three curves says about where: a straight line between them (over the logarithm of a key that
-grows by factors), a straight line through the logarithm of the change, a parabola that also runs through the case
-before them. Where the two lines disagree nothing is said. A limit is written rounded down. A case that did not settle,
-or whose measure misses its tolerance, is neither within nor beyond.
+A limit stands between two cases, the last one surely within and the first one surely beyond. Where these are
+neighbours and the curve through them and the cases next to them bends one way, the limit lies between the chord of the
+two and the lines through their neighbours: of a curve without an inflection this is exact. The errors of the cases
+widen this interval. Where the curve bends both ways the two cases alone are told. Where curves through the cases agree
+about a place in it, the key may reach this place, else the lower end. A limit and the lower end are written rounded
+down, the upper end rounded up. A case that did not settle, or whose measure misses its tolerance, is neither within nor
+beyond.
 """
 
 from collections.abc import Sequence
 from html import escape
-from math import ceil, exp, floor, isfinite, log, log10
+from itertools import product
+from math import ceil, exp, floor, inf, isfinite, log, log10, nan
 from typing import NamedTuple
 
 import numpy as np
@@ -38,8 +41,9 @@ class Allowed(NamedTuple):
     change: relative to the first case, by which the measure leaves, < 0 where it falls; first, changed: value in the
     first case [SI] and its relative change up to the last one; start: place of the first case; inside, beyond: places
     of the last case that is surely within and of the first that is surely not (None: none is); whole: no case of the
-    line is left open; about: where it leaves, as a share of the way from the one to the other, NaN where the cases
-    between them are left open or do not tell it; value: of the key at that place, or at `inside` [SI].
+    line is left open; lower, upper: ends of the interval in which the key has its limit [SI]: the values of the cases
+    `inside` and `beyond` where no more is known, upper is inf without the latter; value: about where it lies, `lower`
+    where the cases do not tell it [SI].
     """
 
     name: str
@@ -50,8 +54,9 @@ class Allowed(NamedTuple):
     inside: int
     beyond: int | None
     whole: bool
-    about: float
     value: float
+    lower: float
+    upper: float
 
     def resolved(self) -> bool:
         """Whether the cases show how far the key may go: no more than the first of them is not far."""
@@ -90,7 +95,7 @@ def allowed(keys: list, measures: dict, trusted: dict, grid: bool = True, over: 
         if not np.any(np.abs(values) > zero_below(name)):  # none has it, or it is round-off in all
             continue
         values = np.where(trusted[name], values, np.nan)
-        each = [_along(name, change, line, size, values, errors, bool(key["log"])) for line in lines]
+        each = [_along(name, change, line, size, (values, errors), bool(key["log"])) for line in lines]
         if None not in each:
             found.append(min(each, key=_order))
         elif name in MOVES:
@@ -98,10 +103,11 @@ def allowed(keys: list, measures: dict, trusted: dict, grid: bool = True, over: 
     return Limits(key, found, lost, float(size.max()), over)
 
 
-def _along(name: str, change: float, line: np.ndarray, size: np.ndarray, values: np.ndarray, errors: np.ndarray,
+def _along(name: str, change: float, line: np.ndarray, size: np.ndarray, measure: tuple,
            factors: bool) -> Allowed | None:
-    """Allowed of a measure along one line of cases; None where its first case or all others have no value."""
-    value, error = values[line], np.nan_to_num(errors[line])
+    """Allowed of a measure, (values, errors), along one line of cases; None where its first case or all others have no
+    value; factors: the key grows by factors."""
+    value, error = measure[0][line], np.nan_to_num(measure[1][line])
     known = np.flatnonzero(np.isfinite(value))
     if known.size < 2 or known[0] != 0 or value[0] == 0:
         return None
@@ -112,27 +118,35 @@ def _along(name: str, change: float, line: np.ndarray, size: np.ndarray, values:
     inside = int(np.argmin(sure)) - 1 if not sure.all() else known.size - 1
     far = np.flatnonzero(away - bar > change)
     start, last = int(line[0]), int(line[known[inside]])
-    ends = Allowed(name, change, float(value[0]), float(share[-1]), start, last, None, inside == line.size - 1, np.nan,
-                   float(size[last]))
+    ends = Allowed(name, change, float(value[0]), float(share[-1]), start, last, None, inside == line.size - 1,
+                   float(size[last]), float(size[last]), inf)
     if not far.size:
         return ends
     beyond = int(far[0])
     next_one = int(line[known[beyond]])
-    ends = ends._replace(beyond=next_one, change=float(np.copysign(change, share[beyond])))
-    if known[beyond] != known[inside] + 1:
+    ends = ends._replace(beyond=next_one, change=float(np.copysign(change, share[beyond])), upper=float(size[next_one]))
+    if known[beyond] != known[inside] + 1 or inside == 0:
         return ends
-    way = np.array([share[inside], ends.change, share[beyond]])
-    way = _way(way, change, factors)
-    part = float((way[1] - way[0]) / (way[2] - way[0]))
-    low, high = float(size[last]), float(size[next_one])
-    bent = log(change / away[inside]) / log(away[beyond] / away[inside]) if share[inside] * ends.change > 0 else 1.0
-    before = known[inside - 1] if inside else None
-    arched = part if before is None else _arched(np.append(_way(share[inside - 1], change, factors), way), _places(
-        [float(size[int(line[before])]), low, high], factors))
-    place, other, third = (exp(log(low) + one * log(high / low)) if factors and low > 0 else low + one * (high - low)
+    near = slice(inside - 1, beyond + 2)  # the case before both, both, the case after them where there is one
+    at = size[line[known[near]]]
+    low, high = _interval(at, share[near], bar[near], ends.change, factors)
+    place = _about(at, share[near], ends.change, factors and at[0] > 0)
+    return ends._replace(value=float(np.clip(place, low, high)) if isfinite(place) else low, lower=low, upper=high)
+
+
+def _about(at: np.ndarray, share: np.ndarray, wanted: float, factors: bool) -> float:
+    """About where a change is reached: the least of three curves, a straight line between the cases at both sides (over
+    the logarithm of a key that grows by factors), a straight line through the logarithm of the change, a parabola that
+    also runs through the case before them; NaN where both lines disagree by more than ALIKE. Arguments as of
+    `_interval`."""
+    way = _way(np.array([*share[:2], wanted, share[2]]), abs(wanted), factors)
+    part = float((way[2] - way[1]) / (way[3] - way[1]))
+    bent = log(abs(wanted / share[1])) / log(share[2] / share[1]) if share[1] * wanted > 0 else 1.0
+    arched = _arched(way, _places(at.tolist(), factors))
+    low, high = float(at[1]), float(at[2])
+    place, other, third = (exp(log(low) + one * log(high / low)) if factors else low + one * (high - low)
                            for one in (part, bent, arched))
-    return ends._replace(about=part, value=min(place, other, third)) if abs(other - place) <= ALIKE * abs(place) \
-        else ends
+    return min(place, other, third) if abs(other - place) <= ALIKE * abs(place) else nan
 
 
 def _way(share, change: float, factors: bool):
@@ -160,6 +174,67 @@ def _arched(way: np.ndarray, at: list) -> float:
     return min((float(one.real) for one in roots if abs(one.imag) < 1e-12 and 0 <= one.real <= 1), default=1.0)
 
 
+def _interval(at: np.ndarray, share: np.ndarray, bar: np.ndarray, wanted: float, factors: bool) -> tuple:
+    """Between which values of the key a curve without an inflection reaches a wanted relative change.
+
+    at (3 or 4,): values of the key in the case before the last one within, in that one, in the first one beyond, in the
+    one after it; share, bar: relative change in each and its error. The interval holds the place of a curve that bends
+    one way over the key; of a key that grows by factors also that of one that does so over its logarithm, of a measure
+    that doubles then that of its own logarithm alone. A curve that bends both ways may be anywhere between both cases.
+    """
+    low, high = float(at[1]), float(at[2])
+    ways = [(lambda one: one, lambda one: one)] + [(np.log, np.exp)] * bool(factors and at[0] > 0)
+    if wanted >= 1 and len(ways) > 1 and np.min(share - bar) > -1:  # what doubles is near a power of the key
+        bar = np.log1p(share + bar) - np.log1p(share)
+        ways, share, wanted = ways[1:], np.log1p(share), float(np.log1p(wanted))
+    told = [tuple(float(back(one)) for one in found) for to, back in ways
+            if (found := _bent(to(at), share, bar, wanted)) is not None]
+    if not told:
+        return low, high
+    return max(min(one[0] for one in told), low), min(max(one[1] for one in told), high)
+
+
+def _bent(at: np.ndarray, share: np.ndarray, bar: np.ndarray, wanted: float) -> tuple | None:
+    """Ends of the places where a curve that bends one way reaches `wanted`, widened by what errors of the cases move
+    them; None where the cases themselves bend both ways. Arguments as of `_interval`."""
+    if _turns(at, share) == 0:
+        return None
+    ends = []
+    for signs in product((-1, 1), repeat=share.size):
+        value = share + np.array(signs) * bar
+        if not min(value[1], value[2]) <= wanted <= max(value[1], value[2]):
+            return None  # its errors leave one of the cases open
+        places = _lines(at, value, wanted)
+        chord, beside = places[0], places[1:]
+        bend = _turns(at, value)
+        if bend == 0:
+            ends += places
+        else:  # the lines beside lie on the other side of the curve than the chord
+            early = bend * np.sign(wanted) > 0
+            ends += [chord, min(beside) if early else max(beside)]
+    return min(ends), max(ends)
+
+
+def _turns(at: np.ndarray, value: np.ndarray) -> int:
+    """1 where a curve through all cases bends up, or is straight, -1 where it bends down, 0 where it does both."""
+    slope = np.diff(value) / np.diff(at)
+    bends, least = np.diff(slope), 1e-9 * np.abs(slope).max()
+    return 1 if (bends >= -least).all() else -1 if (bends <= least).all() else 0
+
+
+def _lines(at: np.ndarray, value: np.ndarray, wanted: float) -> list:
+    """Where the chord between the second and the third case reaches a value, then the line through the first two, then
+    that through the last two where there are four; each no further than these cases."""
+    out = []
+    for one, two in ((1, 2), (0, 1), (2, 3))[:value.size - 1]:
+        slope = (value[two] - value[one]) / (at[two] - at[one])
+        inner = 1 if one < 2 else 2  # the case between which and the limit nothing lies
+        ahead = slope * (value[2] - value[1]) > 0
+        place = at[inner] + (wanted - value[inner]) / slope if ahead else at[2] if inner == 1 else at[1]
+        out.append(float(np.clip(place, at[1], at[2])))
+    return out
+
+
 def _order(one: Allowed) -> tuple:
     """What allows least comes first; of two that reach equally far, that whose limit lies among the cases."""
     return one.beyond is None and one.whole, one.value, one.beyond is None
@@ -167,13 +242,14 @@ def _order(one: Allowed) -> tuple:
 
 def as_json(limits: Limits) -> list:
     """The limits as sweep.json has them, SI: `value` of the key, between the cases `low` and `high`, from which a
-    measure differs by `change`, relative to the first case; `value` is `low` where no case lies between the first one
-    and one beyond the limit."""
+    measure differs by `change`, relative to the first case; the limit is about `value`, and lies between `lower` and
+    `upper` unless the curve has an inflection among these cases."""
     if limits.key is None:
         return []
     size = np.asarray(limits.key["values"], float)
     return [{"measure": one.name, "key": limits.key["name"], "value": one.value, "unit": limits.key["unit"],
-             "change": one.change, "low": float(size[one.inside]), "high": float(size[one.beyond])}
+             "change": one.change, "low": float(size[one.inside]), "high": float(size[one.beyond]),
+             "lower": one.lower, "upper": one.upper}
             for one in limits.found if one.beyond is not None]
 
 
@@ -233,14 +309,18 @@ def _moving(limits: Limits) -> str:
         rest = "the cases with larger values do not show where this limit lies" if sure is None else \
             f"{label(sure.name)} has changed by more than {within} at {_at(limits, sure, float(size[sure.beyond]))}"
         return f"{name} may reach at least {far} {held}; {rest}"
-    between = f"between cases at {_between(limits, least)}"
-    later = "" if last is least or last.beyond is None else f"; {label(last.name)} {_where(limits, last)}"
+    reached = [one for one in ends if one.beyond is not None]
+    soonest = min(reached, key=lambda one: one.upper)
+    early = [label(one.name) for one in reached if one.lower < soonest.upper or one is least]
+    later = "" if last is least or last.beyond is None or label(last.name) in early else \
+        f"; {label(last.name)} {_where(limits, last)}"
+    between = f"the limit lies {_between(limits, least._replace(upper=soonest.upper))}"
     return (f"{name} may reach {_at(limits, least)}{_brackets(_gap(limits, least), between)} {held} "
-            f"(first to change: {label(least.name)}{later})")
+            f"(first to change: {' or '.join(early)}{later})")
 
 
 def _brackets(*parts: str) -> str:
-    told = ", ".join(part for part in parts if part)
+    told = "; ".join(part for part in parts if part)
     return f" ({told})" if told else ""
 
 
@@ -248,7 +328,7 @@ def _at(limits: Limits, one: Allowed, value: float | None = None, down: bool = F
     """A value of the key, that of a limit unless given, with two digits or what its cases resolve; down: rounded down,
     as a limit is."""
     value, down = (one.value, True) if value is None else (value, down)
-    unit, scale = _unit(limits.key, value, one.inside)
+    unit, scale = _unit(limits)
     digits = _digits(limits.key, one)
     return f"{plain(_down(value * scale, digits) if down else value * scale, digits)} {unit}".strip()
 
@@ -261,9 +341,10 @@ def _down(value: float, digits: int) -> float:
     return floor(value / step + 1e-6) * step
 
 
-def _where(limits: Limits, one: Allowed) -> str:
-    """The place of a limit, or the cases at both sides of one that they do not tell."""
-    return f"at {_at(limits, one)}" if isfinite(one.about) else f"between {_between(limits, one)}"
+def _up(value: float, digits: int) -> float:
+    """The least number of so many digits that is no smaller than the value but for round-off."""
+    low = _down(value, digits)
+    return low if not value or value <= low * (1 + 1e-9) else low + 10.0**(floor(log10(abs(value)) + 1e-9) - digits + 1)
 
 
 def _gap(limits: Limits, one: Allowed, value: float | None = None) -> str:
@@ -279,22 +360,47 @@ def _gap(limits: Limits, one: Allowed, value: float | None = None) -> str:
 
 
 def _between(limits: Limits, one: Allowed) -> str:
-    """The cases at both sides of a limit, in its unit."""
-    size = np.asarray(limits.key["values"], float)
-    unit, scale = _unit(limits.key, one.value, one.inside)
-    low, high = (plain(size[place] * scale, _digits(limits.key, one)) for place in (one.inside, one.beyond))
-    return f"{low} and {high} {unit}".strip()
+    """The ends of the interval of a limit in its unit, rounded outwards."""
+    unit, scale = _unit(limits)
+    digits = _digits(limits.key, one)
+    low = _down(one.lower * scale, digits)
+    high = max(_up(one.upper * scale, digits), _up(low * (1 + 1e-8), digits))  # it ends above where it begins
+    return f"between {plain(low, digits)} and {plain(high, digits)} {unit}".strip()
 
 
-def _unit(key: dict, value: float, case: int) -> tuple:
-    """(unit, scale from SI) in which a value of the key is read: that in which the case is written, unless the number
-    would be below LEAST and there is a unit for it; an angle always in the largest in which it is not."""
+def _where(limits: Limits, one: Allowed) -> str:
+    """The interval of a limit, or its lower end where that is all to two digits."""
+    unit, scale = _unit(limits)
+    low, high = _down(one.lower * scale, 2), _up(one.upper * scale, 2)
+    if low > 0 and high - low < 1.5 * 10.0**(floor(log10(low) + 1e-9) - 1):  # of its second digit
+        return f"at {plain(low, 2)} {unit}".strip()
+    return _between(limits, one)
+
+
+def _unit(limits: Limits) -> tuple:
+    """(unit, scale from SI) in which all values of the key are read: that in which its cases are written, unless the
+    least limit would be a number below LEAST and there is a unit for it; an angle always in the largest in which it is
+    not."""
+    key, ends = limits.key, [one for one in limits.found if one.resolved()]
+    first = min([one for one in ends if one.name in MOVES] or ends, key=_order, default=None)
+    value, case = (limits.most, 0) if first is None else (first.value, first.inside)
     written, size = NUMBER.match(str(key["texts"][case])), float(key["values"][case])
     unit, scale = (written[2] or "", float(written[1]) / size) if written and size else (key["unit"], 1.0)
     own = unit.removesuffix("1"), scale
     if LEAST < abs(value * scale) < 1e4 and (key["unit"] != "rad" or unit not in ANGLES):
         return own
     return next((step for step in reversed(LADDERS.get(key["unit"], ())) if LEAST < abs(value * step[1])), own)
+
+
+def in_one_unit(keys: list, limits: Limits) -> list:
+    """The keys, that of the limits with texts in the unit in which the limits are read."""
+    if limits.key is None or not limits.found:
+        return keys
+    unit, scale = _unit(limits)
+    if all(str(text).partition(" ")[2] in ("", unit) for text in limits.key["texts"]):
+        return keys
+    texts = [f"{value * scale:.12g} {unit}" for value in np.asarray(limits.key["values"], float).tolist()]
+    return [one | {"texts": texts} if one["name"] == limits.key["name"] else one for one in keys]
 
 
 def _digits(key: dict, one: Allowed) -> int:
@@ -313,8 +419,7 @@ def table(limits: Limits, measures: dict) -> str:
     key, rows, at = limits.key, [], shown_of(limits.key)
     for one in limits.found:
         if one.beyond is not None:
-            far = f"between {bare(at(one.inside), at(one.beyond))} and {at(one.beyond)}" + (
-                f", at about {_at(limits, one)}" if isfinite(one.about) else "")
+            far = f"{_between(limits, one)} (cases at {bare(at(one.inside), at(one.beyond))} and {at(one.beyond)})"
         else:
             far = "in no case" if one.whole else \
                 f"not up to {at(one.inside)}; the cases with larger values do not show where this change is reached"

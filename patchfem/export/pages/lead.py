@@ -89,6 +89,7 @@ def lead_of(table: dict) -> Lead:
                for name, one in measures.items()}
     limits = allowed.Limits() if table.get("drawn") else \
         allowed.allowed(keys, columns(table), trusted, table["grid"], table.get("patch"))
+    keys = allowed.in_one_unit(keys, limits)
     shown = {one["name"]: shown_of(one) for one in keys if not one["words"]}
 
     def where(case: int) -> str:
