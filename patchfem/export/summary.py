@@ -8,11 +8,13 @@ from functools import cache
 from pathlib import Path
 
 from .. import __version__
+from ..core import Outcome
 from ..disk.installed import installed
 from ..disk.whole import write_text
 from ..effects import EFFECTS
 from ..runs.patch import values
 from ..runs.results.result import Result, choices
+from ..runs.rig.plan import run_away
 
 PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
 
@@ -101,7 +103,14 @@ def summary_of(result: Result) -> dict:
     answer = summary(__version__, what.model.source.title, what.kind, str(result.outcome), result.measures,
                      effects_of(result), list(what.not_in_scene), (result.warnings, result.extra.get("notes", [])),
                      result.seconds)
-    return answer | {"numerics": choices(result)} | contact_of(result)
+    return answer | {"numerics": choices(result)} | contact_of(result) | run_away_of(result)
+
+
+def run_away_of(result: Result) -> dict:
+    """{"run_away": {"drive": acceleration of the base, "knee": that above which friction alone does not limit the
+    amplitude at resonance}} [m s-2] of a motion that did not settle above it; {} of any other."""
+    found = run_away(result.plan.model) if result.outcome in (Outcome.TRANSIENT, Outcome.GROWS) else {}
+    return {"run_away": found} if found and found["drive"] > found["knee"] else {}
 
 
 def contact_of(result: Result) -> dict:

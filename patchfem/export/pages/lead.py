@@ -6,18 +6,20 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...core import Outcome
 from ...runs.many.answers import FAILED
 from ...scales import LADDERS, plain, step_of
 from .. import missed
 from ..written import NUMBER, bare, label
 from . import allowed, peaks, ranked
 from .changes import changes, shown_of, varies
-from .words import joined, short, zero_below
+from .words import both, joined, short, zero_below
 
 EXACT = 1e-6  # of a value, up to which no error is told: the values are shown to four digits
 AT = 1e-9  # of a frequency, within which two are one
 AWAY = 0.01  # of the length of the patch, from which on it is said that the centre of its pressure moves
 SETTLED = ranked.SETTLES
+MOVING = Outcome.TRANSIENT.value, Outcome.GROWS.value  # outcomes of cases that move on when their run ends
 FIRST = ("relative_displacement_amplitude", "loop_area", "friction_ratio_peak", "onset_level", "pressure_peak")
 
 
@@ -28,7 +30,8 @@ class Lead(NamedTuple):
     peak: what matters most, where nine in ten drawn cases lie, where a swept frequency has its peak, in sentences;
     left: how many cases have no answer yet, and that none has settled; least: where the motion is least; asked: the
     measure that the sweep was asked about, "" unless it was; passed: what is beyond its limit in the second case;
-    place: how the centre of the pressure moves; ends: how many curves over frequency are largest at an end."""
+    place: how the centre of the pressure moves; ends: how many curves over frequency are largest at an end;
+    grown: which cases have not settled and move farther than those that have."""
 
     missed: dict
     misses: str
@@ -48,6 +51,7 @@ class Lead(NamedTuple):
     passed: str = ""
     place: str = ""
     ends: str = ""
+    grown: str = ""
 
     def sentences(self) -> list:
         """What people read, the answer first, then whether all cases meet the tolerance, then what else is known."""
@@ -75,7 +79,7 @@ class Lead(NamedTuple):
         first = (drawn or [self.span]) if self.asked and (drawn or self.span) else \
             [self.limit or self.peak or self.least] if self.limit or self.peak or self.least else \
             drawn or [self.span or self.turns]
-        return [one for one in first if one]
+        return [one for one in (self.grown, *first) if one]
 
 
 def lead_of(table: dict) -> Lead:
@@ -106,7 +110,8 @@ def lead_of(table: dict) -> Lead:
                 changes(keys, columns(table), outcome, table["grid"]), *ranks,
                 tops, joined([one for one in (peaks.sentence(tops), edge) if one]), left,
                 least(keys, inside, trusted, shown), table.get("first", ""), allowed.passed(limits),
-                place(keys, columns(table), trusted, shown, table.get("patch", {})), ends)
+                place(keys, columns(table), trusted, shown, table.get("patch", {})), ends,
+                "" if table.get("drawn") else grown(keys, columns(table), outcome, shown, table.get("knee", np.nan)))
 
 
 def _inside(table: dict) -> tuple:
@@ -156,7 +161,7 @@ def span(measures: dict, trusted: dict, settled: np.ndarray, names: Sequence = F
             return ""
         values, errors, unit = (part if isinstance(part, str) else np.asarray(part, float)[there]
                                 for part in measures[name])
-        low, high = (short(name, one, unit, 4) for one in (values.min(), values.max()))
+        low, high = both(name, values.min(), values.max(), unit, 4)
         alike = there.sum() > 1  # of one case nothing runs
         ran = f"ranges from {low} to {high}" if low != high else f"is {high} throughout" if alike else f"is {high}"
         known = np.isfinite(errors) & (errors > 0) & (np.abs(values) > zero_below(name))  # 0 is known absolutely
@@ -168,6 +173,32 @@ def span(measures: dict, trusted: dict, settled: np.ndarray, names: Sequence = F
             f" in the {'only case that meets' if counts == 1 else 'cases that meet'} the tolerance"
         return f"{ranked.called(name).capitalize()}{whose} {ran}{band}."
     return ""
+
+
+def grown(keys: list, measures: dict, outcome: np.ndarray, shown: dict, knee: float = np.nan) -> str:
+    """Which cases have not settled and how far they move at their end, where that is farther than any case that has
+    settled; "" where there are none. knee: of `sweeps.tables.knee`; the others as of `least`."""
+    name, settled, moving = FIRST[0], np.isin(outcome, SETTLED), np.isin(outcome, MOVING)
+    if name not in measures:
+        return ""
+    values, _, unit = measures[name]
+    values = np.asarray(values, float)
+    cases = np.flatnonzero(moving & np.isfinite(values))
+    most = values[settled & np.isfinite(values)]
+    if not cases.size or not most.size or values[cases].max() <= most.max():
+        return ""
+    low, high = both(name, values[cases].min(), values[cases].max(), unit, 4)
+    ends = f"{label(name)} at the end of the run is " + (high if low == high else f"{low} to {high}")
+    swept = [one for one in keys if varies(one)]
+    order = np.argsort(np.asarray(swept[0]["values"], float), kind="stable") if len(swept) == 1 else np.zeros(0, int)
+    first = int(np.argmax(moving[order])) if order.size else 0
+    if not first or swept[0]["name"] not in shown or not moving[order[first:]].all():
+        count = int(moving.sum())
+        return f"{count} of {outcome.size} cases did not settle; their {ends}."
+    key, (before, start) = swept[0]["name"], (shown[swept[0]["name"]](int(one)) for one in order[first - 1:first + 1])
+    why = f"above {short('', knee, 'm s-2', 4)} friction alone does not limit the amplitude at resonance; " \
+        if np.isfinite(knee) else ""
+    return f"From {key} {start} on (not yet at {bare(before, start)}) the motion does not settle: {why}its {ends}."
 
 
 def place(keys: list, measures: dict, trusted: dict, shown: dict, patch: dict) -> str:

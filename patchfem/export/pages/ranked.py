@@ -10,7 +10,7 @@ from ...scales import fitting, plain
 from ..written import NUMBER, label
 from . import document
 from .changes import shown_of, varies
-from .words import is_share, joined, linked, short
+from .words import both, is_share, joined, linked, short
 
 RANKED = ("relative_displacement_amplitude", "loop_area", "equivalent_damping", "absolute_acceleration_peak",
           "friction_ratio_peak", "onset_level", "pressure_peak", "contact_fraction", "normal_stiffness",
@@ -183,7 +183,7 @@ def scatter(found: dict, of: int, settled: bool = True, names: tuple = SPREAD) -
                 "the results is not known.")
     for name in [name for name in names if name in found]:
         unit, (low, _, high), count, misses = found[name]
-        low, high = (short(name, one, unit, 3) for one in (low, high))
+        low, high = both(name, low, high, unit, 3)
         some = [f"in the {count} that have one"] * (count < most) + \
             [f"{misses} of {count} miss the tolerance and are included with their values" if misses > 1 else
              f"1 of {count} misses the tolerance and is included with its value"] * (misses > 0)

@@ -82,6 +82,16 @@ def short(name: str, value: float, unit: str, digits: int) -> str:
     return scales.short(value, unit, digits, zero_below(name))
 
 
+def both(name: str, low: float, high: float, unit: str, digits: int) -> tuple:
+    """Two values [SI] as `short` writes them, in one unit unless one of them is a thousand times the other."""
+    texts = tuple(short(name, one, unit, digits) for one in (low, high))
+    if is_share(name) or unit not in scales.LADDERS or texts[0].partition(" ")[2] == texts[1].partition(" ")[2] \
+            or "0" in texts or abs(high) > 1000 * abs(low):
+        return texts
+    own, scale = scales.fitting(max(abs(low), abs(high)), unit)
+    return tuple(f"{scales.plain(one * scale, digits)} {own}" for one in (low, high))
+
+
 def pair(name: str, measure: dict) -> str:
     """A measure with its error in the first of its units, such as `14.808 ± 0.041 um`; a dash without a value."""
     value, error = texts(name, measure)
@@ -118,6 +128,10 @@ def verdict(summary: dict) -> str:
     outcome, measures = Outcome(summary["outcome"]), summary["measures"]
     if summary["kind"] == "bench" and outcome is Outcome.DONE:
         return _slid(measures.get("slip_amplitude"), outcome.sentence, "contact_fraction" in measures)
+    if away := summary.get("run_away"):
+        drive, knee = (short("", away[name], "m s-2", 4) for name in ("drive", "knee"))
+        return (f"{outcome.sentence} The drive, {drive}, is larger than {knee}, above which friction alone does not "
+                "limit the amplitude at resonance.")
     if outcome is not Outcome.STUCK or not {"loop_area", "slip_amplitude"} & measures.keys():
         return outcome.sentence
     force, motion = (measures.get(name, {}).get("value") or 0.0 for name in

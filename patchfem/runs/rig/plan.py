@@ -23,6 +23,7 @@ RESAMPLED = *OF_EVENTS, "smooth"  # engines whose last cycles are kept at SAMPLE
 SAMPLES = 400  # of a kept cycle, of `dynamics.events.histories` and `dynamics.smooth`
 CURVE = 160, 250  # points over a frequency, with those that its bends and its peak ask for: by a map, by a balance
 MARCHED = 400.0  # cycles of the marches until a motion repeats, of all steps
+RESONANT = 0.02  # of the frequency of a mode, within which a sine drives it at resonance
 STIFF = 10.0  # times the stiffness of the mode, from which a link holds the block
 
 
@@ -147,6 +148,17 @@ def groups(model: Model) -> dict:
     if f is not None and f.bond_length:
         out["drive_amplitude_over_bond_length"] = largest(rig.drive) / omega_of(rig.drive)**2 / f.bond_length
     return out
+
+
+def run_away(model: Model) -> dict:
+    """{`drive`: acceleration of the base, `knee`: that above which friction alone does not limit the amplitude} [m s-2]
+    of one mode that a sine drives at its resonance; {} of another rig."""
+    rig = model.rig
+    if rig is None or rig.waveform != "sine" or rig.force or rig.modes.omega.size != 1 or not rig.by_modes \
+            or abs(rig.own_frequency * rig.drive.period - 1) > RESONANT:
+        return {}
+    knee = groups(model).get("knee")
+    return {} if knee is None else {"drive": float(largest(rig.drive)), "knee": float(knee)}
 
 
 def _lever(rig) -> float:

@@ -276,3 +276,36 @@ def test_exact_the_ends_of_swept_frequencies_are_read_back(tmp_path):
     said = "n 1 of 2 cases the largest response lies at an end of the swept frequencies"
     assert said in answer.out
     assert said in lead_of(read_table(tmp_path / "out")).answer()
+
+
+def test_always_motions_that_run_away_are_told_before_those_that_settle(tmp_path):
+    """Of the shipped rig friction alone does not limit the motion above 4 mu N / (pi m) = 5.067 g. The amplitude of the
+    settled cases was told as that of all: up to 20 um beside motions of millimetres."""
+    scene = tmp_path / "rig.toml"
+    scene.write_text(text_of("rig"), "utf-8")
+    answer = cli("sweep", scene, "--over", "drive.acceleration=3 g,4 g,5 g,5.5 g,6 g", "-o", tmp_path / "out")
+    knee = 4 * 0.3 * 115 / (np.pi * 0.884 * 9.80665)
+    assert f"{knee:.4g}" == "5.067"
+    first = answer.out.splitlines()[0]
+    assert first.startswith("From drive.acceleration 5.5 g on (not yet at 5) the motion does not settle: above 5.067 g "
+                            "friction alone does not limit the amplitude at resonance; its relative displacement "
+                            "amplitude at the end of the run is 0.8564 mm to 1.845 mm; relative displacement amplitude "
+                            "of the settled cases ranges from 0 to")
+    assert lead_of(read_table(tmp_path / "out")).answer() == first
+    said = cli("run", scene, "--set", "drive.acceleration=6 g", "-o", tmp_path / "run").out
+    assert "The drive, 6 g, is larger than 5.067 g, above which friction alone does not limit the amplitude" in said
+    assert "limit the amplitude" not in cli("run", scene, "-o", tmp_path / "below").out
+
+
+def test_exact_unsettled_cases_that_are_no_end_of_the_key_are_counted():
+    name, size = "relative_displacement_amplitude", np.array([1.0, 2.0, 3.0, 4.0])
+    keys = [key("normal.load", size, [f"{one:g} N" for one in size]) | {"unit": "N"}]
+
+    def said(outcome, values):
+        table = {"keys": keys, "grid": True, "outcome": outcome, "messages": {}, "folders": None, "tolerance": 0.01,
+                 "measures": {name: {"unit": "m", "means": "", "values": np.array(values), "errors": np.zeros(4)}}}
+        return lead_of(table).answer()
+
+    assert said(["transient", "steady", "transient", "steady"], [2e-3, 1e-6, 3e-3, 2e-6]).startswith(
+        "2 of 4 cases did not settle; their relative displacement amplitude at the end of the run is 2 mm to 3 mm; ")
+    assert "did not settle" not in said(["transient", "steady", "transient", "steady"], [1e-6, 2e-6, 1e-6, 3e-6])
