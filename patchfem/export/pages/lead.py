@@ -102,15 +102,16 @@ def lead_of(table: dict) -> Lead:
 
     tops, edge = (find(keys, columns(table), trusted, table["grid"]) for find in (peaks.found, peaks.edge))
     ranks = ranked.told(table, trusted, settled)
-    left = _left(table, outcome, ranks[1] == ranked.too_few(table, settled))
     inside, ends = _inside(table)
+    lowest = least(keys, inside, trusted, shown)
+    top = peaks.sentence(tops) or ("" if lowest or table.get("drawn") else peaks.over(keys, inside, trusted, shown))
+    left = _left(table, outcome, ranks[1] == ranked.too_few(table, settled))
     return Lead(missed.counted(measures, tolerance), missed.sentence(measures, tolerance, where), limits,
                 allowed.sentence(limits),
                 span(columns(table), trusted, settled, ranked.asked_first(FIRST, table)),
                 changes(keys, columns(table), outcome, table["grid"]), *ranks,
-                tops, joined([one for one in (peaks.sentence(tops), edge) if one]), left,
-                least(keys, inside, trusted, shown), table.get("first", ""), allowed.passed(limits),
-                place(keys, columns(table), trusted, shown, table.get("patch", {})), ends,
+                tops, joined([one for one in (top, edge) if one]), left, lowest, table.get("first", ""),
+                allowed.passed(limits), place(keys, columns(table), trusted, shown, table.get("patch", {})), ends,
                 "" if table.get("drawn") else grown(keys, columns(table), outcome, shown, table.get("knee", np.nan)))
 
 

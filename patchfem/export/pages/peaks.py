@@ -18,13 +18,15 @@ LEAST = 5  # frequencies that show a peak
 SURE = 3.0  # times what polynomials differ by
 NEWTON = 30  # steps from a vertex, or a straight line's crossing
 NAMED = 4  # values of another key in the sentence
+OPEN = "not resolved by these cases"
 KNOWN = 0.01  # of a steady estimate, up to which it tells the height of a peak
 
 
 class Peak(NamedTuple):
     """The peak along one line of cases: name of the measure; what the other keys are; frequency [Hz], its distance to
     the next cases [Hz], height [SI], half-power width [Hz], NaN where a side stays above it, each with its error, NaN
-    where cases beside the largest do not count; unit of the height."""
+    where cases beside the largest do not count; unit of the height; open: the curve falls to
+    peak/sqrt2 on both sides, but so fast that the cases do not tell its width."""
 
     name: str
     held: str
@@ -33,6 +35,7 @@ class Peak(NamedTuple):
     height: tuple
     width: tuple
     unit: str
+    open: bool = False
 
 
 def found(keys: list, measures: dict, trusted: dict, grid: bool) -> list:
@@ -49,7 +52,8 @@ def found(keys: list, measures: dict, trusted: dict, grid: bool) -> list:
         if peak is not None:
             held = ", ".join(f"{one['name']} {one['texts'][line[0]] if one['words'] else shown[one['name']](line[0])}"
                              for one in others)
-            out.append(Peak(name, held, *peak, measures[name][2]))
+            *known, falls = peak
+            out.append(Peak(name, held, *known, measures[name][2], falls))
     return out
 
 
@@ -66,8 +70,9 @@ def _heights(name: str, measures: dict, trusted: dict) -> tuple:
 
 
 def _peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) -> tuple | None:
-    """((frequency, its error), distance of the cases there, (height, its error), (half-power width, its error)) of the
-    largest value inside the range, NaN where a case beside it has none, None where it stands at an end.
+    """((frequency, its error), distance of the cases there, (height, its error), (half-power width, its error), whether
+    the cases fall that far on both sides, though they do not tell it) of the largest value inside the range, NaN where
+    a case beside it has none, None where it stands at an end.
 
     By the parabola of 1/y^2 over f^2 through it and its neighbours, which one mode has. What polynomials through more
     cases, or those on one side, tell otherwise is its error, beside that of the cases.
@@ -79,7 +84,7 @@ def _peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) -> tuple
         return None
     nowhere = (np.nan, np.nan)
     if not there[np.flatnonzero(there)[top] + np.array([-1, 1])].all():
-        return nowhere, np.nan, nowhere, nowhere
+        return nowhere, np.nan, nowhere, nowhere, False
     between, off = float(x[top + 1] - x[top - 1]) / 2, float(np.nanmax(error[there][top - 1:top + 2]) / y[top])
     square, g = x**2 - x[top]**2, (y[top] / y)**2
     at, least = _lowest(square, g, top, top - 1, top + 2) or (0.0, 1.0)
@@ -91,12 +96,13 @@ def _peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) -> tuple
     place, high = float(places[0]), float(heights[0])
     apart = SURE * float(np.ptp(heights)) + (high * (1 - (y[top - 1:top + 2] / high).min()) if lost else 0.0)
     ends = [_crossing(square[top::step], g[top::step], x[top], (y[top] / high)**2) for step in (-1, 1)]
-    width = float(ends[1][0] - ends[0][0])
+    width, deep = float(ends[1][0] - ends[0][0]), frequency[height <= high / 2**0.5]
+    falls = bool(np.isnan(width) and deep.size and deep.min() < x[top] < deep.max())
     slack = off + apart / high  # of the height: a crossing moves by as much of the width on each side
     wide = (width, ends[0][1] + ends[1][1] + 2 * width * slack)
     moved = SURE * float(np.ptp(places)) + (between if lost else 0.0)
     moved += slack * (width if np.isfinite(width) else between)
-    return (place, moved), between, (high, apart + off * high), wide
+    return (place, moved), between, (high, apart + off * high), wide, falls
 
 
 def _lowest(square: np.ndarray, g: np.ndarray, top: int, low: int, high: int) -> tuple | None:
@@ -214,7 +220,32 @@ def _high(one: Peak) -> str:
 
 
 def _width(one: Peak) -> str:
-    return f", half-power width {told(*one.width, unit='Hz')}" if np.isfinite(one.width[0]) else ""
+    if np.isfinite(one.width[0]):
+        return f", half-power width {told(*one.width, unit='Hz')}"
+    return f", half-power width {OPEN}" if one.open else ""
+
+
+def over(keys: list, measures: dict, trusted: dict, shown: dict) -> str:
+    """The peak frequency of curves of steady motions at both ends of the one key of numbers that is swept, and from
+    where to where a curve has no peak because nothing moves; "" without such curves.
+
+    keys, measures, trusted: as of `allowed.allowed`; shown: {name: `shown_of` the key}.
+    """
+    swept, name = [one for one in keys if varies(one)], "peak_frequency"
+    if len(swept) != 1 or swept[0]["name"] not in shown or name not in measures:
+        return ""
+    order = np.argsort(np.asarray(swept[0]["values"], float), kind="stable")
+    (value, error, unit), height = measures[name], measures[HEIGHTS[0]]
+    known = [int(case) for case in order if np.isfinite(value[case]) and trusted[name][case]]
+    if len(known) < 2:
+        return ""
+    key, at = swept[0]["name"], shown[swept[0]["name"]]
+    first, last = (f"{told(value[case], error[case], unit=unit)} with {key} {at(case)} "
+                   f"({short(height[0][case], height[2], 4)})" for case in (known[0], known[-1]))
+    still = [int(case) for case in order if height[0][case] == 0 and not np.isfinite(value[case])]
+    ends = [at(case) for case in (still[:1] + still[-1:] if len(still) > 1 else still)]
+    lost = f"; with {key} {' to '.join(ends)} the output does not move, so there is no peak" if still else ""
+    return f"{label(HEIGHTS[0]).capitalize()} peaks at {first} and at {last}{lost}."
 
 
 def table(peaks: list) -> str:
@@ -223,7 +254,9 @@ def table(peaks: list) -> str:
         return ""
     cells_of = [(told(*one.frequency, unit="Hz"), _high(one)) if np.isfinite(one.height[0]) else ("not known",) * 2
             for one in peaks]
-    rows = [[escape(one.held), *cells, told(*one.width, unit="Hz") if np.isfinite(one.width[0]) else "&ndash;"]
+    rows = [[escape(one.held), *cells, told(*one.width, unit="Hz") if np.isfinite(one.width[0]) else
+             f"{OPEN}; add cases near {plain(one.frequency[0], 4)} Hz" if one.open else
+             "reaches beyond the swept frequencies" if np.isfinite(one.height[0]) else "&ndash;"]
             for one, cells in zip(peaks, cells_of)]
     return (f"<p class=soft>The largest {linked(label(peaks[0].name), peaks[0].name)} of each curve is found from a "
             "parabola of 1/y&sup2; against f&sup2; through the case with the largest value and its two neighbours in "

@@ -133,7 +133,8 @@ def _lead(table: dict, said: Lead) -> str:
 
 def _cases(table: dict) -> str:
     """The first cases as a table with their keys, outcome and the measures that change from case to case."""
-    shown = [name for name in ranked.asked_first(FIRST, table) if name in table["measures"]]
+    shown = [name for name in ranked.asked_first((FIRST[0], "peak_frequency", *FIRST[1:]), table)
+             if name in table["measures"]]
     shown += [name for name, one in table["measures"].items() if name not in shown and _changes(one["values"])]
     shown = shown[:6]
     few = slice(LISTED)

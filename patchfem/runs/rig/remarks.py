@@ -50,7 +50,7 @@ def peak_at_an_end(run, modes) -> list:
     run: a `rig.Coupled`; modes() -> them, as `plan.modes_of` does.
     """
     found, drive = run.measures.get("peak_frequency"), run.model.rig.drive
-    at = None if found is None else at_an_end(found.value, drive.low, drive.high)
+    at = None if found is None or found.value is None else at_an_end(found.value, drive.low, drive.high)
     if at is None or not run.measures["relative_displacement_amplitude"].value > 0:
         return []
     upper, key = at == max(drive.low, drive.high), "drive.from" if at == drive.low else "drive.to"

@@ -10,6 +10,7 @@ from ...response.reasons import SHARED
 from ...response.rows import Seen
 from ...structure.drive_sizes import omega_of, sinusoidal, whole
 
+NO_PEAK = "the output does not move at any of the swept frequencies, so there is no peak"
 OF_OTHERS = 3.0  # times the way that a peak moves by a coarser mesh or fewer modes
 
 
@@ -113,7 +114,7 @@ def sampled_loop(window, drive, work: float, force: complex | None = None) -> tu
 
 
 def curve_measures(extra: dict, coarser=()) -> dict:
-    """Measure of a curve of steady motions: the frequency [Hz] of its largest amplitude.
+    """Measure of a curve of steady motions: the frequency [Hz] of its largest amplitude, no value where that is 0.
 
     extra: of a Solution; {} without a curve; coarser: Solutions of coarser runs, which have their peak elsewhere.
     """
@@ -121,5 +122,7 @@ def curve_measures(extra: dict, coarser=()) -> dict:
         return {}
     at, others = (np.array([one["at"].omega for one in every]) / (2 * np.pi)
                   for every in ([extra], [one.extra for one in coarser if "at" in one.extra]))
+    if extra["at_error"] is None:
+        return {"peak_frequency": Measure(None, "Hz", None, 0.0, reason=NO_PEAK)}
     error = extra["at_error"] + OF_OTHERS * float(np.abs(others - at).max(initial=0.0))
     return {"peak_frequency": Measure(float(at[0]), "Hz", error, 0.0)}

@@ -309,3 +309,42 @@ def test_exact_unsettled_cases_that_are_no_end_of_the_key_are_counted():
     assert said(["transient", "steady", "transient", "steady"], [2e-3, 1e-6, 3e-3, 2e-6]).startswith(
         "2 of 4 cases did not settle; their relative displacement amplitude at the end of the run is 2 mm to 3 mm; ")
     assert "did not settle" not in said(["transient", "steady", "transient", "steady"], [1e-6, 2e-6, 1e-6, 3e-6])
+
+
+def test_exact_a_width_that_the_cases_do_not_tell_has_its_reason():
+    """A peak of 1 Hz between cases 5 Hz apart, and a curve whose cases end above peak/sqrt2. Both stood as a dash."""
+    x, name = np.linspace(80, 120, 9), "relative_displacement_amplitude"
+    wide = np.linspace(98, 102, 9)
+
+    def table(at, centre, damping):
+        keys = [key("drive.frequency", at)]
+        found = peaks.found(keys, {name: (curve(at, centre, damping), 0 * at, "m")}, {name: np.ones(9, bool)}, True)
+        return peaks.sentence(found), peaks.table(found)
+
+    said, rows = table(x, 102.4, 0.005)
+    assert "half-power width not resolved by these cases" in said and "; add cases near 102.4 Hz" in rows
+    said, rows = table(wide, 100.2, 0.05)
+    assert "half-power" not in said and "reaches beyond the swept frequencies" in rows
+
+
+def test_always_a_sweep_over_levels_names_the_peak_frequency_at_both_ends(tmp_path):
+    """Up to 3 g the block sticks at all frequencies: the first of them, 100.0 +- 0 Hz, was given as its peak."""
+    scene = tmp_path / "rig.toml"
+    scene.write_text(text_of("rig"), "utf-8")
+    swept = ["drive.waveform=sweep", "drive.from=100 Hz", "drive.to=200 Hz", "drive.rate=1 Hz/s",
+             "accuracy.method=harmonic"]
+    answer = cli("sweep", scene, *(word for one in swept for word in ("--set", one)), "--over",
+                 "drive.acceleration=2 g,3 g,6 g,8 g", "-o", tmp_path / "out")
+    first = answer.out.splitlines()[0]
+    assert first.startswith("Relative displacement amplitude peaks at 142.973 Hz with drive.acceleration 6 g (1.889 "
+                            "mm) and at 142.99")
+    assert ("Hz with drive.acceleration 8 g (5.938 mm); with drive.acceleration 2 g to 3 g the output does not move, so "
+            "there is no peak") in first
+    table = read_table(tmp_path / "out")
+    assert np.isnan(table["measures"]["peak_frequency"]["values"][:2]).all()
+    text = (tmp_path / "out" / "report.html").read_text("utf-8")
+    cases = text[text.index("id=cases"):] if "id=cases" in text else text[text.index(">Cases<"):]
+    assert "peak frequency [Hz]" in cases[:cases.index("</table>")].replace("</a>", "")
+    said = cli("run", scene, *(word for one in swept for word in ("--set", one)), "--set", "drive.acceleration=2 g",
+               "-o", tmp_path / "run").out
+    assert "peak_frequency                     - (the output does not move at any of the swept frequencies" in said
