@@ -204,7 +204,7 @@
     worded(fig.xaxis, x);
     const made = source(cases, m, {x: cases.map((i) => x.values[i]), y: cases.map((i) => m.values[i] ?? NaN),
       colour: cases.map((i) => bad(i) ? ink("--warm") : ink("--accent")),
-      shade: cases.map((i) => beside ? beside.values[i] : 0),
+      shade: cases.map((i) => beside ? beside.values[i] : 0), stroke: cases.map((i) => bad(i) ? 2 : beside ? 0.5 : 1),
       filled: cases.map((i) => m.over[i] ? 0 : 0.75), ...spread(cases, m)});
     fig.segment({field: "x"}, {field: "low"}, {field: "x"}, {field: "high"}, {source: made, line_color: ink("--soft")});
     let fill = {field: "colour"};
@@ -216,12 +216,12 @@
       bar(fig, mapper, named(beside));
     }
     const dots = fig.scatter({field: "x"}, {field: "y"}, {source: made, size: count > 2000 ? 4 : 7, fill_color: fill,
-      line_color: {field: "colour"}, line_width: beside ? 0.5 : 1, fill_alpha: {field: "filled"}});
+      line_color: {field: "colour"}, line_width: {field: "stroke"}, fill_alpha: {field: "filled"}, marker: {field: "marker"}});
     hover(fig, m, [dots]);
     return fig;
   }
 
-  function told(cases, x, beside, m) {           // the picture in words, for those who hear the page
+  function told(cases, x, beside, m, mapped) {           // the picture in words, for those who hear the page
     const found = cases.filter((i) => m.values[i] !== null);
     if (!found.length) return `No value in these ${cases.length} cases.`;
     const lowest = found.reduce((a, b) => m.values[b] < m.values[a] ? b : a);
@@ -232,8 +232,8 @@
     const some = `${cases.length} ${data.whole ? "" : "drawn "}cases`;
     return `Against ${x.label}: lowest value ${value(lowest)} at ${where(lowest)}; highest value ` +
       `${value(highest)} at ${where(highest)}.` + (off ? ` ${off} of ${some} did not ` +
-      "settle (shaded or hatched)." : "") + (open ? ` ${open} of ${some} miss the tolerance ` +
-      "(hollow or dotted)." : "");
+      `settle (${mapped ? "hatched" : "crosses"}).` : "") + (open ? ` ${open} of ${some} miss the tolerance ` +
+      `(${mapped ? "dotted" : "hollow"}).` : "");
   }
 
   function draw() {
@@ -251,7 +251,7 @@
     const value = (i) => `${within(m.values[i], m.errors[i], m.least)} ${m.unit}`.trim();
     const zero = !away.length ? "" : ` Not drawn on a logarithmic axis: ${away.length === 1 ?
       `the case at ${x.label} ${x.texts[away[0]]}, ${value(away[0])}` : `${away.length} cases with values of 0 or below`}.`;
-    const words = told(cases, x, beside, m) + zero;
+    const words = told(cases, x, beside, m, mapped) + zero;
     at("means").textContent = `${m.means ? `${m.means[0].toUpperCase()}${m.means.slice(1)}. ` : ""}${words}`;
     at("chart").setAttribute("aria-label", `${m.label}: ${words}`);
     put(make, at("chart"));

@@ -105,14 +105,16 @@ def lead_of(table: dict) -> Lead:
     inside, ends = _inside(table)
     lowest = least(keys, inside, trusted, shown)
     top = peaks.sentence(tops) or ("" if lowest or table.get("drawn") else peaks.over(keys, inside, trusted, shown))
+    ran = span(columns(table), trusted, settled, ranked.asked_first(FIRST, table))
+    far = grown(keys, columns(table), outcome, shown, table.get("knee", np.nan))
     left = _left(table, outcome, ranks[1] == ranked.too_few(table, settled))
     return Lead(missed.counted(measures, tolerance), missed.sentence(measures, tolerance, where), limits,
                 allowed.sentence(limits),
-                span(columns(table), trusted, settled, ranked.asked_first(FIRST, table)),
+                joined([one for one in (far if table.get("drawn") else "", ran) if one]),
                 changes(keys, columns(table), outcome, table["grid"]), *ranks,
                 tops, joined([one for one in (top, edge) if one]), left, lowest, table.get("first", ""),
                 allowed.passed(limits), place(keys, columns(table), trusted, shown, table.get("patch", {})), ends,
-                "" if table.get("drawn") else grown(keys, columns(table), outcome, shown, table.get("knee", np.nan)))
+                "" if table.get("drawn") else far)
 
 
 def _inside(table: dict) -> tuple:

@@ -138,6 +138,9 @@ def sentence(ranks: dict, left: int = 0, moves: bool = True) -> str:
     said += [f"then on {one.key} ({percent(one)})" for one in others[:NAMED - 1]]
     if len(others) >= NAMED:
         said.append(f"least on {others[-1].key} ({percent(others[-1])})")
+    if sum(round(100 * each.total) for each in ranks[name]) > 100:
+        said.append("where each share includes interactions between keys, so that the shares can sum to more than "
+                    "100 %")
     one = left == 1
     why = f"ha{'s' if one else 've'} not settled {'is' if one else 'are'} included with {'its' if one else 'their'} " \
         f"last value{'s' * (not one)}" if moves else f"miss{'es' * one} the tolerance {'is' if one else 'are'} included"
@@ -220,16 +223,20 @@ def _range(one) -> str:
     return "&ndash;" if one.low == one.high else f"{100 * one.low:.0f} to {100 * one.high:.0f} %"
 
 
-def spread(found: dict) -> str:
-    """Quantiles, as `quantiles` gives them, as a table; "" where there are none."""
-    rows = []
+def spread(found: dict, of: int) -> str:
+    """Quantiles of `of` drawn cases, as `quantiles` gives them, as a table; "" where there are none. Where those that
+    are left out may be its ends none is told: a measure that only some motions have is told of these."""
+    rows, most = [], max((one[2] for one in found.values()), default=0)
     for name, (unit, values, count, misses) in found.items():
-        of, scale = ("%", 100.0) if is_share(name) else fitting(float(np.abs(values).max()), unit)
-        rows.append([linked(label(name), name), *(plain(one * scale, 4) for one in values.tolist()), escape(of),
-                     str(count), str(misses)])
+        in_unit, scale = ("%", 100.0) if is_share(name) else fitting(float(np.abs(values).max()), unit)
+        known = ["not known"] * len(ENDS) if most < SETTLED * of else [plain(one * scale, 4) for one in values.tolist()]
+        rows.append([linked(label(name), name), *known, escape(in_unit), str(count), str(misses)])
     if not rows:
         return ""
+    left = "" if most >= SETTLED * of else (
+        f" {of - most} of {of} cases do not count, perhaps those with the largest motion, so that these values are not "
+        "known; with more cycles (drive.cycles) more cases may settle.")
     return (document.table(("measure", ">5 %", ">half", ">95 %", "unit", ">cases", ">miss the tolerance"), rows, "wide")
-            + "<p class=soft>The curve gives, for each value, the fraction of the random cases with a smaller value. "
-              "If any case has settled, only settled cases count. Cases that miss the tolerance are included with "
-              "their values.</p>")
+            + "<p class=soft>The columns 5 %, half and 95 % give the values below which so many of the random cases "
+              "lie. If any case has settled, only settled cases count. Cases that miss the tolerance are included with "
+              f"their values.{left}</p>")

@@ -38,7 +38,8 @@ def page(table: dict, told: Lead | None = None) -> str:
                 *_change(table, told.limits),
                 *(Section(*one) for one in (("peaks", "Peaks", peaks.table(told.peaks)),
                                             ("ranking", "Keys that matter most", ranked.picture(told.ranks)),
-                                            ("scatter", "Scatter of the answers", ranked.spread(told.spread)))
+                                            ("scatter", "Scatter of the answers",
+                                             ranked.spread(told.spread, len(table["outcome"]))))
                   if one[2]),
                 Section("cases", "Cases", _cases(table)),
                 Section("measures", "What the measures mean", _meanings(table)),
