@@ -3,7 +3,7 @@
 import numpy as np
 
 from ..core import allowed
-from ..scales import plain
+from ..scales import plain, short
 from .written import label
 
 # what a case answers first, named before what misses its tolerance by more
@@ -26,6 +26,21 @@ def over(one: dict, tolerance) -> np.ndarray:
         return errors > allowed(tolerance, values, floors)  # no comparison with NaN holds
 
 
+def by_floor(one: dict, tolerance) -> np.ndarray:
+    """(n,) whether an error is more than tolerance * |value| and meets the tolerance by the floor of its measure alone,
+    where the value is above this floor, so that a reader sees it with that error. Arguments as of `over`."""
+    values, errors = (np.asarray(one[name], float) for name in ("values", "errors"))
+    floors = np.nan_to_num(np.asarray(one.get("floors", 0.0), float))
+    with np.errstate(invalid="ignore"):
+        return (errors > tolerance * np.abs(values)) & (np.abs(values) > floors) & ~over(one, tolerance)
+
+
+def floor_of(one: dict, cases: np.ndarray) -> str:
+    """The largest floor of a measure in some cases (n,) as people read it."""
+    floors = np.broadcast_to(np.asarray(one.get("floors", 0.0), float), cases.shape)
+    return short(float(floors[cases].max()), one.get("unit", "1"), 2)
+
+
 def counted(measures: dict, tolerance) -> dict:
     """{measure: {`count` of cases over the tolerance, `worst`: their largest error/|value|, None where all are 0}} of
     the measures that miss it anywhere; measures: {name: as `over` takes it}."""
@@ -37,11 +52,12 @@ def counted(measures: dict, tolerance) -> dict:
     return out
 
 
-def sentence(measures: dict, tolerance, where) -> str:
+def sentence(measures: dict, tolerance, where, first: str = "") -> str:
     """How many cases miss the tolerance in the worst measure of those that answer first, where it is worst and how many
     other measures miss it; "" where no error is known.
 
-    measures and tolerance: as `counted` takes them; where(case): the swept values of a case as people read them.
+    measures and tolerance: as `counted` takes them; where(case): the swept values of a case as people read them; first:
+    the measure that is spoken of, "" for the worst.
     """
     known = {name: np.isfinite(np.asarray(one["errors"], float)) for name, one in measures.items()}
     number = max((found.size for found in known.values()), default=0)
@@ -53,19 +69,29 @@ def sentence(measures: dict, tolerance, where) -> str:
     lost = {name: missed for name, missed in lost.items() if missed.any()}
     if not lost:
         ran = int(np.any([np.isfinite(np.asarray(one["values"], float)) for one in measures.values()], axis=0).sum())
-        return f"All {number} cases meet {asked}." if ran == number else \
-            f"{ran} of {number} cases have an answer; {'it meets' if ran == 1 else 'all of these meet'} {asked}."
+        some = next(((name, cases) for name in FIRST if name in measures
+                     and (cases := by_floor(measures[name], tolerance)).any()), None)
+        floor = "" if some is None else \
+            f" or the floor of their measure, such as {floor_of(measures[some[0]], some[1])} of {label(some[0])}"
+        return f"All {number} cases meet {asked}{floor}." if ran == number else \
+            f"{ran} of {number} cases have an answer; {'it meets' if ran == 1 else 'all of these meet'} {asked}{floor}."
+    if first in measures and first not in lost:
+        return f"In {label(first)} all {number} cases meet {asked}; {_others(len(lost))}."
     beyond = {name: float(np.max(_beyond(measures[name], tolerance), initial=0.0, where=missed))
               for name, missed in lost.items()}
-    name = max([name for name in FIRST if name in lost] or lost, key=beyond.get)
+    name = first if first in lost else max([name for name in FIRST if name in lost] or lost, key=beyond.get)
     share = np.where(lost[name], _share(measures[name]), 0.0)
     count, case, others = int(lost[name].sum()), int(np.argmax(share)), len(lost) - 1
     known = f"{plain(100 * share[case], 2)} % of its value" if share[case] <= ZERO else "larger than the value"
     called = LONGER.get(name) or label(name)
-    more = (f"; {others} other measure{'s' * (others > 1)} miss{'es' * (others == 1)} the tolerance in some cases"
-            if others else "")
+    more = f"; {_others(others)}" if others else ""
     return (f"{count} of {number} cases miss{'es' * (count == 1)} {asked} in {called}; the largest error, at "
             f"{where(case)}, is {known}{more}.")
+
+
+def _others(count: int) -> str:
+    """How many measures beside that which is spoken of miss the tolerance."""
+    return f"{count} other measure{'s' * (count > 1)} miss{'es' * (count == 1)} the tolerance in some cases"
 
 
 def _beyond(one: dict, tolerance) -> np.ndarray:

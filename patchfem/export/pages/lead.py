@@ -1,6 +1,6 @@
 """What a sweep says first: how far its key may go, where its main measure runs, how many cases miss the tolerance."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -18,6 +18,7 @@ from .words import both, joined, short, zero_below
 EXACT = 1e-6  # of a value, up to which no error is told: the values are shown to four digits
 AT = 1e-9  # of a frequency, within which two are one
 AWAY = 0.01  # of the length of the patch, from which on it is said that the centre of its pressure moves
+NONE = MappingProxyType({})
 SETTLED = ranked.SETTLES
 MOVING = Outcome.TRANSIENT.value, Outcome.GROWS.value  # outcomes of cases that move on when their run ends
 FIRST = ("relative_displacement_amplitude", "loop_area", "friction_ratio_peak", "onset_level", "pressure_peak")
@@ -105,11 +106,13 @@ def lead_of(table: dict) -> Lead:
     inside, ends = _inside(table)
     lowest = least(keys, inside, trusted, shown)
     top = peaks.sentence(tops) or ("" if lowest or table.get("drawn") else peaks.over(keys, inside, trusted, shown))
-    ran = span(columns(table), trusted, settled, ranked.asked_first(FIRST, table))
+    held = {name: missed.by_floor(one, tolerance) for name, one in measures.items()}
+    floors = {name: (cases, missed.floor_of(measures[name], cases)) for name, cases in held.items() if cases.any()}
+    ran = span(columns(table), trusted, settled, ranked.asked_first(FIRST, table), floors)
     far = grown(keys, columns(table), outcome, shown, table.get("knee", np.nan))
     left = _left(table, outcome, ranks[1] == ranked.too_few(table, settled))
-    return Lead(missed.counted(measures, tolerance), missed.sentence(measures, tolerance, where), limits,
-                allowed.sentence(limits),
+    misses = missed.sentence(measures, tolerance, where, table.get("first", ""))
+    return Lead(missed.counted(measures, tolerance), misses, limits, allowed.sentence(limits),
                 joined([one for one in (far if table.get("drawn") else "", ran) if one]),
                 changes(keys, columns(table), outcome, table["grid"]), *ranks,
                 tops, joined([one for one in (top, edge) if one]), left, lowest, table.get("first", ""),
@@ -148,12 +151,13 @@ def _left(table: dict, outcome: np.ndarray, known: bool) -> str:
     return joined(said)
 
 
-def span(measures: dict, trusted: dict, settled: np.ndarray, names: Sequence = FIRST) -> str:
+def span(measures: dict, trusted: dict, settled: np.ndarray, names: Sequence = FIRST, least: Mapping = NONE) -> str:
     """From where to where the first measure of interest runs, and how well its values are known; "" where none has a
     value that counts.
 
     measures: {name: (values (n,), errors (n,), SI unit)}, NaN where a case has none; trusted: {name: (n,) whether the
-    value of a case counts}; settled: (n,) whether a case did; names: of the measures, the first of interest first.
+    value of a case counts}; settled: (n,) whether a case did; names: of the measures, the first of interest first;
+    least: {name: (`missed.by_floor`, the floor as people read it)} of those that meet the tolerance by their floor.
     """
     for name in names:
         every = np.isfinite(measures[name][0]) if name in measures else np.zeros(1, bool)
@@ -168,8 +172,12 @@ def span(measures: dict, trusted: dict, settled: np.ndarray, names: Sequence = F
         alike = there.sum() > 1  # of one case nothing runs
         ran = f"ranges from {low} to {high}" if low != high else f"is {high} throughout" if alike else f"is {high}"
         known = np.isfinite(errors) & (errors > 0) & (np.abs(values) > zero_below(name))  # 0 is known absolutely
+        known &= ~least[name][0][there] if name in least else True
         share = float(np.max(errors[known] / np.abs(values[known]))) if known.any() else 0.0
-        band = f", with errors of at most {plain(100 * share, 1)} %" if share > EXACT else ""
+        bands = [f"{plain(100 * share, 1)} %"] * (share > EXACT)
+        if name in least and least[name][0][there].any():
+            bands.append(f"{least[name][1]}, the floor of this measure")
+        band = f", with errors of at most {' or '.join(bands)}" if bands else ""
         counts, ended = there.sum(), (every & settled).sum()
         whose = "" if counts == every.sum() else \
             f" of the {'only settled case' if counts == 1 else 'settled cases'}" if counts == ended else \

@@ -5,7 +5,8 @@ import pytest
 from scene_texts import PIECE
 
 import patchfem as pf
-from patchfem.export.missed import counted, over, sentence
+from patchfem.export.missed import by_floor, counted, over, sentence
+from patchfem.export.pages.lead import lead_of
 
 NAN = np.nan
 
@@ -79,3 +80,25 @@ tolerance = 1e-2
 def _misses(measure) -> bool:
     return None not in (measure and measure.value, measure and measure.error) and \
         measure.error > 0.01 * abs(measure.value) + measure.floor
+
+
+def test_exact_a_tolerance_that_only_the_floor_meets_is_told_with_the_floor():
+    """A loop of 0.16 nJ, known to 60 %, "met the tolerance of 0.1 %" by a floor of 0.1 nJ, and nothing said so."""
+    loop = one([1.6e-10, 1e-3], [0.96e-10, 1e-7], 1e-10) | {"unit": "J"}
+    assert by_floor(loop, 1e-3).tolist() == [True, False]
+    assert sentence({"loop_area": loop}, 1e-3, str) == ("All 2 cases meet the tolerance of 0.1 % or the floor of their "
+                                                        "measure, such as 0.1 nJ of loop area.")
+    table = {"keys": [{"name": "slide.amplitude", "unit": "m", "values": np.array([1e-7, 1e-6]), "log": True,
+                       "texts": ["0.1 um", "1 um"]}], "grid": True, "outcome": ["done"] * 2, "messages": {},
+             "folders": None, "tolerance": 1e-3, "measures": {"loop_area": loop | {"means": ""}}}
+    assert lead_of(table).span == ("Loop area ranges from 0.16 nJ to 1 mJ, with errors of at most 0.01 % or 0.1 nJ, "
+                                   "the floor of this measure.")
+
+
+def test_exact_the_measure_that_is_asked_for_is_spoken_of_first():
+    found = {"loop_area": one([1, 1], [0.5, 0]), "peak_frequency": one([1, 1], [0, 0.02]), "moment": one([1], [0.1])}
+    assert sentence(found, 0.01, str, "peak_frequency") == (
+        "1 of 2 cases misses the tolerance of 1 % in peak frequency; the largest error, at 1, is 2 % of its value; 2 "
+        "other measures miss the tolerance in some cases.")
+    assert sentence(found, 0.1, str, "peak_frequency") == (
+        "In peak frequency all 2 cases meet the tolerance of 10 %; 1 other measure misses the tolerance in some cases.")
