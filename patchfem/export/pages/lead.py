@@ -10,7 +10,7 @@ from ...core import Outcome
 from ...runs.many.answers import FAILED
 from ...scales import LADDERS, plain, step_of
 from .. import missed
-from ..written import NUMBER, bare, label
+from ..written import NUMBER, bare, brief, label
 from . import allowed, peaks, ranked
 from .changes import changes, shown_of, varies
 from .words import both, joined, short, zero_below
@@ -98,7 +98,7 @@ def lead_of(table: dict) -> Lead:
     shown = {one["name"]: shown_of(one) for one in keys if not one["words"]}
 
     def where(case: int) -> str:
-        return ", ".join(f"{one['name']} {shown[one['name']](case) if one['name'] in shown else one['texts'][case]}"
+        return ", ".join(f"{one['name']} {brief(str(one['texts'][case]))}"
                          for one in keys if varies(one) or len(keys) == 1)
 
     tops, edge = (find(keys, columns(table), trusted, table["grid"]) for find in (peaks.found, peaks.edge))
@@ -262,14 +262,14 @@ def least(keys: list, measures: dict, trusted: dict, shown: dict) -> str:
         low = int(np.argmax(still))
         if low == 0 or not still[low:].all() or not trusted[name][order].all():
             return ""
-        first = ", ".join(f"{one['name']} {shown[one['name']](int(order[low]))}" for one in swept)
+        first = ", ".join(f"{one['name']} {brief(str(one['texts'][order[low]]))}" for one in swept)
         last = " with ".join(shown[one["name"]](int(order[low - 1])) for one in swept)
         return f"{label(name).capitalize()} is 0 from {first} on (not yet at {last})."
     known = trusted[name][order] | (height - error[order] > height[low] + error[order[low]])
     if min(height[0], height[-1]) < 1.05 * height[low] or not known.all():
         return ""
     names, best = [one["name"] for one in swept], int(order[low])
-    at = ", ".join(f"{key} {shown[key](best)}" for key in names)
+    at = ", ".join(f"{one['name']} {brief(str(one['texts'][best]))}" for one in swept)
     before, after = (" with ".join(shown[key](int(case)) for key in names) for case in (order[low - 1], order[low + 1]))
     told = f"{label(name).capitalize()} is least at {at}: {short(name, height[low], unit, 4)}"
     peak = measures.get("peak_frequency")

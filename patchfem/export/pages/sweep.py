@@ -2,6 +2,7 @@
 
 from collections import Counter
 from html import escape
+from pathlib import Path
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from .drawn import BAR, SHORT, digits, drawn
 from .lead import FIRST, SETTLED, Lead, columns, lead_of
 from .words import is_share, linked, zero_below
 
+PAGE, SUMMARY = "report.html", "summary.json"  # of a case
 LISTED, TALL = 400, 24  # cases in the table, sweep.csv has them all; rows from which on it scrolls within its frame
 
 
@@ -33,7 +35,7 @@ def page(table: dict, told: Lead | None = None) -> str:
                   and np.isfinite(table["measures"][name]["values"]).any()), None)
     told, part = told or lead_of(table), drawn(table, first, lambda cases, whole: _data(table, first, cases, whole))
     data = _data(table, first, part.cases, not part.said)
-    sections = [Section("answers", "Results", _explorer(part.said) if data["measures"] else
+    sections = [Section("answers", "Results", _explorer(part.said, table["folders"]) if data["measures"] else
                         "<p>No case has a value to draw.</p>"),
                 *_change(table, told.limits),
                 *(Section(*one) for one in (("peaks", "Peaks", peaks.table(told.peaks)),
@@ -92,8 +94,13 @@ def _along(keys: list) -> str:
     return max(keys, key=lambda one: np.unique(one["values"]).size)["name"] if keys else ""
 
 
-def _explorer(said: str) -> str:
-    """The choices and the place of the picture; `explorer.js` fills both; said: which cases are drawn, "" for all."""
+def _explorer(said: str, folders: list | None) -> str:
+    """The choices and the place of the picture; `explorer.js` fills both; said: which cases are drawn, "" for all;
+    folders: where the cases lie, None where nothing is kept of them."""
+    kept = {Path(one).name for one in folders or ()}
+    opens = " Click on a case to open its page." if kept == {PAGE} else \
+        f" Click on a case to open its {'page or its ' * (PAGE in kept)}{SUMMARY}; <code>--keep pages</code> keeps a " \
+        "page of every case." if kept else ""
     thinned = said and f"<p class=soft>{prose(said)}</p>"
     return ("<div class=choices><label>Measure<select id=measure></select></label>"
             "<label>Key on the axis<select id=along></select></label>"
@@ -104,8 +111,8 @@ def _explorer(said: str) -> str:
             "<span id=held class=choices style='padding:0'></span></div>"
             "<div id=chart class=chart role=img></div><p id=means class=soft aria-live=polite></p>"
             "<p class=soft>Bands show the numerical error. Hollow points (dots in a map) miss the tolerance. Crosses, "
-            "shading and hatching mark cases that did not settle. Click on a case to open "
-            f"it.</p>{thinned}<noscript><p class=verdict>The pictures need JavaScript; the numbers are in "
+            "shading and hatching mark cases that did not settle."
+            f"{opens}</p>{thinned}<noscript><p class=verdict>The pictures need JavaScript; the numbers are in "
             "sweep.csv.</p></noscript>")
 
 

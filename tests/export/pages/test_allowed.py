@@ -273,4 +273,4 @@ def test_exact_one_sentence_has_one_unit():
                          for name, values in lines.items()}
     table["measures"]["moment"]["errors"] = np.array([0, 0, 0, 0, 0, 0.4, 0.2])
     said = lead_of(table).sentences()
-    assert "0.32 mrad, is 40 %" in said[0] and all(("mrad" in one) + ("urad" in one) < 2 for one in said)
+    assert "0.316228 mrad, is 40 %" in said[0] and all(("mrad" in one) + ("urad" in one) < 2 for one in said)

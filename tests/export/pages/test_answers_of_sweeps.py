@@ -381,3 +381,13 @@ def test_exact_shares_that_sum_to_more_than_all_say_why():
     said = "where each share includes interactions between keys, so that the shares can sum to more than 100 %"
     assert said in ranked.sentence({"loop_area": shares})
     assert "interactions" not in ranked.sentence({"loop_area": [one._replace(total=0.3) for one in shares]})
+
+
+def test_exact_a_case_is_named_with_the_digits_of_the_table():
+    """The motion was least "at normal.load 12 N": the case was 11.8383 N, and no row of the table had 12 N."""
+    size, name = np.array([1.0, 11.838315151, 140.145, 1659.1, 19641.0]), "relative_displacement_amplitude"
+    values = np.array([5e-6, 1e-6, 2e-6, 4e-6, 6e-6])
+    table = {"keys": [key("normal.load", size, [f"{value!r} N" for value in size.tolist()]) | {"unit": "N"}],
+             "grid": True, "outcome": ["steady"] * 5, "messages": {}, "folders": None, "tolerance": 0.01,
+             "measures": {name: {"unit": "m", "means": "", "values": values, "errors": 0 * values}}}
+    assert "is least at normal.load 11.8383 N: 1 um" in lead_of(table).least

@@ -457,3 +457,19 @@ def test_always_tables_and_pictures_are_whole_on_a_wide_and_on_a_narrow_page(chr
     narrow = chromium.opened(text, 420)
     assert [one for one in narrow.js(HIDDEN) if not one.startswith("contact.tilt.angle")] == []
     assert narrow.js(DOUBLE) == 0 and narrow.js("document.documentElement.scrollWidth") <= 420
+
+
+@pytest.mark.parametrize("links, said", [
+    (["cases/a/report.html", "cases/b/report.html"], "Click on a case to open its page."),
+    (["cases/a/summary.json", "cases/b/summary.json"], "Click on a case to open its summary.json; <code>--keep pages"),
+    (["cases/a/report.html", "cases/b/summary.json"], "Click on a case to open its page or its summary.json;"),
+    (None, "")])
+def test_exact_the_page_says_what_a_click_on_a_case_opens(links, said):
+    """It promised to open cases of which nothing was kept, and opened raw JSON as if it were a page."""
+    values = np.array([1.0, 2.0])
+    table = {"title": "t", "version": "0", "command": "c", "scene": "s", "grid": True, "outcome": ["steady"] * 2,
+             "messages": {}, "folders": links, "tolerance": 0.01,
+             "keys": [{"name": "normal.load", "unit": "N", "values": values, "texts": ["1 N", "2 N"], "log": False}],
+             "measures": {"loop_area": {"unit": "J", "means": "m", "values": values, "errors": 0 * values}}}
+    text = page(table)
+    assert said in text and ("Click on a case" in text) == bool(said)
