@@ -389,12 +389,14 @@ def _unit(limits: Limits) -> tuple:
     own = unit.removesuffix("1"), scale
     if LEAST < abs(value * scale) < 1e4 and (key["unit"] != "rad" or unit not in ANGLES):
         return own
-    return next((step for step in reversed(LADDERS.get(key["unit"], ())) if LEAST < abs(value * step[1])), own)
+    if key["unit"] != "rad":
+        return step_of(LADDERS[key["unit"]], abs(value)) if key["unit"] in LADDERS else own
+    return next((step for step in reversed(LADDERS["rad"]) if LEAST < abs(value * step[1])), own)
 
 
 def in_one_unit(keys: list, limits: Limits) -> list:
     """The keys, that of the limits with texts in the unit in which the limits are read."""
-    if limits.key is None or not limits.found:
+    if limits.key is None or not any(one.resolved() for one in limits.found):
         return keys
     unit, scale = _unit(limits)
     if all(str(text).partition(" ")[2] in ("", unit) for text in limits.key["texts"]):
