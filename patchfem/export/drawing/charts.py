@@ -109,8 +109,7 @@ def interface(x, fields: dict, name: str = "") -> list:
         frame = int(np.argmax(np.abs(tau @ np.gradient(x))))
         shown = np.unique(np.linspace(1, len(tau) - 1, min(FRAMES, len(tau) - 1)).round().astype(int))
         frames = [line(x * size, tau[k] * scale, "soft", most=FAINT, width=0.6, alpha=0.6) for k in shown]
-        title = f"Shear stress{f' on {name}' * bool(name)} at {len(shown)} instants; the instant with the largest " \
-            "stress is in colour"
+        title = f"Shear stress{f' on {name}' * bool(name)} at {len(shown)} instants"
         out.append(chart(title, place, axis("shear stress", unit),
                          [*frames, line(x * size, tau[frame] * scale, "warm")]))
     return out

@@ -51,7 +51,7 @@ def document(title: str, lead: str, sections: list, data: dict | None = None, sc
     return (f"<!doctype html><html lang=en><head><meta charset=utf-8>"
             f"<meta name=viewport content='width=device-width, initial-scale=1'><title>{escape(title)}</title>"
             f"<style>{library.own('page.css')}</style></head><body>\n"
-            f"<header><h1>{escape(title)}</h1>{lead}</header>\n{contents}<main>\n{body}\n</main>\n{drawn}</body></html>\n")
+            f"<header><h1>{breakable(title)}</h1>{lead}</header>\n{contents}<main>\n{body}\n</main>\n{drawn}</body></html>\n")
 
 
 def table(heads: Sequence, rows: Iterable, frame: str = "across", kind: str = "") -> str:
@@ -78,6 +78,11 @@ def table(heads: Sequence, rows: Iterable, frame: str = "across", kind: str = ""
 def prose(text: str) -> str:
     """A sentence as HTML: escaped, and what stands between two back-quotes as code."""
     return QUOTED.sub(r"<code>\1</code>", escape(text))
+
+
+def breakable(text: str) -> str:
+    """A text as HTML whose names of keys may break behind a dot: structure.mode.axial.damping."""
+    return re.sub(r"(?<=[A-Za-z])\.(?=[A-Za-z])", ".<wbr>", escape(text))
 
 
 def warned(texts: Sequence, heading: str = "") -> str:

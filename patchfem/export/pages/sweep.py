@@ -11,11 +11,12 @@ from ...scales import LADDERS, axis_unit, rounded
 from ..missed import over
 from ..written import NUMBER, brief, label
 from . import allowed, document, peaks, ranked
-from .document import Section, prose
+from .document import Section, breakable, prose
 from .drawn import BAR, SHORT, digits, drawn
 from .lead import FIRST, SETTLED, Lead, columns, lead_of
 from .words import is_share, linked, zero_below
 
+MOST, COLUMNS = 6, 8  # measures in the table of cases, and keys with measures: more do not fit a wide screen
 PAGE, SUMMARY = "report.html", "summary.json"  # of a case
 LISTED, TALL = 400, 24  # cases in the table, sweep.csv has them all; rows from which on it scrolls within its frame
 
@@ -143,11 +144,12 @@ def _cases(table: dict) -> str:
     """The first cases as a table with their keys, outcome and the measures that change from case to case."""
     shown = [name for name in ranked.asked_first((FIRST[0], "peak_frequency", *FIRST[1:]), table)
              if name in table["measures"]]
-    shown += [name for name, one in table["measures"].items() if name not in shown and _changes(one["values"])]
-    shown = shown[:6]
+    shown += [name for name, one in table["measures"].items() if name not in shown and _changes(one["values"])
+              and np.nanmax(np.abs(one["values"])) > zero_below(name)]
+    shown = shown[:min(MOST, max(2, COLUMNS - len(table["keys"])))]
     few = slice(LISTED)
     columns = [_measure(name, table["measures"][name], few, table.get("tolerance", np.nan)) for name in shown]
-    heads = [*(escape(one["name"]) for one in table["keys"]), "outcome",
+    heads = [*(breakable(one["name"]) for one in table["keys"]), "outcome",
              *(f">{linked(one['label'], one['name'])}{escape(one['unit'] and ' [' + one['unit'] + ']')}"
                for one in columns)]
     rows = []
@@ -158,7 +160,7 @@ def _cases(table: dict) -> str:
         numbers = (f"<td class=n{' data-over' * bool(one['over'][i])}>"
                    f"{_number(one['values'][i], one['errors'][i], one['least'])}</td>" for one in columns)
         rows.append(("" if outcome in SETTLED else " class=bad",
-                     [*(escape(brief(str(one["texts"][i]))) for one in table["keys"]), said, *numbers]))
+                     [*(_unbroken(brief(str(one["texts"][i]))) for one in table["keys"]), said, *numbers]))
     number = len(table["outcome"])
     more = (f"<p class=soft>The first {LISTED} of {number} cases; sweep.csv contains all cases.</p>"
             if number > LISTED else "")
@@ -166,6 +168,11 @@ def _cases(table: dict) -> str:
         "sweep.csv and sweep.nc (run the same command with --collect to write them)"
     files = f"<p class=soft>Every case with every measure and its error: {named}.</p>" if table.get("own", True) else ""
     return f"{files}{document.table(heads, rows, 'wide long' if len(rows) > TALL else 'wide')}{more}"
+
+
+def _unbroken(text: str) -> str:
+    """A value of a key as HTML, its unit on the line of its number."""
+    return escape(text).replace(" ", "&nbsp;") if NUMBER.match(text) else escape(text)
 
 
 def _changes(values) -> bool:

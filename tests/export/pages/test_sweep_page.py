@@ -473,3 +473,22 @@ def test_exact_the_page_says_what_a_click_on_a_case_opens(links, said):
              "measures": {"loop_area": {"unit": "J", "means": "m", "values": values, "errors": 0 * values}}}
     text = page(table)
     assert said in text and ("Click on a case" in text) == bool(said)
+
+
+def test_exact_names_of_keys_break_behind_dots_and_the_table_of_cases_fits():
+    """structure.mode.axial.dampi/ng broke between its letters on a phone, and four keys with six measures did not fit a
+    screen of 1400 pixels; a column of round-off, 0 in every row, was among them."""
+    values = np.array([1.0, 2.0])
+    names = ["friction.static", "normal.load", "drive.acceleration", "structure.mode.axial.damping"]
+    keys = [{"name": name, "unit": "N", "values": values, "texts": ["1 N", "2 N"], "log": False} for name in names]
+    shown = ["relative_displacement_amplitude", "loop_area", "absolute_acceleration_peak", "friction_force_peak",
+             "slip_amplitude", "friction_work"]
+    measures = {name: {"unit": "J", "means": "m", "values": values, "errors": 0 * values} for name in shown}
+    measures["energy_balance"] = {"unit": "1", "means": "m", "values": 1e-16 * values, "errors": 0 * values}
+    text = page({"title": "Sweep of " + " × ".join(names), "version": "0", "command": "c", "scene": "s", "grid": False,
+                 "keys": keys, "measures": measures, "outcome": ["steady"] * 2, "messages": {}, "folders": None,
+                 "tolerance": 0.01})
+    assert "structure.<wbr>mode.<wbr>axial.<wbr>damping × " not in text.partition("</h1>")[2]
+    assert "× structure.<wbr>mode.<wbr>axial.<wbr>damping</h1>" in text
+    cases = text[text.index("<section id=\"cases\">"):text.index("<section id=\"measures\">")]
+    assert cases.count("<th scope=col") == 4 + 1 + 4 and "energy balance" not in cases and "1&nbsp;N" in cases
