@@ -15,6 +15,7 @@ from .. import core
 from ..campaigns.sweeps import ask, executors
 from ..campaigns.sweeps import sweep as sweeping
 from ..export.sweeps import receipt, run
+from ..scene import axes
 from .shared import Ended, Json, NoPage, NotReached, Out, Quiet, Refused, Sets, flag, note, placed, say, texts, word
 
 FIRST = 5  # messages of failed cases that are printed
@@ -118,6 +119,8 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
     if by.collect:
         _answered(run.collect(asked, cases, target, not no_page), told)
         return
+    for text in () if quiet else axes.drawn_from(what.over if what else ()):
+        note(text)
     if not quiet and (wrong := ask.contradictions(asked, cases)):
         note(wrong)
     line = Progress(quiet)

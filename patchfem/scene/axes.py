@@ -19,6 +19,7 @@ LENGTH = "drive.displacement"  # a key that holds one
 MOST = 10_000_000  # values of one range
 _RANGE = re.compile(r"(.*?)\s*\.\.\s*(.*?)\s*(?::\s*([0-9]*)\s*(log|lin)?)?")
 _UNIT = re.compile(r"[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?\s*(.*)")
+_ABOUT = re.compile(r"([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*?)\s*(?:\+/?-|±)\s*([0-9.]+(?:[eE][-+]?[0-9]+)?)\s*(.*)")
 _PLAIN = re.compile(r"[-+]?(0|[1-9][0-9]{0,14})(\.[0-9]{1,20})?([eE][-+]?[0-9]{1,2})?")  # a finite number of TOML
 _TEN = 10  # ratio of the ends from which a range of positive numbers is logarithmic unless it says otherwise
 _ENDS = {"]": "[", "}": "{"}
@@ -119,6 +120,11 @@ def _axis(key: str, text: str, sampled: bool) -> Axis | Span:
         try:
             if not piece:
                 raise ValueError("there is no value between two commas")
+            if _is_number(key) and (ends := _around(piece)):
+                if not sampled or len(pieces) > 1:
+                    raise ValueError(f"{piece}: write this range as {ends}:9 for 9 values in it, or as {ends} with "
+                                     "--random")
+                piece = f"{ends}:lin"
             ends = _RANGE.fullmatch(piece) if ".." in piece and _is_number(key) else None
             if ends is None:
                 out.append(piece)
@@ -131,6 +137,37 @@ def _axis(key: str, text: str, sampled: bool) -> Axis | Span:
     if wrong:
         raise ValueError("\n".join(wrong))
     return values_of(key, out)
+
+
+def drawn_from(texts: Iterable[str]) -> list[str]:
+    """Sentences on texts `table.key=value +- width` of drawn values: from which range these are drawn."""
+    out = []
+    for text in texts:
+        key, _, values = (part.strip() for part in text.partition("="))
+        try:
+            ends = _around(values)
+        except ValueError:  # `read` says so
+            continue
+        out += [f"{key}: {values} is drawn evenly from {ends}"] * bool(ends)
+    return out
+
+
+def _around(text: str) -> str:
+    """The range `low..high` of a value with its width: of 0.3 +- 15 % 0.255..0.345, of 5 mm +- 1 mm 4.0 mm..6.0 mm; ""
+    of another text, ValueError where the width has another unit."""
+    found = _ABOUT.fullmatch(text)
+    if found is None:
+        return ""
+    middle, unit, width, of = found.groups()
+    try:
+        middle, width = Fraction(middle), Fraction(width)
+    except ValueError:  # 1.2.3
+        return ""
+    if of not in ("%", "", unit):
+        raise ValueError(f"{text}: write the width in % or in the unit of the value{f' ({unit})' * bool(unit)}, or the "
+                         "range as low..high")
+    half = abs(middle) * width / 100 if of == "%" else width
+    return "..".join(_written(float(end), unit) for end in (middle - half, middle + half))
 
 
 def _with_unit(low: str, high: str, *rest) -> tuple:

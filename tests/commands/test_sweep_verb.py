@@ -428,6 +428,7 @@ def test_refuses_a_key_of_the_file_and_of_the_line(scene, tmp_path):
     (["--over", "friction.static=0.1,0.2", "--shard", "5/4"], "--shard 5/4"),
     (["--over", "friction.static=0.1,0.2", "-j", "0"], "the number of processes must be"),
     (["--over", "friction.static=0.1,0.2", "--of", "equivalent_dampin"], "did you mean 'equivalent_damping'?"),
+    (["--over", "friction.static=0.1,0.2", "--of", "damping"], "did you mean 'equivalent_damping', "),
     (["--over", "friction.static=0.1,0.2", "--of", "zzz"], "--of zzz: unknown measure; use a name that"),
     (["--over", "friction.static=0.1,0.2", "--executor", "slurm"], "--executor slurm: not possible"),
 ])

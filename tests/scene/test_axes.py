@@ -6,7 +6,7 @@ from scene_texts import BENCH, line_of, mistakes
 
 import patchfem as pf
 from patchfem.core import PatchfemError
-from patchfem.scene.axes import Span, read
+from patchfem.scene.axes import Span, _around, drawn_from, read
 from patchfem.scene.keys.quantities import parse
 from patchfem.scene.scene import loads
 from patchfem.scene.sets import texts
@@ -151,3 +151,24 @@ def test_refuses_mistakes_of_the_table_with_their_lines():
 def test_refuses_one_run_of_many_cases():
     with pytest.raises(PatchfemError, match=r"sweep: has 12 cases, but a single run computes only one; use `patch"):
         pf.run(SWEPT)
+
+
+@pytest.mark.parametrize("text, low, high, unit", [
+    ("friction.static=0.3+-15%", 0.255, 0.345, ""), ("friction.static=0.3 ± 15 %", 0.255, 0.345, ""),
+    ("friction.static=0.3 +/- 0.03", 0.27, 0.33, ""), ("normal.load=115 N +- 10 N", 105, 125, "N"),
+    ("contact.length=5 mm +- 95 %", 0.25, 9.75, "mm")])
+def test_exact_a_value_with_its_width_is_an_even_range(text, low, high, unit):
+    """0.3 +- 15 %, as scatter is written everywhere, was refused with "a plain number is needed"."""
+    (one,), wrong = read([text], sampled=True)
+    assert not wrong and (one.low, one.high, one.unit, one.log) == (low, high, unit, False)
+    (said,) = drawn_from([text])
+    assert said.endswith(f" is drawn evenly from {_around(text.partition('=')[2])}")
+    assert drawn_from(["friction.static=0.2..0.3"]) == []
+
+
+@pytest.mark.parametrize("text, sampled, says", [
+    ("friction.static=0.3+-15%", False, "write this range as 0.255..0.345:9 for 9 values in it"),
+    ("normal.load=115 N +- 10 kN", True, "write the width in % or in the unit of the value (N)")])
+def test_refuses_a_width_with_what_helps(text, sampled, says):
+    found, (wrong,) = read([text], sampled=sampled)
+    assert not found and says in wrong

@@ -21,6 +21,7 @@ from .cases import Cases, product
 
 LOOKED = 32  # cases that are read before a sweep starts, to find one that is valid
 SHOWN = 12  # mistakes that are printed
+NEAR = 4  # measures that a mistaken name may mean
 MOST = 3_000_000  # cases of a sweep: their names and columns fill some gigabytes
 
 
@@ -96,13 +97,16 @@ def cases_of(asked: Asked, request: Request) -> Cases:
 
 
 def _unknown(measure: str) -> list[str]:
-    """A mistake where a measure is named that no run has, with the one that is nearest."""
+    """A mistake where a measure is named that no run has, with those that it is a word of, or the one that is
+    nearest."""
     known = [*rows.TABLE, *patch_rows.TABLE]
     if not measure or rows.of_first(measure) in known:
         return []
-    near = get_close_matches(measure, known, 1, 0.5)
-    return [f"--of {measure}: unknown measure; " + (f"did you mean '{near[0]}'?" if near else "use a name that "
-            "`patchfem run` prints, such as loop_area")]
+    parts = [name for name in known if measure in name.split("_") and not name.endswith("_scatter")]
+    near = parts if 0 < len(parts) <= NEAR else get_close_matches(measure, known, 1, 0.5)
+    *others, last = map(repr, near or [""])
+    return [f"--of {measure}: unknown measure; " + (f"did you mean {', '.join(others)}{' or ' * bool(others)}{last}?"
+            if near else "use a name that `patchfem run` prints, such as loop_area")]
 
 
 def _same(asked: Asked, keys: Sequence[str]) -> list[str]:
