@@ -77,7 +77,8 @@ class Lead(NamedTuple):
     def _first(self) -> list:
         """The sentences that the answer is made of."""
         drawn = [one for one in (self.rank, self.scatter) if one]
-        first = (drawn or [self.span]) if self.asked and (drawn or self.span) else \
+        first = [self.peak] if self.asked == "peak_frequency" and self.peak and not drawn else \
+            (drawn or [self.span]) if self.asked and (drawn or self.span) else \
             [self.limit or self.peak or self.least] if self.limit or self.peak or self.least else \
             drawn or [self.span or self.turns]
         return [one for one in (self.grown, *first) if one]
@@ -263,14 +264,15 @@ def least(keys: list, measures: dict, trusted: dict, shown: dict) -> str:
         if low == 0 or not still[low:].all() or not trusted[name][order].all():
             return ""
         first = ", ".join(f"{one['name']} {brief(str(one['texts'][order[low]]))}" for one in swept)
-        last = " with ".join(shown[one["name"]](int(order[low - 1])) for one in swept)
+        last = " with ".join(brief(str(one["texts"][order[low - 1]])) for one in swept)
         return f"{label(name).capitalize()} is 0 from {first} on (not yet at {last})."
     known = trusted[name][order] | (height - error[order] > height[low] + error[order[low]])
     if min(height[0], height[-1]) < 1.05 * height[low] or not known.all():
         return ""
-    names, best = [one["name"] for one in swept], int(order[low])
+    best = int(order[low])
     at = ", ".join(f"{one['name']} {brief(str(one['texts'][best]))}" for one in swept)
-    before, after = (" with ".join(shown[key](int(case)) for key in names) for case in (order[low - 1], order[low + 1]))
+    before, after = (" with ".join(brief(str(one["texts"][case])) for one in swept)
+                     for case in (order[low - 1], order[low + 1]))
     told = f"{label(name).capitalize()} is least at {at}: {short(name, height[low], unit, 4)}"
     peak = measures.get("peak_frequency")
     if peak is not None and np.isfinite(peak[0][best]):

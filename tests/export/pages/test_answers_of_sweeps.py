@@ -343,6 +343,7 @@ def test_always_a_sweep_over_levels_names_the_peak_frequency_at_both_ends(tmp_pa
     assert ("Hz with drive.acceleration 8 g (5.938 mm); with drive.acceleration 2 g to 3 g the output does not move, "
             "so there is no peak") in first
     table = read_table(tmp_path / "out")
+    assert lead_of(table | {"first": "peak_frequency"}).answer().startswith(first.rstrip(".").partition(" (1 of")[0])
     assert np.isnan(table["measures"]["peak_frequency"]["values"][:2]).all()
     text = (tmp_path / "out" / "report.html").read_text("utf-8")
     cases = text[text.index("id=cases"):] if "id=cases" in text else text[text.index(">Cases<"):]
@@ -390,4 +391,5 @@ def test_exact_a_case_is_named_with_the_digits_of_the_table():
     table = {"keys": [key("normal.load", size, [f"{value!r} N" for value in size.tolist()]) | {"unit": "N"}],
              "grid": True, "outcome": ["steady"] * 5, "messages": {}, "folders": None, "tolerance": 0.01,
              "measures": {name: {"unit": "m", "means": "", "values": values, "errors": 0 * values}}}
-    assert "is least at normal.load 11.8383 N: 1 um" in lead_of(table).least
+    assert lead_of(table).least.endswith("is least at normal.load 11.8383 N: 1 um (neighbouring cases: 1.0 N and "
+                                         "140.145 N).")
