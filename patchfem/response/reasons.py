@@ -17,6 +17,7 @@ CYCLIC = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", *ACC
 HOLDS = "the whole interface sticks throughout the last cycles"
 UNBOUNDED = "no bounded motion exists at this drive"
 STILL = "the output does not move: the first harmonic of its acceleration is 0 within the accuracy of the computation"
+APERIODIC = "the drive is not a sine at the end of the run, so no period is known over which to take the mean slide"
 UNCLOSED = ("the friction loop does not close: during the last cycles the stored energy changes by more than friction "
             "dissipates; the energy dissipated in the whole run is given by energy_dissipated")
 
@@ -36,6 +37,14 @@ def without_value(values, window, drive, rubs: bool, beside: float = 0.0) -> dic
         lacking["slip_start_phase"] = _of_phase(values, drive)
     return {name: Measure(None, TABLE[name].unit, None, TABLE[name].floor, reason=reason)
             for name, reason in lacking.items() if name not in values}
+
+
+def undrifting(values, drive) -> dict:
+    """The drift without a value, by name, where no drive gives the period over which a mean stands still: means over
+    other spans differ without any drift. values: Measure by name; drive."""
+    one = values.get("drift_per_cycle")
+    return {} if one is None or sinusoidal(drive) else {
+        "drift_per_cycle": replace(one, value=None, error=None, reason=APERIODIC)}
 
 
 def unbounded(values) -> dict:

@@ -245,7 +245,7 @@ ROWS = (
     Row("drift_per_cycle", "m", 1e-11,
         "drift of the slide per cycle: (mean slide over the last cycle of the window - mean slide over the "
         "first cycle of the window)/(number of cycles between these two cycles); if the interface slides in a plane, "
-        "the length of this vector",
+        "the length of this vector; null if the drive is not a sine at the end of the run",
         lambda s: drift_of(s) if s.own.drift is None else s.own.drift,
         term=("slip amplitude (without slip: amplitude of the motion)", _moved), halves=FOURTH),
     Row("slip_amplitude", "m", 1e-10,

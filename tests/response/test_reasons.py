@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from patchfem.core import BaseSine, Measure, Segment
-from patchfem.response.reasons import STILL, UNCLOSED, unclosed
+from patchfem.response.reasons import APERIODIC, STILL, UNCLOSED, unclosed
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
@@ -129,3 +129,11 @@ def test_exact_no_distortion_of_an_output_that_stands_still(force, there):
     first, ratio = (found[name] for name in ("absolute_acceleration_fundamental", "acceleration_distortion"))
     assert (ratio.value is not None) == there == (first.value > first.floor)
     assert ratio.reason == ("" if there else STILL)
+
+
+@pytest.mark.parametrize(("start", "cycles"), [("20 um", 15), ("20 um", 15.3)])
+def test_always_no_drift_where_no_drive_gives_a_period(start, cycles):
+    """The stuck interface rings with a period of its own, so means over periods of the free mode differ by nothing that
+    moves on."""
+    found = run(loads(RELEASED.format(start=start, cycles=cycles))).measures["drift_per_cycle"]
+    assert found.value is None and found.error is None and found.reason == APERIODIC

@@ -118,8 +118,9 @@ def _started(run: Coupled) -> Coupled:
 def _reasoned(run: Coupled) -> Coupled:
     """With a reason in place of each measure that such a run can have and this one has not."""
     found, window, rig = run.measures, run.raw.window, run.model.rig
-    return replace(run, measures=found | reasons.unclosed(found, window, run.drive) | reasons.without_value(
-        found, window, run.drive, run.rubs, rig.beside_first(window.modal)))
+    return replace(run, measures=found | reasons.unclosed(found, window, run.drive) | reasons.undrifting(
+        found, run.drive) | reasons.without_value(found, window, run.drive, run.rubs,
+                                                  rig.beside_first(window.modal)))
 
 
 def _decayed(run: Coupled, coarse) -> tuple:
