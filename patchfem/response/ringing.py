@@ -91,6 +91,47 @@ def held_ring(amplitude: float, own: float, damping: float, size: float) -> dict
     return {"ring_frequency": float(own / (2 * np.pi)), "ring_damping": float(damping)}
 
 
+class HeldMode(NamedTuple):
+    """A mode that rings while every interface holds: begin, end [s] of the stick; frequency [Hz] as seen, damping ratio
+    [1], size at the output of its displacement [m] and of its acceleration [m s-2] at `begin`."""
+
+    begin: float
+    end: float
+    frequency: float
+    damping: float
+    displacement: float
+    acceleration: float
+
+
+def held_modes(modes, stiffness, motion) -> list:
+    """The HeldModes of a motion without a sine while every interface holds by a spring, of the eigenvalues of the rig.
+
+    stiffness (i,) [N/m] of the interfaces; motion: Response of the stick. Two states h apart differ by c (e^(lambda h)
+    - 1) in every mode, whatever the place it swings about, so each amplitude c follows from them alone.
+    """
+    n, rows = modes.omega.size, modes.interfaces
+    whole = np.diag(modes.omega**2) + rows.T * stiffness @ rows / modes.mass
+    matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-whole, -modes.dampers]])
+    values, shapes = np.linalg.eig(matrix)
+    state = np.concatenate([motion.modal[:2], motion.modal_rate[:2]], axis=1)
+    turned = np.expm1(values * (motion.time[1] - motion.time[0]))
+    told = (values.imag > 0) & (np.abs(turned) > FAINT)
+    sizes = np.linalg.solve(shapes, (state[1] - state[0]).astype(complex))[told] / turned[told]
+    out = 2 * np.abs(modes.output @ shapes[:n, told] * sizes)  # a pair of eigenvalues makes one real sinusoid
+    return [HeldMode(float(motion.time[0]), float(motion.time[-1]), one.imag / (2 * np.pi), -one.real / abs(one),
+                     float(size), float(size * abs(one)**2)) for one, size in zip(values[told], out)]
+
+
+def strongest(held: list, kind: str) -> HeldMode:
+    """The one of HeldModes with the most energy over the stick, by the square of its "displacement" or its
+    "acceleration"."""
+    def energy(one: HeldMode) -> float:
+        fall = 4 * np.pi * one.damping * one.frequency * (one.end - one.begin)
+        return getattr(one, kind)**2 * (-np.expm1(-fall) / fall if fall else 1.0)
+
+    return max(held, key=energy)
+
+
 def ringing(time, value, sticks, omega: float = 0.0) -> tuple:
     """Frequency [Hz] and damping ratio [1] of what rings in a signal, and their errors: medians over the sticks.
 

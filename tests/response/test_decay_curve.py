@@ -158,19 +158,68 @@ def test_a_release_of_an_iwan_joint_follows_its_balance():
             np.abs(ours - other) < bar + 4 * beside.quasi_static_damping.values[::-1] * other).all()
 
 
-def test_always_runs_that_do_not_reach_leave_an_infinite_error_and_no_warning_of_python():
+def test_always_runs_that_do_not_reach_leave_no_point_and_no_warning_of_python():
     """Of a coarser run and of the one beside it, both of which hold at once: their curves have no point."""
     def run(amplitude: float, *coarser):
         t, y, v = viscous(0.05, 300.0, 2000)
         return SimpleNamespace(response=SimpleNamespace(time=t, output=amplitude * y, output_rate=amplitude * v),
-                               coarser=coarser)
+                               coarser=coarser, extra={})
 
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         found = decay_of(run(1.0, (run(0.0), run(0.0)), (run(1.0), None)))
-    assert np.isinf(found.damping_error).all() and np.isinf(found.frequency_error).all()
+    assert found is None
     same = decay_of(run(1.0, (run(1.0), None)))
     assert same.damping == pytest.approx(0.05, rel=1e-4) and np.isfinite(same.damping_error).all()
+
+
+TWO_MODES = """[normal]
+load = "20 N"
+[friction]
+law = "elastic-plastic"
+static = 0.3
+stiffness = "30 kN/m"
+[structure]
+moving_mass = "1 kg"
+[[structure.mode]]
+name = "first"
+frequency = "40 Hz"
+damping = 0.002
+slide = 1.0
+output = 1.0
+[[structure.mode]]
+name = "second"
+frequency = "131 Hz"
+damping = 0.002
+slide = 0.7
+output = -0.6
+[drive]
+kind = "free"
+displacement = "2 mm"
+cycles = 60
+"""
+
+
+def test_exact_a_release_that_ends_stuck_has_the_eigenvalue_of_the_stuck_rig():
+    """Another mode rings beside it, so the turns of the output tell of neither. No point is as uncertain as large."""
+    done = pf.run(TWO_MODES)
+    omega, slide = 2 * np.pi * np.array([40.0, 131.0]), np.array([1.0, 0.7])
+    matrix = np.block([[np.zeros((2, 2)), np.eye(2)],
+                       [-np.diag(omega**2) - 3e4 * np.outer(slide, slide), -0.004 * np.diag(omega)]])
+    values = np.linalg.eigvals(matrix)
+    frequency, damping = values.imag / (2 * np.pi), -values.real / np.abs(values)
+    decay, ring = done.extra["decay"], done.measures
+    k = np.argmin(np.abs(frequency - decay.frequency[-1]))
+    rings = decay.frequency == decay.frequency[-1]
+    assert str(done.outcome) == "stuck" and rings.sum() > 40 and 3 < np.sum(~rings)
+    assert decay.frequency[-1] == pytest.approx(frequency[k], rel=1e-9)
+    assert decay.damping[-1] == pytest.approx(damping[k], rel=1e-7)
+    assert np.all(decay.frequency_error < decay.frequency / 2) and np.all(decay.damping_error < decay.damping / 2)
+    k = np.argmin(np.abs(frequency - ring["ring_frequency"].value))
+    assert ring["ring_frequency"].value == pytest.approx(frequency[k], rel=1e-9)
+    assert ring["ring_damping"].value == pytest.approx(damping[k], rel=1e-7)
+    amplitude = np.ptp(done.window.output) / 2
+    assert decay.amplitude[-1] < 1.2 * amplitude
 
 
 CROWNED = CROWNED_JOINT + """\

@@ -12,7 +12,7 @@ from ...compiled import load
 from ...core import NotConverged, PatchfemError
 from ...dynamics.harmonic import forces, quasi_static
 from ...dynamics.march import models
-from ...response.decay_curve import DecayCurve, curve_of, of_turns, turns
+from ...response.decay_curve import FAINT, DecayCurve, curve_of, of_turns, turns
 from ...slip.grain import spread, stiffer
 from ..bench import shear
 from ..patch import faces
@@ -24,11 +24,13 @@ MOVING = ("the contact slides on grooves", "the normal load changes",
           "the strips of the patch slide independently of one another")
 NO_LOOP = "the hysteresis loop of this friction law is not known without a computation in time"
 NOT_STATIC = "no static curve of the mode was found at these amplitudes"
+MOST = 0.5  # of a value, the error up to which it is one
 APART = 16  # amplitudes a decade at which the error of the mesh is computed
 
 
 def decay_of(raw: Solution) -> DecayCurve | None:
-    """The curve of the output of a release; None where it does not swing three half swings down.
+    """The curve of the output of a release, without the points whose errors are above MOST of their values; None where
+    there is no other.
 
     What coarser runs change at the same amplitudes is added to what the reading leaves open; where a coarser run does
     not reach, the error is infinite.
@@ -36,6 +38,13 @@ def decay_of(raw: Solution) -> DecayCurve | None:
     found = _read(raw)
     if not found.time.size:
         return None
+    found = _compared(found, raw)
+    known = (found.frequency_error <= MOST * found.frequency) & (found.damping_error <= MOST * np.abs(found.damping))
+    return found.at(known) if known.any() else None
+
+
+def _compared(found: DecayCurve, raw: Solution) -> DecayCurve:
+    """A curve of a run with what its coarser runs change in its errors."""
     for run, beside in raw.coarser:
         one, other = _read(run).over(found.amplitude), found if beside is None else _read(beside).over(found.amplitude)
         found = found.widened(one, other)
@@ -43,8 +52,18 @@ def decay_of(raw: Solution) -> DecayCurve | None:
 
 
 def _read(run: Solution) -> DecayCurve:
-    motion = run.response
-    return curve_of(of_turns(*turns(motion.time, motion.output, motion.output_rate)))
+    """The curve of the half swings as long as they shrink, and behind the last slip that of the mode that rings on, at
+    each of its half swings: there other modes ring beside it, and the turns of their sum tell of none of them."""
+    motion, held = run.response, run.extra.get("tail")
+    found = curve_of(of_turns(*turns(motion.time, motion.output, motion.output_rate)))
+    if held is None:
+        return found
+    time = np.arange(held.begin, held.end, 0.5 / held.frequency)
+    rate = 2 * np.pi * held.frequency * held.damping / np.sqrt(1 - held.damping**2)
+    size, still = held.displacement * np.exp(-rate * (time - held.begin)), np.zeros(time.size)
+    kept = size > FAINT * np.abs(motion.output).max()
+    rings = DecayCurve(time, size, still + held.frequency, still, still + held.damping, still).at(kept)
+    return DecayCurve(*map(np.concatenate, zip(found.at(found.time < held.begin), rings)))
 
 
 def laws_on(model, patch, meshed: tuple = ()):

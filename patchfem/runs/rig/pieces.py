@@ -17,7 +17,7 @@ from ...effects import has
 from ...response import run_events
 from ...response.loops import interface_loops
 from ...response.measures import REST, harmonic
-from ...response.ringing import held_ring
+from ...response.ringing import held_modes, held_ring, strongest
 from ...response.rows import stuck_share
 from ...response.spectrum import distorted
 from ...structure.drive_sizes import largest, omega_of, sinusoidal, slowest, whole
@@ -103,12 +103,34 @@ class Pieces(Reader):
         return {"known": known, "ledger": np.array([[lost], [0.0], [lost], [0.0]]), "together": self.apart}
 
     def rings(self, run, drive) -> tuple:
-        """What rings is known in closed form of a single element, and of a motion that repeats by one of its cycles."""
+        """What rings is known in closed form of a single element and where every interface holds to the end of a run
+        without a sine, and of a motion that repeats by one of its cycles."""
         if not self.rubs:
             return {}, {}
         if run.ring is not None:
             return held_ring(*run.ring, run.acceleration), {}
+        if held := self.held_modes(run, run.window, drive):
+            one = strongest(held, "acceleration")
+            return held_ring(one.acceleration, 2 * np.pi * one.frequency, one.damping, run.acceleration), {}
         return run_events.rings(run.window, self.model.rig.modes, drive, run.log, repeats=run.repeats)
+
+    def held_modes(self, run, motion, drive) -> list:
+        """`ringing.held_modes` of a part of a run; [] unless nothing but a constant drives it there and every interface
+        is one spring that holds to the end."""
+        springs = [one.stiffness for one in self.groups]
+        held = self.rubs and not self.rigid and all(one.size == 1 for one in springs) and \
+            not any(one.slip for one in run.loops) and (not run.log.time.size or run.log.time[-1] < motion.time[0])
+        if not held or sinusoidal(drive) or not drive.segments or motion.time.size < 2:
+            return []
+        return held_modes(self.model.rig.modes, np.concatenate(springs), motion)
+
+    def tail(self, run, drive) -> dict:
+        """What rings after the last slip of a release, as the field `extra` of a Solution keeps it; {} without one."""
+        if self.model.rig.kind != "free" or run.response is None or run.log is None or not run.log.time.size:
+            return {}
+        after = run.response.at(run.response.time > run.log.time[-1])
+        held = self.held_modes(run, after, drive)
+        return {"tail": strongest(held, "displacement")} if held else {}
 
     def own(self, run, drive, values: dict) -> dict:
         """What samples leave open of the measures that no sum over the pieces has, and behind rigid elements the
@@ -131,6 +153,7 @@ class Pieces(Reader):
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:
         """The Solution of a PieceRun; where its windows still change, with the motion that it settles to."""
         drive, numerics = drive or self.model.rig.drive, self.numerics
+        more |= {"extra": more.get("extra", {}) | tail} if (tail := self.tail(run, drive)) else {}
         unsettled = still_changes(run.amplitudes, numerics.window, self.model.accuracy.tolerance,
                                   slowest(self.model.rig.modes) * drive.period)
         if numerics.whole and run.outcome is None and not self.rigid and not self.sticks(run) and unsettled:

@@ -162,7 +162,7 @@ def _extra(run: Coupled, notes: list) -> dict:
     numbers = {"steps_per_cycle": numerics.steps, "iterations": raw.book.get("iterations")}
     out = {"engine": numerics.engine, "cycles": numerics.cycles} | raw.extra | {"window": numerics.window}
     out |= {name: numbers[name] for name in tells}
-    for name in ("at", "at_error"):
+    for name in ("at", "at_error", "tail"):
         out.pop(name, None)
     if raw.levels:
         out["levels"] = levels.in_scene_units(rig, raw.levels)
