@@ -11,6 +11,16 @@ import numpy as np
 
 from ..core import ModalBasis, Outcome, Response
 
+ALIKE = 0.95  # length of the mean of unit vectors at twice their phases, from which starts of slip have one phase
+
+
+def start_phase(count, cosine, sine):
+    """Mean phase [rad] modulo pi of the starts of slip, of numbers or (n,) of n runs: their count, and the sums of the
+    cosine and of the sine of twice their phases. NaN without a start, and where they differ by more than ALIKE has it:
+    the mean of several slips in half a cycle is the phase of none of them."""
+    told = (count > 0) & (np.hypot(cosine, sine) >= ALIKE * count)
+    return np.where(told, np.arctan2(sine, cosine) / 2 % np.pi, np.nan)[()]
+
 
 class Loop(NamedTuple):
     """An interface in the last cycles: first harmonics of slide [m] and force [N], friction work [J], range of the slip

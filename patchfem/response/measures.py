@@ -7,6 +7,7 @@ import numpy as np
 
 from ..core import Response
 from ..dynamics import work_check as work_checks
+from ..dynamics.integrated import start_phase
 
 SHARE = 0.5  # irreversible part of the slide from which an interface slips
 ROUND = 1e-13  # of the largest coordinate
@@ -103,7 +104,7 @@ def slip_measures(window: Response, drive, steps_per_cycle: int, second=(None, N
     if rises.size:
         middles = (time[1:] + time[:-1]) / 2
         at = middles[rises] - before[rises] / rise[rises] * np.diff(middles)[rises]
-        out["slip_start_phase"] = circular_mean(2 * np.pi / drive.period * at)
+        out |= slip_start(2 * np.pi / drive.period * at)
     return out
 
 
@@ -112,9 +113,10 @@ def slip_noise(window: Response) -> float:
     return ROUND * float(np.abs(window.modal).max(initial=0.0))
 
 
-def circular_mean(phases) -> float:
-    """Mean of angles [rad] that mean the same modulo pi, in [0, pi)."""
-    return float(np.angle(np.mean(np.exp(2j * np.asarray(phases)))) / 2 % np.pi)
+def slip_start(phases) -> dict:
+    """slip_start_phase [rad] by name of starts of slip at phases (k,) [rad]; {} where they have no phase in common."""
+    found = start_phase(len(phases), np.cos(2 * phases).sum(), np.sin(2 * phases).sum())
+    return {} if np.isnan(found) else {"slip_start_phase": float(found)}
 
 
 def ledger_measures(ledger) -> dict:

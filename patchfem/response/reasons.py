@@ -81,6 +81,8 @@ def _of_phase(values, drive) -> str:
     stuck = getattr(values.get("stick_fraction"), "value", values.get("stick_fraction"))
     if stuck == 1.0:
         return f"{HOLDS}, so no slip starts"
+    if stuck:
+        return "slip does not start at one phase of the half cycles: it starts several times, or not in all of them"
     return "the interface never sticks in the last cycles, so slip never starts after stick"
 
 

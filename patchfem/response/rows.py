@@ -19,11 +19,11 @@ from .loops import Turn, drift, half_range, interface_loop, secant_stiffness, tu
 from .measures import (
     REST,
     acceleration_peak,
-    circular_mean,
     energy_balance,
     lateral,
     ledger_measures,
     slip_measures,
+    slip_start,
 )
 from .spectrum import FLOOR, odd_harmonics, wave_measures
 
@@ -85,7 +85,7 @@ class Seen:
         else:
             starts = self.own.starts
             found = {"stick_fraction": stuck_share(first.stuck, self.span)} | (
-                {"slip_start_phase": circular_mean(starts)} if starts is not None and len(starts) else {})
+                {} if starts is None else slip_start(np.asarray(starts)))
         found |= {} if first is None else {"slip_amplitude": first.slip / 2}
         return found if self.sine else {k: v for k, v in found.items() if k != "slip_start_phase"}
 
@@ -261,8 +261,9 @@ ROWS = (
         lambda s: s.slip.get("stick_fraction"), 0.35, group="friction", term=("1", lambda _: 1.0),
         halves=(2.5, 0.5)),
     Row("slip_start_phase", "rad", 1e-3,
-        "phase of the base displacement at which slip starts after stick, modulo pi; slip is the weighted mean "
-        "defined under `slip_amplitude`; the phase is printed in degrees",
+        "phase of the drive (of the base displacement, or of the force) at which slip starts after stick, modulo pi; "
+        "slip is the weighted mean defined under `slip_amplitude`; the phase is printed in degrees; null if slip "
+        "starts at different phases of a half cycle",
         lambda s: s.slip.get("slip_start_phase"), 1.0, group="friction", term=("pi", lambda _: np.pi),
         halves=(2.5, 1.0)),
     Row("normal_load", "N", 0.0, "normal load on the interface, summed over all equal patches (key `pairs`)",

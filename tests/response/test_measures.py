@@ -106,11 +106,17 @@ def test_exact_slip_of_a_resting_and_of_a_sliding_interface():
     assert steady["stick_fraction"] == 0.0 and "slip_start_phase" not in steady
 
 
-@given(st.floats(0, pi), st.floats(0, 0.4))
-def test_always_circular_mean(middle, spread):
-    found = measures.circular_mean([middle - spread, middle + spread, middle + pi, middle - 3 * pi])
+@given(st.floats(0, pi), st.floats(0, 0.22))
+def test_always_one_phase_of_starts_that_agree(middle, spread):
+    found = measures.slip_start(np.array([middle - spread, middle + spread, middle + pi, middle - 3 * pi]))
+    found = found["slip_start_phase"]
     assert 0 <= found <= pi
     assert min(abs(found - middle % pi), pi - abs(found - middle % pi)) < 1e-9
+
+
+@pytest.mark.parametrize("degrees", [[18, 51, 141, 170], [10, 60], []])
+def test_refuses_the_mean_of_several_slips_per_half_cycle(degrees):
+    assert measures.slip_start(np.radians(np.array(degrees, float))) == {}
 
 
 # peaks

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..integrated import Loop
+from ..integrated import Loop, start_phase
 from . import names_kernels as at
 
 # least angle [rad] that what rings turns in a stick: a ring is told of 1.5 periods, and a fit that leaves a tenth of it
@@ -46,9 +46,8 @@ class Reading:
 
     @property
     def start(self):
-        """Mean phase [rad] modulo pi of the releases of the first interface, NaN without one."""
-        angle = np.arctan2(self.run[..., at.START_SIN], self.run[..., at.START_COS]) / 2 % np.pi
-        return np.where(self.run[..., at.STARTS] > 0, angle, np.nan)[()]
+        """Phase [rad] modulo pi of the releases of the first interface, as `start_phase` has it."""
+        return start_phase(*(self.run[..., place] for place in (at.STARTS, at.START_COS, at.START_SIN)))
 
     @property
     def drift(self):

@@ -146,8 +146,7 @@ def integrated(response, drive, ends) -> tuple:
     """(Integrated of the steps whose places are those of a Response, by measure what the last terms of the polynomials
     make of a peak).
 
-    ends (2, 4): time [s], output [m], its rate [m/s] and friction work [J] where they begin and end. Of the starts of
-    slip their mean phase alone is told.
+    ends (2, 4): time [s], output [m], its rate [m/s] and friction work [J] where they begin and end.
     """
     period = drive.period
     parts, (before, after) = Parts(response, period), ends
@@ -156,10 +155,9 @@ def integrated(response, drive, ends) -> tuple:
     (gain, unsure), (pull, loose) = max(peaks["acceleration"]), max(peaks["force"])
     slip, swing = ((up + down) / 2 for (up, _), (down, _) in (peaks["slip"], peaks["output"]))
     held, starts = parts.holds()
-    start = [float(np.angle(np.exp(4j * np.pi * starts / period).sum()) / 2 % np.pi)] if starts.size else []
     loop = Loop(parts.harmonic("slide"), parts.harmonic("force"), after[3] - before[3], 2 * slip,
                 min(held, parts.time[-1, -1] - parts.time[0, 0]), pull)
-    return Integrated(swing, gain, parts.drift(), _waves(parts, drive, ends), (loop,), np.array(start)), \
+    return Integrated(swing, gain, parts.drift(), _waves(parts, drive, ends), (loop,), 2 * np.pi * starts / period % np.pi), \
         {"absolute_acceleration_peak": unsure, "friction_force_peak": loose}
 
 

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from ...core import Response
+from ...dynamics.integrated import start_phase
 from ...dynamics.work_check import gap
 from ...response.loops import half_range, interface_loops, secant_stiffness, turns_of
 from ...response.measures import REST, ROUND, SHARE, SMOOTH
@@ -125,9 +126,8 @@ class Samples:
         phase = self.angle[at] + 2 * np.pi / self.steps * (0.5 - before[at, run] / rise[at, run])
         count, sums = np.bincount(run, minlength=slip.shape[1]), [
             np.bincount(run, wave(2 * phase), slip.shape[1]) for wave in (np.cos, np.sin)]
-        start = np.where(count > 0, np.arctan2(sums[1], sums[0]) / 2 % np.pi, np.nan)
         return {"slip_amplitude": np.ptp(slip, axis=0) / 2, "stick_fraction": below.mean(axis=0),
-                "slip_start_phase": start}
+                "slip_start_phase": start_phase(count, *sums)}
 
     def window_of(self, run: int, acceleration) -> Response:
         """The samples of one run with its acceleration (s,) [m s-2], as far as what rings in them is asked for."""

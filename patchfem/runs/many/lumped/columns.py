@@ -173,7 +173,8 @@ def _reasons(models, sizes: Sizes, runs: Runs, found: Answers) -> None:
         found.measure(name, TABLE[name].unit)
     lacking = np.array([np.isnan(found.values[name]) for name in names])
     holds = found.values["stick_fraction"] == 1 if "stick_fraction" in found.values else lacking[0] & False
-    signs = np.array([*lacking, holds, sizes.largest != 0])  # all that a reason hangs on, of a sine
+    sticks = found.values["stick_fraction"] > 0 if "stick_fraction" in found.values else lacking[0] & False
+    signs = np.array([*lacking, holds, sticks, sizes.largest != 0])  # all that a reason hangs on, of a sine
     patterns, which = np.unique(signs, axis=1, return_inverse=True)
     for place in np.flatnonzero(patterns[:len(names)].any(axis=0)).tolist():
         cases = np.flatnonzero(which.ravel() == place).tolist()
