@@ -269,9 +269,9 @@ ROWS = (
     Row("normal_load", "N", 0.0, "normal load on the interface, summed over all equal patches (key `pairs`)",
         lambda s: s.load, group="friction"),
     Row("loop_area", "J", 1e-10,
-        "energy dissipated per cycle in this interface alone, in both directions if the interface slides in a plane; "
-        "null if the drive is not a sine and the friction loop does not close, because the interface then stores or "
-        "returns more energy than it dissipates",
+        "friction work per cycle in this interface alone (the energy dissipated, if the loop closes), in both "
+        "directions if the interface slides in a plane; null if the drive is not a sine and the friction loop does not "
+        "close, because the interface then stores or returns more energy than it dissipates",
         lambda s: s.cycle.get("loop_area"), group="energy"),
     Row("equivalent_stiffness", "N m-1", 1.0,
         "part of the first harmonic of the friction force that is in phase with the slide, divided by the first "

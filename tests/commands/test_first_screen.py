@@ -24,6 +24,7 @@ from patchfem.export.pages.words import (
     zero_below,
 )
 from patchfem.response.rows import ROWS as MOTION
+from patchfem.runs.bench.result import OPENED
 from patchfem.runs.results.patch_rows import ROWS as STATIC
 from patchfem.runs.rig.rig import Passes
 from patchfem.scene.keys.quantities import KINDS
@@ -250,3 +251,13 @@ def test_refuses_with_the_key_that_was_meant(tmp_path):
 def test_exact_a_second_interface_reads_in_the_units_of_the_first():
     one = {"value": 1.0, "error": 0.0, "unit": "1"}
     assert pair("stick_fraction_2", one) == pair("stick_fraction", one) == "100 %"
+
+
+@pytest.mark.parametrize("kind, outcome, warnings, text", [
+    ("rig", "steady", [], "2.00 ± 0.10 mJ dissipated per cycle."),
+    ("rig", "transient", [], "2.00 ± 0.10 mJ dissipated per cycle (mean of the last cycles)."),
+    ("bench", "done", [f"{OPENED}: it misses"], "Friction work of the last cycle 2.00 ± 0.10 mJ.")])
+def test_exact_the_work_of_a_loop_that_changes_is_told_with_its_cycles(kind, outcome, warnings, text):
+    measures = {"loop_area": {"value": 2e-3, "unit": "J", "error": 1e-4}}
+    summary = {"kind": kind, "outcome": outcome, "measures": measures, "warnings": warnings, "effects": []}
+    assert headline(summary, 10.0) == text

@@ -157,7 +157,8 @@ def integrated(response, drive, ends) -> tuple:
     held, starts = parts.holds()
     loop = Loop(parts.harmonic("slide"), parts.harmonic("force"), after[3] - before[3], 2 * slip,
                 min(held, parts.time[-1, -1] - parts.time[0, 0]), pull)
-    return Integrated(swing, gain, parts.drift(), _waves(parts, drive, ends), (loop,), 2 * np.pi * starts / period % np.pi), \
+    phases = 2 * np.pi * starts / period % np.pi
+    return Integrated(swing, gain, parts.drift(), _waves(parts, drive, ends), (loop,), phases), \
         {"absolute_acceleration_peak": unsure, "friction_force_peak": loose}
 
 

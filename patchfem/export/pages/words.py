@@ -10,6 +10,7 @@ from ... import scales
 from ...core import Outcome
 from ...response.rows import TABLE as MOTION
 from ...response.rows import of_first, of_number
+from ...runs.bench.result import OPENED
 from ...runs.results.patch_rows import TABLE as STATIC
 from ...runs.results.result import Result
 from ..summary import measure_object
@@ -38,6 +39,7 @@ SHAKEN = {"relative_displacement_rms": "the displacement of the output is {} rms
           "absolute_acceleration_rms": "the acceleration of the output is {} rms",
           "response_frequency": "the frequency response H1 peaks at {}",
           "response_damping": "the damping ratio of that peak is {}"}
+CHANGES = ("transient", "grows")  # outcomes of a motion whose last cycles differ
 BETWEEN = ("jump_level",)  # known to lie between two levels of the drive, whatever the tolerance
 ROUND = 1e-12  # of the friction force times the motion: work that is round-off
 NONE = MappingProxyType({})
@@ -211,7 +213,10 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str, str], s
         if "relative_displacement_amplitude" not in measures:
             said("friction_ratio_peak", "friction ratio peaks at {}")
         if whole and not released:
-            of_each("loop_area", "{} dissipated per cycle")
+            opened = any(one.startswith(OPENED) for one in summary.get("warnings", ()))
+            changes = summary["outcome"] in CHANGES and summary["kind"] in ("rig", "linear")
+            of_each("loop_area", "friction work of the last cycle {}" if opened else "{} dissipated per cycle" +
+                    " (mean of the last cycles)" * changes)
         of_each("contact_fraction", "{} of the length in contact" + placed(
             summary.get("contact"), measures.get("contact_fraction", {}).get("value")))
         if summary["kind"] == "patch":

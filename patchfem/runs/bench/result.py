@@ -1,11 +1,14 @@
 """A bench from its plan to its result: the slide, its errors, and the warnings on law and overhang."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...core import Outcome
 from ...effects import has
 from ...response.errors import with_errors
 from ...response.rows import judged
+from ...scales import short
 from ..results.notes import climbing_as_one, of_growth, unbounded_bonds, unripe, warming, work_check_warning
 from ..results.result import FRAMES, Result, frames_of, on_a_mesh_of_known_error, without_errors
 from ..results.travel import FAR, largest_slide, outcome_on_piece, travelled
@@ -13,6 +16,10 @@ from . import bench, shear
 from .engine import steps_of
 from .errors import errors_of
 from .ledger import Watch
+
+OPENED = "the friction loop of the last cycle does not close"
+MORE = 4  # cycles by which a steady loop is sought
+MOST_TRIED = 2e6  # forces of points at samples, up to which they are tried
 
 
 def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point, estimate) -> Result:
@@ -37,7 +44,8 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
         warnings = [*warnings, f"the law as printed in the report created {created:.3g} J, "
                                f'which is {100 * created / power:.2g} % of the work exchanged; with friction.reading = '
                                '"stretch" no energy is created']
-    warnings = [*warnings, *warming(model, patch, fine), *work_check_warning(found, steps)]
+    warnings = [*warnings, *warming(model, patch, fine), *work_check_warning(found, steps),
+                *_still_open(model, patch, fine, steps)]
     if patch is not None:
         warnings = [*warnings, *_overhang(model.patch, patch, fine)]
         fields = frames_of(patch, fine.time[fine.frames], fine.tau, fine.local, fine.slide[fine.frames])
@@ -52,6 +60,38 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
     return Result(what, outcome, found, fine, fine, patch, fields, seconds, warnings,
                   {"engine": fine.engine.name, "steps": steps, "notes": notes, "left_open": left}
                   | ({"shear_modes": count} if count else {}))
+
+
+def _miss(fine) -> float:
+    """By what the last cycle misses to close [1]: by the force over the largest one, or by the energy stored over the
+    work of the cycle."""
+    force, (work, stored, *_) = fine.force[fine.first:], fine.ledger[:, fine.first:]
+    shares = ((force[-1] - force[0], np.abs(force).max()), (stored[-1] - stored[0], work[-1] - work[0]))
+    return max(abs(float(change / size)) if size else 0.0 for change, size in shares)
+
+
+def _still_open(model, patch, fine, steps: int) -> list:
+    """Warning, as a list, of a bench whose last loop does not close and is not the steady one, with the cycles after
+    which it is, found by MORE cycles, where they take fewer than MOST_TRIED forces."""
+    period, tolerance, cycles = model.slide.period, model.accuracy.tolerance, model.slide.cycles
+    if period is None or cycles < 1 or not fine.values.get("loop_area"):
+        return []
+    if (miss := _miss(fine)) <= tolerance:
+        return []
+    text = f"{OPENED}: it misses by {100 * miss:.2g} % (limit {100 * tolerance:g} %), so loop_area, the friction " \
+           "work of the last cycle, is not the energy dissipated in a steady loop"
+    if fine.time.size * (1 if patch is None else patch.x.size) * (cycles + MORE) / cycles > MOST_TRIED:
+        return [f"{text}; raise slide.cycles"]
+    longer = bench.run(replace(model, slide=replace(model.slide, cycles=cycles + MORE)), patch, steps)
+    ends = longer.time[-1] - period * np.arange(MORE + 1, -1, -1)
+    loops = np.diff(np.interp(ends, longer.time, longer.ledger[0]))
+    near = np.abs(loops - loops[-1]) <= tolerance * np.abs(loops[-1])
+    if near[0]:
+        return []
+    if not near[-2]:
+        return [f"{text}; no steady loop is reached within {cycles + MORE:g} cycles"]
+    count = int(np.flatnonzero(~near)[-1]) + 1
+    return [f"{text}, which is {short(float(loops[-1]), 'J', 4)}; set slide.cycles = {cycles + count:g}"]
 
 
 def _overhang(asked, patch, fine) -> list:
