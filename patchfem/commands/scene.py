@@ -8,10 +8,11 @@ from cyclopts import Parameter
 
 from .. import rates
 from ..campaigns.sweeps import ask, estimate
-from ..effects import shown_absent
+from ..effects import has, shown_absent
 from ..export.written import brief
 from ..mesh import files as mesh_files
 from ..model import files as model_files
+from ..response.rows import of_first
 from ..runs import plan as plans
 from ..runs.patch import faces, result
 from ..scales import short, tidied
@@ -115,18 +116,27 @@ def _print_plan(answer: dict, probe: bool, verbose: bool) -> None:
         print(f"  runs   {effect['effect']:<28} {effect['equations']}")
     for sentence in answer["verdict"]:
         print(f"says     {sentence}")
-    links = [f"{_words(name)} {link if isinstance(link, str) else short(link, 'N m-1', 4)}"
+    bonded = any(has(one["effect"].partition("law=")[2], "bonds") for one in answer["effects"])
+    links = [f"{_link(name, bonded)} {link if isinstance(link, str) else short(link, 'N m-1', 4)}"
              for name, link in answer["stiffness_chain"].items()]
     print("chain    " + " -> ".join(links))
-    if not probe and not isinstance(answer["stiffness_chain"].get("pieces_shear", "rigid"), str):
+    above = not probe and any(not isinstance(link, str) for name, link in answer["stiffness_chain"].items()
+                              if of_first(name) == "pieces_shear")
+    if above:
         print("         the shear stiffness of the pieces is an upper estimate; use --probe to compute it")
     for one in answer.get("modes", ()):
-        held = "" if one["stuck_frequency"] is None else f", {one['stuck_frequency']:.5g} Hz while the contact sticks"
+        held = "" if one["stuck_frequency"] is None else \
+            f", {'at most ' * above}{one['stuck_frequency']:.5g} Hz while the contact sticks"
         print(f"mode     {one['name']} {one['free_frequency']:.5g} Hz without contact{held}")
     for name, value in answer["groups"].items():
         print(f"group    {_group(value, name)}")
     if verbose:
         print(f"absent   {', '.join(shown_absent(answer['not_in_scene'], answer['engine']))}")
+
+
+def _link(name: str, bonded: bool) -> str:
+    """The name of a link of the stiffness chain as words: bonds hold an interface where a law has them."""
+    return _words(name if bonded else name.replace("bonds", "friction"))
 
 
 def _words(name: str) -> str:

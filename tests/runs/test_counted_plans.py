@@ -222,3 +222,44 @@ def test_always_the_list_of_a_block_that_is_just_held_is_foreseen(order):
     model = found.model
     assert book["strips"] / 3 <= bonds_cost(model, choose(model))[0] <= 3 * book["strips"]
     assert any("bonds of order 0 keep the block from sliding" in text for text in found.verdict) == (order == "0.0")
+
+
+SLIDES = """[normal]
+load = "100 N"
+[friction]
+law = "coulomb"
+static = 0.9
+kinetic = {kinetic}
+[structure]
+moving_mass = "1 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "50 Hz"
+damping = 0.02
+slide = 1.0
+[drive]
+kind = "force"
+frequency = "50 Hz"
+force = "100 N"
+cycles = 200
+"""
+
+
+@pytest.mark.parametrize("kinetic, sticks", [(0.2, False), (0.85, True)])
+def test_exact_the_kinetic_coefficient_tells_whether_a_block_that_slips_sticks_again(kinetic, sticks):
+    text = SLIDES.format(kinetic=kinetic)
+    found, run_ = plan(loads(text)), run(loads(text))
+    said = next(one for one in found.verdict if one.startswith("D = 0.9 is below 1"))
+    assert (run_.measures["stick_fraction"].value > 0) == sticks == ("alternates between stick and slip" in said)
+    assert ("does not limit the amplitude" in said) != sticks
+    assert found.groups["D"] == pytest.approx(0.9) and found.groups["D_kinetic"] == pytest.approx(kinetic)
+    assert found.groups["knee"] == pytest.approx(4 / np.pi * kinetic * 100)
+
+
+@pytest.mark.parametrize("drive, there", [('kind = "force"\nforce = "100 N"', False),
+                                          ('kind = "base"\nacceleration = "10 g"', True)])
+def test_exact_a_force_has_no_displacement_of_the_drive(drive, there):
+    head, _, _ = SLIDES.partition("[drive]")
+    head = head.replace("kinetic = {kinetic}", 'bond_length = "10 um"').replace("coulomb", "elastic-plastic")
+    groups = plan(loads(f'{head}[drive]\n{drive}\nfrequency = "50 Hz"\ncycles = 20\n')).groups
+    assert ("drive_amplitude_over_bond_length" in groups) == there

@@ -58,6 +58,7 @@ def test_a_spring_before_the_slip_keeps_a_small_swing_up():
     assert swings[0] == pytest.approx(swings[1], rel=2e-3)
     [note] = [one for one in small.notes if "which is stable" in one]
     assert f"{1e6 * swings[0]:.1f} um" in note
+    assert "smaller amplitude ends in the limit cycle" in note
     edge = small.measures["flutter_amplitude"]
     for way in (-1, 1):
         start = 1e3 * edge.value + way * (1e3 * edge.error + 0.02 * EDGE)

@@ -30,13 +30,16 @@ def flutter_of(run) -> tuple:
     if not edges:
         return {NAME: Measure(None, unit, None, floor, reason=reason)}, far
     edge = edges[-1]
-    below = [one for one in found if one.lasts and one.amplitude < edge.amplitude]
+    below = [one for one in found if one.lasts and one.amplitude < edge.amplitude][-1:]
+    least = [one for one in found if not one.lasts and below and one.amplitude < below[0].amplitude][-1:]
     alone = has(model.friction.law, "set-valued") and model.rig.modes.omega.size == 1  # nothing rings in a stick
-    falls = f" to the limit cycle of {say(below[-1].amplitude, 3)}, which is stable" if below else " to rest" * alone
+    falls = f"amplitude between {say(least[0].amplitude, 3)} and this" if least else "smaller amplitude"
+    falls += f" ends in the limit cycle of {say(below[0].amplitude, 3)}, which is stable" if below else \
+        " decays to rest" if alone else " decays"
     return {NAME: Measure(edge.amplitude, unit, edge.error, floor)}, [
         "a mode of negative damping gains energy: without a drive this mode has an unstable steady oscillation of "
         f"{say(edge.amplitude, 4)} at the output, at {edge.omega / 6.283185307179586:.4g} Hz; a free oscillation of "
-        f"smaller amplitude decays{falls}, and a free oscillation of larger amplitude grows", *far]
+        f"{falls}, and a free oscillation of larger amplitude grows", *far]
 
 
 def _cycles(model, numerics, patch) -> tuple:

@@ -134,18 +134,20 @@ def _of_modes(numerics, points: int, unknowns: dict, load_varies: bool) -> float
 def groups(model: Model) -> dict:
     """Dimensionless groups of the motion by name, those without a meaning left out.
 
-    D: friction limit over the largest force of the drive, which is D of 2.3 at resonance; knee [m s-2]: input beyond
-    which friction alone does not bound a motion at resonance.
+    D: static friction limit over the largest force of the drive, which is D of 2.3 at resonance; D_kinetic: that of the
+    kinetic limit, where it is another; knee [m s-2]: input beyond which friction alone does not bound a motion at
+    resonance, that of a block that slides.
     """
     out, f, rig = {}, model.friction, model.rig
-    limit = sum(one.numbers.static * (model.nominal_load if one.load is None else one.load) for one in rig.interfaces)
+    limits = [one.limits(model.nominal_load if one.load is None else one.load) for one in rig.interfaces]
+    limit, kinetic = (sum(one[k] for one in limits) for k in range(2))
     push = rig.force if rig.force else rig.mass * largest(rig.drive)
     if push > 0:
-        out["D"] = limit / push
+        out |= {"D": limit / push} | ({} if kinetic == limit else {"D_kinetic": kinetic / push})
     ratio = rig.own_frequency * rig.drive.period if rig.frequency else inf
     if abs(ratio - 1) < 0.2:
-        out["knee"] = 4 / pi * limit / rig.mass * _lever(rig)
-    if f is not None and f.bond_length:
+        out["knee"] = 4 / pi * kinetic / rig.mass * _lever(rig)
+    if f is not None and f.bond_length and f.stiffness is None and rig.drive.moving:
         out["drive_amplitude_over_bond_length"] = largest(rig.drive) / omega_of(rig.drive)**2 / f.bond_length
     return out
 
@@ -185,9 +187,17 @@ def first_words(rig, found: dict, chain: dict) -> list:
                 f"({soft[-1]}) is {chain[soft[-1]]:.4g} N/m and the stiffness of the mode is {rig.stiffness:.4g} N/m"]
     if d >= 1:
         return [f"D = {d:.3g} >= 1: friction should hold the block, so that it sticks"]
+    if "D_kinetic" in found:  # a block that slides is braked by the kinetic limit
+        sliding = found["D_kinetic"] * _lever(rig)
+        return [f"D = {d:.3g} is below 1, so that the block slips; with the kinetic coefficient {_sliding(sliding)}"]
+    return [_sliding(d)]
+
+
+def _sliding(d: float) -> str:
+    """The sentence on a block that slips at D < 1."""
     if d > pi / 4:
-        return [f"D = {d:.3g} lies between pi/4 and 1: at resonance the block alternates between stick and slip"]
-    return [f"D = {d:.3g} is below pi/4: at resonance friction alone does not limit the amplitude"]
+        return f"D = {d:.3g} lies between pi/4 and 1: at resonance the block alternates between stick and slip"
+    return f"D = {d:.3g} is below pi/4: at resonance friction alone does not limit the amplitude"
 
 
 def sum_words(model: Model) -> list:
