@@ -69,16 +69,16 @@ def rounded(value: float | None, error: float | None = None, least: float = 0.0,
     """Value and error as texts that end at the same digit, the second of the error.
 
     least: the floor of the measure, below which a value that its error leaves open, and round-off whatever its error,
-    is 0; ratio: it has no unit, so that its floor is the same in a large rig and a small one. A dash stands for no
-    value. No error stands beside a value whose digits are all known, to one unit of the last, and beside one whose
-    error is not known.
+    is 0, with its error where that is the floor; ratio: it has no unit, so that its floor is the same in a large rig
+    and a small one. A dash stands for no value. No error stands beside a value whose digits are all known, to one unit
+    of the last, and beside one whose error is not known.
     """
     if value is None:
         return "-", ""
     if not isfinite(value):
         return f"{value:g}", ""
     if _is_zero(value, error, least, ratio):
-        return "0", ""
+        return "0", plain(error, 2) if error is not None and 0 < least <= error else ""
     if error is None or not isfinite(error):
         return plain(value, ALONE), "" if error is None else f"{error:g}"
     if value == 0:

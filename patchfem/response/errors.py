@@ -14,6 +14,7 @@ laws (seeds below 200, 41000000- and 42000000- of tests/support/motion_scenes.py
 tests/README.md.
 """
 
+from dataclasses import replace
 from statistics import median
 
 import numpy as np
@@ -265,6 +266,24 @@ def with_errors(values: dict, *errors: dict, least: float = 0.0, size: float = n
     for name, value in values.items():
         error = total_error(name, value, [part.get(name, abs(value)) for part in errors], least, amplitude)
         out[name] = Measure(float(value), row_of(name).unit, float(error), float(floor_of(name, size)))
+    return out
+
+
+def unseen(found: dict, cycles: float) -> dict:
+    """Measures by name behind a patch that slips part by part: a mesh shows no slip of less than an element, so no slip
+    is known to the floor only, and with it the work of so many cycles, 4 F u of a loop of force F and slip u."""
+    out = dict(found)
+    for name, slip in found.items():
+        if of_first(name) != "slip_amplitude" or slip.error is None or abs(slip.value or 0.0) > row_of(name).floor:
+            continue
+        number, least = name[len("slip_amplitude"):], max(slip.error, row_of(name).floor)
+        force = found.get(f"friction_force_peak{number}")
+        works = {f"loop_area{number}": 1.0} | ({} if number else {"energy_dissipated": cycles})
+        errors = {name: least} | {one: 4 * abs(force.value) * least * times for one, times in works.items() if force}
+        for one, error in errors.items():
+            if one in found and found[one].value is not None and found[one].error is not None \
+                    and abs(found[one].value) <= error:
+                out[one] = replace(found[one], error=max(found[one].error, error), floor=max(found[one].floor, error))
     return out
 
 

@@ -18,6 +18,8 @@ HOLDS = "the whole interface sticks throughout the last cycles"
 UNBOUNDED = "no bounded motion exists at this drive"
 STILL = "the output does not move: the first harmonic of its acceleration is 0 within the accuracy of the computation"
 APERIODIC = "the drive is not a sine at the end of the run, so no period is known over which to take the mean slide"
+STOPS = ("the interface sticks where its slide is largest: during this stick the friction force takes different values "
+         "at the same slide")
 UNCLOSED = ("the friction loop does not close: during the last cycles the stored energy changes by more than friction "
             "dissipates; the energy dissipated in the whole run is given by energy_dissipated")
 
@@ -37,6 +39,15 @@ def without_value(values, window, drive, rubs: bool, beside: float = 0.0) -> dic
         lacking["slip_start_phase"] = _of_phase(values, drive)
     return {name: Measure(None, TABLE[name].unit, None, TABLE[name].floor, reason=reason)
             for name, reason in lacking.items() if name not in values}
+
+
+def stopping(values) -> dict:
+    """The secant stiffness without a value, by name, of rigid friction that holds at the ends of its slide: the force
+    there is no single one. values: Measure by name."""
+    one, stuck = values.get("secant_stiffness"), values.get("stick_fraction")
+    holds = one is not None and stuck is not None and stuck.value is not None and \
+        stuck.value > TABLE["stick_fraction"].floor + (stuck.error or 0.0)
+    return {"secant_stiffness": replace(one, value=None, error=None, reason=STOPS)} if holds else {}
 
 
 def undrifting(values, drive) -> dict:

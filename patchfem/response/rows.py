@@ -281,7 +281,7 @@ ROWS = (
     Row("secant_stiffness", "N m-1", 1.0,
         "friction force at the largest slide of a cycle minus friction force at the smallest slide, divided by the "
         "range of the slide; if the force jumps at the largest or the smallest slide, the mean of the forces "
-        "before and after the jump is used",
+        "before and after the jump is used; null if rigid friction sticks there, where the force takes many values",
         lambda s: s.cycle.get("secant_stiffness"), group="friction", halves=FOURTH),
     Row("equivalent_damping", "1", 1e-8,
         "equivalent damping ratio of friction in the first mode that is not rigid, averaged over the last cycles: "

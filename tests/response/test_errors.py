@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from patchfem.core import Measure
 from patchfem.model.model import build
 from patchfem.response.errors import (
     GROWS,
@@ -18,6 +19,7 @@ from patchfem.response.errors import (
     step_error,
     tolerance_error,
     typical_change,
+    unseen,
     with_errors,
 )
 from patchfem.response.rows import floor_of
@@ -321,3 +323,15 @@ def test_exact_an_amplitude_that_agrees_by_chance_errs_with_those_that_do_not():
     assert found["secant_stiffness"] == pytest.approx(0.015e6)
     assert found["friction_force_peak"] == 0
     assert found["loop_area"] == pytest.approx(0.3) and found["energy_balance"] == pytest.approx(2e-12)
+
+
+def test_exact_no_slip_of_a_mesh_is_known_to_its_floor_only():
+    """An edge slips within an element: the loss of a loop is 4 F u at most."""
+    found = {"slip_amplitude": Measure(0.0, "m", 0.0, 1e-13), "friction_force_peak": Measure(3.0, "N", 0.0, 1e-6),
+             "loop_area": Measure(0.0, "J", 0.0, 1e-10), "energy_dissipated": Measure(0.0, "J", 0.0, 1e-10)}
+    bars = {name: one.error for name, one in unseen(found, 20.0).items()}
+    assert bars == pytest.approx({"slip_amplitude": 1e-10, "friction_force_peak": 0.0, "loop_area": 1.2e-9,
+                                  "energy_dissipated": 2.4e-8})
+    assert str(unseen(found, 20.0)["slip_amplitude"]).startswith("0 ± 0.1 nm")
+    slips = found | {"slip_amplitude": Measure(1e-6, "m", 1e-9, 1e-10)}
+    assert unseen(slips, 20.0) == slips

@@ -7,7 +7,7 @@ import pytest
 
 from patchfem.core import BaseSine, Measure, Segment
 from patchfem.response.events import RELEASE_UP
-from patchfem.response.reasons import APERIODIC, STILL, UNCLOSED, unclosed
+from patchfem.response.reasons import APERIODIC, STILL, STOPS, UNCLOSED, unclosed
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
@@ -168,3 +168,15 @@ def test_exact_several_slips_per_half_cycle_have_no_start_phase():
     starts = 360 * 3 * events.time[(events.kind == RELEASE_UP) | (events.kind == RELEASE_UP + 1)] % 180
     assert np.ptp(starts) > 100 and done.measures["slip_start_phase"].value is None
     assert "several times" in done.measures["slip_start_phase"].reason
+
+
+@pytest.mark.parametrize(("kinetic", "there"), [("0.2", False), ("0.05", True)])
+def test_exact_no_secant_where_rigid_friction_sticks_at_the_largest_slide(kinetic, there):
+    """The force of a stick is any between both limits; a block that slides through its turns has a mean of 0."""
+    text = STICK_SLIP.replace("kinetic = 0.2", f"kinetic = {kinetic}")
+    if there:
+        text = text.replace("3 Hz", "50 Hz").replace("static = 0.4", "static = 0.05").replace("= 12", "= 60")
+    found = run(loads(text)).measures
+    secant = found["secant_stiffness"]
+    assert (found["stick_fraction"].value == 0) == there == (secant.value is not None)
+    assert secant.value == pytest.approx(0.0, abs=1e-3) if there else secant.reason == STOPS

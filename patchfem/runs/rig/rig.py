@@ -6,10 +6,11 @@ from math import ceil
 import numpy as np
 
 from ...core import Outcome, PatchfemError
+from ...effects import has
 from ...model.rig import BEYOND
 from ...response import reasons, run_events, stationary
 from ...response.coarser import estimate, left_open
-from ...response.errors import with_errors
+from ...response.errors import unseen, with_errors
 from ...response.outcome import settle, without_bars
 from ...response.rows import judged
 from ...response.settling import slip_period
@@ -118,7 +119,9 @@ def _started(run: Coupled) -> Coupled:
 def _reasoned(run: Coupled) -> Coupled:
     """With a reason in place of each measure that such a run can have and this one has not."""
     found, window, rig = run.measures, run.raw.window, run.model.rig
-    return replace(run, measures=found | reasons.unclosed(found, window, run.drive) | reasons.undrifting(
+    rigid = run.rubs and has(run.model.friction.law, "set-valued") and not (run.model.soft or rig.soft)
+    stops = reasons.stopping(found) if rigid else {}
+    return replace(run, measures=found | stops | reasons.unclosed(found, window, run.drive) | reasons.undrifting(
         found, run.drive) | reasons.without_value(found, window, run.drive, run.rubs,
                                                   rig.beside_first(window.modal)))
 
@@ -149,7 +152,9 @@ def _decayed(run: Coupled, coarse) -> tuple:
 
 def _judged(run: Coupled) -> Coupled:
     """With the final floors of its measures; a steady motion that does not exist has none."""
-    found = judged(run.measures, run.model.accuracy.tolerance)
+    soft = run.rubs and (run.model.soft or run.model.rig.soft)
+    found = unseen(run.measures, run.numerics.cycles) if soft else run.measures
+    found = judged(found, run.model.accuracy.tolerance)
     if ENGINES[run.numerics.engine].steady and run.outcome is Outcome.GROWS:
         found = reasons.unbounded(found)
     return replace(run, measures=found)

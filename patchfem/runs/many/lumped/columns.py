@@ -13,7 +13,7 @@ from ....model.alike import Alike, columns_of
 from ....response.errors import total_error
 from ....response.measures import energy_balance
 from ....response.outcome import SMALL, goes_on, moves_on, settled, steady_error
-from ....response.reasons import CYCLIC, without_value
+from ....response.reasons import CYCLIC, STOPS, without_value
 from ....response.rows import TABLE, floor_of, larger_term
 from ....response.settling import CLASSES, STEADY, steady_amplitudes, windows_of
 from ....structure.drive_sizes import largest, slowest
@@ -127,6 +127,8 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
         found.errors[name] = np.where(there & ~grows, errors[name], np.nan)
         found.floors[name] = np.where(there, floor, np.nan)
     _reasons(models, sizes, runs, found)
+    if has(models[0].friction.law, "set-valued"):
+        _stops(found)
     found.numerics.update({case: numerics | runs.chosen[case] for case in range(n)} if runs.chosen
                           else dict.fromkeys(range(n), numerics))
     wide_of &= True if again is None else ~again(found)
@@ -164,6 +166,19 @@ def _outcome(sizes: Sizes, runs: Runs, moves) -> tuple:
     ends = [Outcome.STUCK if stuck else CLASSES[k] for stuck, k in zip(runs.stuck, number)]
     return [Outcome.TRANSIENT if loads else one for loads, one in zip(np.broadcast_to(runs.loads, len(ends)), ends)], \
         steady
+
+
+def _stops(found: Answers) -> None:
+    """No secant stiffness where rigid friction holds at the ends of its slide, as of `response.reasons.stopping`."""
+    stuck, secant = (found.values.get(name) for name in ("stick_fraction", "secant_stiffness"))
+    if stuck is None or secant is None:
+        return
+    with np.errstate(invalid="ignore"):
+        holds = ~np.isnan(secant) & (stuck > TABLE["stick_fraction"].floor + np.nan_to_num(
+            found.errors["stick_fraction"]))
+    found.values["secant_stiffness"] = np.where(holds, np.nan, secant)
+    found.errors["secant_stiffness"] = np.where(holds, np.nan, found.errors["secant_stiffness"])
+    found.reasons.setdefault("secant_stiffness", {}).update(dict.fromkeys(np.flatnonzero(holds).tolist(), STOPS))
 
 
 def _reasons(models, sizes: Sizes, runs: Runs, found: Answers) -> None:
