@@ -20,6 +20,9 @@ from .settling import (
 )
 
 TELLS = 0.02  # of the tolerance, from which what an amplitude will still change by is told
+UNSETTLED = "the interface sticks, but the amplitude has not settled"
+SAFE = 1.5  # times the cycles that the decay needs: the last windows of a short run beat
+MOST_MORE = 1e6  # cycles that are proposed
 SMALL = 1e-12  # of the displacement a/omega^2 of the drive: a change of the amplitude that is round-off
 
 
@@ -168,6 +171,34 @@ def off_the_piece(outcome: Outcome | None, reach: float, length: float) -> Outco
     slide means nothing.
     """
     return Outcome.LEAVES_CONTACT if reach > length and outcome is not Outcome.NOT_CONVERGED else outcome
+
+
+def unsettled(raw, measures: dict, limits: tuple, drive, cycles: float) -> list:
+    """Warning, as a list, of a motion under a sine that sticks but rings on: its amplitude is that of a transient.
+
+    limits: (tolerance, rate [1/s] at which the slowest mode decays); cycles: of the run. By what the amplitude of the
+    last window will still change, with the cycles after which a free motion at that rate is below the tolerance.
+    """
+    (tolerance, slowest), amplitude = limits, measures["relative_displacement_amplitude"].value
+    if raw.outcome is not Outcome.STUCK or not drive_sizes.sinusoidal(drive) or raw.extremes is None or not amplitude:
+        return []
+    window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
+    return rings_on(np.asarray(raw.extremes), window, amplitude, tolerance, slowest * drive.period, cycles)
+
+
+def rings_on(extremes, window: int, amplitude: float, tolerance: float, decay: float, cycles: float) -> list:
+    """`unsettled` of a motion that sticks, by the extremes (c, 2) [m] of its cycles and the decay of its slowest mode
+    over a cycle [1]."""
+    ends = windows_of(extremes, window)[0]
+    left = float(left_over(extremes, window, max(decay, 0.0) * window))
+    left = max(left, float(abs(ends[-1] - ends[-2]))) if ends.size > 1 else left
+    if not left > tolerance * amplitude:
+        return []
+    more = np.log(left / amplitude / tolerance) / decay if decay > 0 else np.inf
+    remedy = f"set drive.cycles = {float(f'{cycles + SAFE * more:.2g}'):g}" if more < MOST_MORE else \
+        'set accuracy.method = "harmonic" for the steady motion'
+    return [f"{UNSETTLED}: by up to {100 * left / amplitude:.2g} % (limit {100 * tolerance:g} %) it is free vibration "
+            f"that will decay, so relative_displacement_amplitude is that of a transient; {remedy}"]
 
 
 def changing_note(outcome: Outcome, drive) -> list:

@@ -164,7 +164,8 @@ def test_exact_a_level_between_two_others_does_not_claim_the_tolerance():
     """A jump at 5 g between levels 2 g apart; all that the tolerance steers is known to it."""
     def said(**measures):
         model = SimpleNamespace(accuracy=SimpleNamespace(tolerance=1e-2))
-        return least_known(SimpleNamespace(plan=SimpleNamespace(model=model), measures=measures))
+        return least_known(SimpleNamespace(plan=SimpleNamespace(model=model), measures=measures,
+                                           outcome=Outcome.STEADY))
 
     jump, fine = Measure(5 * 9.80665, "m s-2", 9.80665, 9.80665), Measure(2.0, "J", 1e-2)
     between = "jump_level, 5.0 ± 1.0 g, has an error of one step between the drive levels of the scene"
@@ -264,3 +265,18 @@ def test_exact_the_work_of_a_loop_that_changes_is_told_with_its_cycles(kind, out
     measures = {"loop_area": {"value": 2e-3, "unit": "J", "error": 1e-4}}
     summary = {"kind": kind, "outcome": outcome, "measures": measures, "warnings": warnings, "effects": []}
     assert headline(summary, 10.0) == text
+
+
+@pytest.mark.parametrize("outcome, there", [
+    (Outcome.GROWS, "after 2 s: the measures describe its last cycles"), (Outcome.STEADY, "meets the tolerance")])
+def test_exact_a_motion_that_grows_claims_no_tolerance(outcome, there):
+    plan = SimpleNamespace(model=SimpleNamespace(accuracy=SimpleNamespace(tolerance=1e-2)))
+    load = Measure(1.0, "N", 0.0, 0.0)
+    said = least_known(SimpleNamespace(plan=plan, measures={"normal_load": load}, outcome=outcome,
+                                       response=SimpleNamespace(time=[0.0, 2.0])))
+    assert there in said and ("tolerance" in said) == (outcome is Outcome.STEADY)
+
+
+def test_exact_a_release_is_not_told_of_a_drive():
+    summary = {"kind": "rig", "outcome": "transient", "measures": {}, "effects": [{"effect": "drive.kind=free"}]}
+    assert "drive is periodic" not in verdict(summary) and "came to rest" in verdict(summary)

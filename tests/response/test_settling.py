@@ -5,9 +5,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import patchfem as pf
 from patchfem.core import Outcome
 from patchfem.response import settling
-from patchfem.response.outcome import settled, steady_error
+from patchfem.response.outcome import UNSETTLED, settled, steady_error
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
@@ -267,3 +268,44 @@ def test_exact_the_error_of_a_steady_amplitude_holds_that_of_the_run():
     """An amplitude that is 5 % off moves what it settles to by 5 %."""
     assert steady_error(2.0, 0.01, 1.0, 0.05) == pytest.approx(0.01 + 0.1, rel=1e-12)
     assert steady_error(np.array([2.0, 0.5]), 0.0, -1.0, 0.05) == pytest.approx([0.1, 0.025], rel=1e-12)
+
+
+HOLDS = """[normal]
+load = "100 N"
+[friction]
+law = "elastic-plastic"
+static = 0.5
+stiffness = "1e6 N/m"
+[structure]
+moving_mass = "1 kg"
+[[structure.mode]]
+name = "m0"
+frequency = "100 Hz"
+damping = 0.01
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "150 Hz"
+acceleration = "1 m/s^2"
+cycles = {cycles}
+[accuracy]
+tolerance = 1e-2
+"""
+
+
+@pytest.mark.parametrize("cycles, settled", [(20, False), (600, True)])
+def test_exact_a_motion_that_sticks_and_rings_on_is_said_to_be_transient(cycles, settled):
+    """Of a held linear rig the steady amplitude is a/|w_1^2 - w^2 + 2 i z_1 w_1 w|."""
+    done = pf.run(HOLDS.format(cycles=cycles))
+    own, omega = 2 * np.pi * 100, 2 * np.pi * 150
+    steady = 1 / abs(own**2 + 1e6 - omega**2 + 0.02j * own * omega)
+    amplitude = done.measures["relative_displacement_amplitude"].value
+    told = [one for one in done.warnings if one.startswith(UNSETTLED)]
+    assert done.outcome == "stuck" and (abs(amplitude / steady - 1) < 0.01) == settled == (not told)
+    assert settled or "drive.cycles = " in told[0]
+
+
+def test_exact_the_cycles_that_are_named_let_a_motion_that_sticks_settle():
+    told = next(one for one in pf.run(HOLDS.format(cycles=20)).warnings if one.startswith(UNSETTLED))
+    cycles = float(told.rpartition("drive.cycles = ")[2])
+    assert cycles < 600 and not any(one.startswith(UNSETTLED) for one in pf.run(HOLDS.format(cycles=cycles)).warnings)

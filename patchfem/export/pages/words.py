@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 from ... import scales
 from ...core import Outcome
+from ...response.outcome import UNSETTLED
 from ...response.rows import TABLE as MOTION
 from ...response.rows import of_first, of_number
 from ...runs.bench.result import OPENED
@@ -39,6 +40,9 @@ SHAKEN = {"relative_displacement_rms": "the displacement of the output is {} rms
           "absolute_acceleration_rms": "the acceleration of the output is {} rms",
           "response_frequency": "the frequency response H1 peaks at {}",
           "response_damping": "the damping ratio of that peak is {}"}
+RELEASED = "The run ended before the motion came to rest; raise drive.cycles to see more of the decay."
+GROWN = ("The motion still grows at the end of the run, after {}: the measures describe its last cycles and have no "
+         "error estimate.")
 CHANGES = ("transient", "grows")  # outcomes of a motion whose last cycles differ
 BETWEEN = ("jump_level",)  # known to lie between two levels of the drive, whatever the tolerance
 ROUND = 1e-12  # of the friction force times the motion: work that is round-off
@@ -134,18 +138,22 @@ def verdict(summary: dict) -> str:
         drive, knee = (short("", away[name], "m s-2", 4) for name in ("drive", "knee"))
         return (f"{outcome.sentence} The drive, {drive}, is larger than {knee}, above which friction alone does not "
                 "limit the amplitude at resonance.")
+    if outcome is Outcome.TRANSIENT and any(one["effect"] == "drive.kind=free" for one in summary["effects"]):
+        return RELEASED
     if outcome is not Outcome.STUCK or not {"loop_area", "slip_amplitude"} & measures.keys():
         return outcome.sentence
     force, motion = (measures.get(name, {}).get("value") or 0.0 for name in
                      ("friction_force_peak", "relative_displacement_amplitude"))
+    rings = " The amplitude has not settled: it is that of a transient." * any(
+        one.startswith(UNSETTLED) for one in summary.get("warnings", ()))
     part = "part of the patch slips" if "contact_fraction" in measures else "part of it slips"
     for first, least, form in (("loop_area", ROUND * abs(force * motion), "{} per cycle"),
                                ("slip_amplitude", 0.0, "by {}")):
         found = {name: one for name, one in measures.items() if re.sub(r"_\d+$", "", name) == first and one["value"]}
         name = max(found, key=lambda each: found[each]["value"], default="")
         if name and found[name]["value"] > max(_open(found[name]), least):
-            return f"The interface as a whole sticks, but {part} ({form.format(pair(name, found[name]))})."
-    return _holds("contact_fraction" in measures, "cycles")
+            return f"The interface as a whole sticks, but {part} ({form.format(pair(name, found[name]))}).{rings}"
+    return _holds("contact_fraction" in measures, "cycles") + rings
 
 
 def _holds(patch: bool, cycles: str) -> str:
@@ -263,6 +271,8 @@ def least_known(result: Result) -> str:
     tolerance = result.plan.model.accuracy.tolerance
     wide = {name: one.beyond(tolerance) for name, one in result.measures.items()
             if one.value is not None and one.error is not None and not name.endswith(SCATTER)}
+    if result.outcome is Outcome.GROWS and result.response is not None:
+        return GROWN.format(scales.short(float(result.response.time[-1]), "s", 3))
     if not wide or max(wide.values()) > 1:
         return ""
     told = {name: pair(name, measure_object(result.measures[name])) for name in wide}

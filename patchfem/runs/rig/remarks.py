@@ -5,8 +5,9 @@ import numpy as np
 from ...core import Outcome
 from ...core import say as length
 from ...effects import has
-from ...response.outcome import changing_note
+from ...response.outcome import changing_note, unsettled
 from ...scales import plain
+from ...structure.drive_sizes import slowest
 from ..patch import faces
 from ..results.notes import climbing_as_one, creeping, of_growth, unbounded_bonds, unripe, warming, work_check_warning
 from ..results.travel import travelled
@@ -37,6 +38,9 @@ def warnings_of(run) -> list:
     if model.grooves is not None and model.soft:
         out += modes_note(model, raw.contact.shear.stiffness.size, raw.contact.shear.points.size)
     out += [*work_check_warning(found, steps, harmonics), *changing_note(run.outcome, run.drive), *raw.notes]
+    if not model.rig.levels:
+        out += unsettled(raw, found, (model.accuracy.tolerance, slowest(model.rig.modes)), run.drive,
+                         run.numerics.cycles)
     if raw.message and raw.outcome is not Outcome.LEAVES_GROOVES:
         out.append(raw.message)
     out += travelled(patch, raw.response.slide) if patch is not None else ()

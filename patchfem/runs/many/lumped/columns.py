@@ -12,7 +12,7 @@ from ....effects import has
 from ....model.alike import Alike, columns_of
 from ....response.errors import total_error
 from ....response.measures import energy_balance
-from ....response.outcome import SMALL, goes_on, moves_on, settled, steady_error
+from ....response.outcome import SMALL, goes_on, moves_on, rings_on, settled, steady_error
 from ....response.reasons import CYCLIC, STOPS, without_value
 from ....response.rows import TABLE, floor_of, larger_term
 from ....response.settling import CLASSES, STEADY, steady_amplitudes, windows_of
@@ -134,11 +134,13 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
     wide_of &= True if again is None else ~again(found)
     alike = isinstance(models, Alike)
     remarks = _remarks(models[0], numerics["engine"]) if alike else ()
+    rings = _rings(sizes, runs, outcome, values[MAIN])
     told = wide_of | _by_law(models, found) if alike else wide_of
+    told = told | np.isin(np.arange(n), list(rings))
     for case in range(n) if remarks or not alike else np.flatnonzero(told).tolist():
         model = models[case]
         said = remarks if alike else _remarks(model, numerics["engine"])
-        if warnings := [*said, *warned(model, outcome[case], found, case, wide_of[case])]:
+        if warnings := [*said, *warned(model, outcome[case], found, case, wide_of[case], rings.get(case, ()))]:
             found.warnings[case] = without_folders(warnings, model.source.path)
     return found, alone, resolved
 
@@ -166,6 +168,16 @@ def _outcome(sizes: Sizes, runs: Runs, moves) -> tuple:
     ends = [Outcome.STUCK if stuck else CLASSES[k] for stuck, k in zip(runs.stuck, number)]
     return [Outcome.TRANSIENT if loads else one for loads, one in zip(np.broadcast_to(runs.loads, len(ends)), ends)], \
         steady
+
+
+def _rings(sizes: Sizes, runs: Runs, outcome, amplitude) -> dict:
+    """What `rings_on` says of the cases that stick and ring on, by case."""
+    sizes = sizes._replace(**{name: np.broadcast_to(getattr(sizes, name), len(amplitude)) for name in (
+        "tolerance", "decay", "period")})
+    found = {case: rings_on(runs.extremes[case], runs.window, float(amplitude[case]), float(sizes.tolerance[case]),
+                            float(sizes.decay[case] * sizes.period[case]), runs.cycles)
+             for case, one in enumerate(outcome) if one is Outcome.STUCK and amplitude[case]}
+    return {case: one for case, one in found.items() if one}
 
 
 def _stops(found: Answers) -> None:
@@ -201,14 +213,14 @@ def _reasons(models, sizes: Sizes, runs: Runs, found: Answers) -> None:
             found.floors[name][cases] = measure.floor
 
 
-def warned(model, outcome, found: Answers, case: int, wide: bool) -> list:
+def warned(model, outcome, found: Answers, case: int, wide: bool, rings=()) -> list:
     """Warnings of a case, those that its own run would give: of its law and, where `wide` says that some is, of what is
     known less well than the tolerance asks."""
     if not wide and not has(model.friction.law, "bonds"):
-        return []
+        return list(rings)
     known = known_of(found, case)
     drift = {name: one for name, one in known.items() if name == "drift_per_cycle"}
-    return [*law_warnings(model, outcome, drift, 0.0), *beyond_tolerance(Finding(model, known))]
+    return [*law_warnings(model, outcome, drift, 0.0), *rings, *beyond_tolerance(Finding(model, known))]
 
 
 def _by_law(models: Alike, found: Answers) -> np.ndarray:
