@@ -127,7 +127,7 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
         found.errors[name] = np.where(there & ~grows, errors[name], np.nan)
         found.floors[name] = np.where(there, floor, np.nan)
     _reasons(models, sizes, runs, found)
-    if has(models[0].friction.law, "set-valued"):
+    if has(models[0].friction.law, "set-valued") and not (models[0].soft or models[0].rig.soft):
         _stops(found)
     found.numerics.update({case: numerics | runs.chosen[case] for case in range(n)} if runs.chosen
                           else dict.fromkeys(range(n), numerics))
