@@ -215,7 +215,8 @@ def sentence(runs: list, tolerance: float) -> str:
     the best one."""
     names, percent = _stated(runs), f"{100 * tolerance:g} %"
     if one := quickest(runs, tolerance):
-        return f"{one.words}: {_seconds(one)} per run, with an error of at most {percent} in every measure"
+        return f"{one.words}: {_seconds(one)} per run, with an error of at most {percent} in every measure" \
+               + _by_floor(one, names, tolerance)
 
     known = [one for one in runs if one.errors or one.distances]
     share, name, least = min(((*_worst(one, names, tolerance), one) for one in known), key=lambda found: found[0])
@@ -224,6 +225,18 @@ def sentence(runs: list, tolerance: float) -> str:
                 f"{100 * share:.2g} %")
     return (f"no run has an error of at most {percent} in every measure: the best run, with {least.words}, has an "
             f"error of {100 * share:.2g} % in {name} and takes {_seconds(least)}")
+
+
+def _by_floor(one: Cost, names: list, tolerance: float) -> str:
+    """What a run owes to the floors of measures, as words behind the sentence on its errors; "" for nothing."""
+    small = [(one.off(name) / abs(one.values[name]) if one.values[name] else inf, name) for name in names
+             if name in one.values and one.off(name) is not None and one.off(name) > tolerance * abs(one.values[name])]
+    if not small:
+        return ""
+    share, name = max(small)
+    size = f"{100 * share:.2g} %" if share < inf else "more than its value 0"
+    others = f" and those of {len(small) - 1} others" if len(small) > 1 else ""
+    return f" or within its floor (the error of {name} is {size}{others})"
 
 
 def worst_of(runs: list, tolerance: float) -> set:

@@ -44,7 +44,8 @@ class Rig:
     slide_1^2, 0 where it leaves the interface at rest; stuck(stiffness [N/m]) -> the Rig without the joint, of modes
     that were measured with one that a patch holds, which is not pressed yet; None of any other. richer: the rig
     of a reduced structure with more of its modes, None where none is left out; kept: notes on what is left of it;
-    taken: stiffness [N/m] of the joint that was taken off modes measured with it, None of others.
+    taken: stiffness [N/m] of the joint that was taken off modes measured with it, None of others; most: how many
+    modes a reduced structure can keep, 0 of others.
     """
 
     modes: ModalBasis
@@ -77,6 +78,7 @@ class Rig:
     richer: "Rig | None" = None
     kept: tuple = ()
     taken: float | None = None
+    most: int = 0
 
     @property
     def speed(self) -> float:
@@ -122,8 +124,8 @@ def rig_asked(scene, joint: float | None = None) -> Rig:
 
     joint: stiffness [N/m] of a pressed patch, taken off modes that were measured with it.
     """
-    (more, kept), faces = richer_modes(scene), interface_laws_of(scene)
-    return replace(_rig(scene, own_modes(scene, joint), faces, joint), kept=tuple(kept), taken=joint,
+    (more, kept, most), faces = richer_modes(scene), interface_laws_of(scene)
+    return replace(_rig(scene, own_modes(scene, joint), faces, joint), kept=tuple(kept), taken=joint, most=most,
                    richer=None if more is None else _rig(scene, more, faces))
 
 

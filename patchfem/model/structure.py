@@ -125,8 +125,9 @@ def _as_given(scene) -> ModalBasis:
 
 
 def richer_modes(scene) -> tuple:
-    """(coordinates of a reduced [structure] with more modes than it keeps, None where no mode is left out; notes)."""
-    return (None, ()) if scene.structure.reduced is None else structure_reduced.found(scene)[1:]
+    """(coordinates of a reduced [structure] with more modes than it keeps, None where no mode is left out; notes; how
+    many modes there are at most, 0 of others)."""
+    return (None, (), 0) if scene.structure.reduced is None else structure_reduced.found(scene)[1:]
 
 
 @once

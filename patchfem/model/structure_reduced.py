@@ -17,7 +17,8 @@ _PLACE, _RANGE = re.compile(r"(\d+)(?::(r?[xyz]))?"), re.compile(r"(\d+)\.\.(\d+
 
 
 def found(scene) -> tuple:
-    """(ModalBasis, the same with more modes or None where none is left out, notes) of the structure of a scene.
+    """(ModalBasis, the same with more modes or None where none is left out, notes, how many modes there are at most) of
+    the structure of a scene.
 
     PatchfemError with the line of the key at fault.
     """
@@ -34,7 +35,9 @@ def found(scene) -> tuple:
                                                       names), laterals) for count in (table.modes, made.omega.size))
     except PatchfemError as error:
         raise type(error)(f"{scene.where(error.key or 'structure.reduced')}: {error}") from None
-    return basis, None if made.whole and table.modes >= made.omega.size else more, [*notes, _kept(made, basis, table)]
+    most = made.omega.size if made.whole else made.lowest.size - len(made.boundary)
+    return basis, None if made.whole and table.modes >= made.omega.size else more, \
+        [*notes, _kept(made, basis, table)], most
 
 
 def pairs_of(structure) -> tuple:

@@ -294,11 +294,12 @@ ROWS = (
     Row("energy_stored", "J", 1e-10, "energy stored in all interfaces at the end of the run: elastic energy and, with "
                                      "grooves, the potential energy of the load (if the load changes: the work done "
                                      "against the load)", group="energy"),
-    Row("energy_dissipated", "J", 1e-10, "energy dissipated by friction in all interfaces over the whole run",
+    Row("energy_dissipated", "J", 1e-10, "energy dissipated by friction in all interfaces over the whole run; with "
+                                         "method `harmonic`, over two cycles",
         lambda s: s.energies.get("energy_dissipated"), group="energy"),
     Row("energy_created", "J", 1e-10,
         "energy created over the whole run by a law that is not passive, such as equation 2.17 as printed in the "
-        "report",
+        "report; with method `harmonic`, over two cycles",
         lambda s: s.energies.get("energy_created"), group="energy"),
     Row("normal_load_least", "N", 1e-6, "smallest normal load in the last cycles", lambda s: s.of_load(np.min),
         group="friction"),

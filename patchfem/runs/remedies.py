@@ -185,9 +185,10 @@ def _finer_motion(seen, wide: dict, coarse) -> str:
 
 
 def _more_modes(seen, times: float) -> int:
-    """Modes of a reduced structure that bring an error down by `times`, which falls with the square of their number."""
+    """Modes of a reduced structure that bring an error down by `times`, which falls with the square of their number, of
+    those that there are."""
     kept = seen.model.rig.modes.omega.size
-    return ceil(kept * min(max(2.0, times**0.5), 16.0))
+    return min(ceil(kept * min(max(2.0, times**0.5), 16.0)), seen.model.rig.most)
 
 
 def _cause(seen, name: str) -> str:

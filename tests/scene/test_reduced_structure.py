@@ -91,6 +91,12 @@ def test_exact_all_modes_kept_are_the_whole_matrices(folder):
     assert "reduced" not in small.extra["left_open"]["parts"]
 
 
+def test_exact_no_more_modes_are_proposed_than_there_are(folder):
+    """Of 40 rows two are boundary coordinates; a tolerance of 1e-9 asks for 16 times the 6 coordinates."""
+    said = next(one for one in run_of(folder, SCENE, **{"accuracy.tolerance": 1e-9}).warnings if "reduced.modes" in one)
+    assert int(said.rpartition("structure.reduced.modes = ")[2].split(";")[0]) == 38
+
+
 def test_exact_other_units_and_names_of_nodes_are_the_same_structure(folder):
     """N, mm and tonne; rows by node and direction in the order of nodes."""
     plain, milli, named = (run_of(folder, text) for text in (
