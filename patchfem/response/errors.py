@@ -270,19 +270,23 @@ def with_errors(values: dict, *errors: dict, least: float = 0.0, size: float = n
 
 
 def unseen(found: dict, cycles: float) -> dict:
-    """Measures by name behind a patch that slips part by part: a mesh shows no slip of less than an element, so no slip
-    is known to the floor only, and with it the work of so many cycles, 4 F u of a loop of force F and slip u."""
+    """Measures by name behind a patch that slips part by part: a mesh shows no slip of less than an element, so a slip
+    of 0 is known to the floor only, and with it work of 0 of so many cycles, 4 F u of a loop of force F and slip u."""
     out = dict(found)
+
+    def shown(name: str) -> bool:
+        one = found[name]
+        return one.value is None or one.error is None or max(abs(one.value), one.error) > NOTHING * row_of(name).floor
+
     for name, slip in found.items():
-        if of_first(name) != "slip_amplitude" or slip.error is None or abs(slip.value or 0.0) > row_of(name).floor:
+        if of_first(name) != "slip_amplitude" or shown(name):
             continue
         number, least = name[len("slip_amplitude"):], max(slip.error, row_of(name).floor)
         force = found.get(f"friction_force_peak{number}")
         works = {f"loop_area{number}": 1.0} | ({} if number else {"energy_dissipated": cycles})
         errors = {name: least} | {one: 4 * abs(force.value) * least * times for one, times in works.items() if force}
         for one, error in errors.items():
-            if one in found and found[one].value is not None and found[one].error is not None \
-                    and abs(found[one].value) <= error:
+            if one in found and not shown(one):
                 out[one] = replace(found[one], error=max(found[one].error, error), floor=max(found[one].floor, error))
     return out
 
