@@ -179,20 +179,22 @@ def unsettled(raw, measures: dict, limits: tuple, drive, cycles: float) -> list:
     limits: (tolerance, rate [1/s] at which the slowest mode decays); cycles: of the run. By what the amplitude of the
     last window will still change, with the cycles after which a free motion at that rate is below the tolerance.
     """
-    (tolerance, slowest), amplitude = limits, measures["relative_displacement_amplitude"].value
-    if raw.outcome is not Outcome.STUCK or not drive_sizes.sinusoidal(drive) or raw.extremes is None or not amplitude:
+    (tolerance, slowest), main = limits, measures["relative_displacement_amplitude"]
+    if raw.outcome is not Outcome.STUCK or not drive_sizes.sinusoidal(drive) or raw.extremes is None or not main.value:
         return []
     window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
-    return rings_on(np.asarray(raw.extremes), window, amplitude, tolerance, slowest * drive.period, cycles)
+    return rings_on(np.asarray(raw.extremes), window, (main.value, main.floor), (tolerance, slowest * drive.period),
+                    cycles)
 
 
-def rings_on(extremes, window: int, amplitude: float, tolerance: float, decay: float, cycles: float) -> list:
-    """`unsettled` of a motion that sticks, by the extremes (c, 2) [m] of its cycles and the decay of its slowest mode
-    over a cycle [1]."""
+def rings_on(extremes, window: int, sizes: tuple, limits: tuple, cycles: float) -> list:
+    """`unsettled` of a motion that sticks, by the extremes (c, 2) [m] of its cycles; sizes: its amplitude and the floor
+    of that [m]; limits: tolerance, and the decay of its slowest mode over a cycle [1]."""
+    (amplitude, floor), (tolerance, decay) = sizes, limits
     ends = windows_of(extremes, window)[0]
     left = float(left_over(extremes, window, max(decay, 0.0) * window))
     left = max(left, float(abs(ends[-1] - ends[-2]))) if ends.size > 1 else left
-    if not left > tolerance * amplitude:
+    if not left > tolerance * amplitude + floor:
         return []
     more = np.log(left / amplitude / tolerance) / decay if decay > 0 else np.inf
     remedy = f"set drive.cycles = {float(f'{cycles + SAFE * more:.2g}'):g}" if more < MOST_MORE else \

@@ -130,7 +130,7 @@ MEASURES = {
               "acceleration_distortion",
     "rig": "relative_displacement_amplitude absolute_acceleration_peak slip_amplitude stick_fraction normal_load "
            "friction_force_peak loop_area equivalent_stiffness equivalent_damping energy_balance drift_per_cycle "
-           "slip_start_phase secant_stiffness acceleration_distortion",
+           "slip_start_phase acceleration_distortion",
 }  # fmt: skip
 
 

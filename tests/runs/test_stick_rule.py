@@ -57,6 +57,9 @@ def test_order_stick_by_samples_comes_to_stick_by_events(law, omega, more):
     for steps in (400, 3200):
         (exact, start, _), (found, phase, _) = both(text(law, omega, more), steps)
         assert 0.02 < exact < 0.98 and abs(found - exact) < 4 / steps
+        if "0.2\n" in f"{law}\n":  # it slips several times in half a cycle
+            assert phase is None and start is None
+            continue
         assert abs((phase - start + pi / 2) % pi - pi / 2) < 4 * pi / steps
 
 

@@ -174,8 +174,9 @@ def _rings(sizes: Sizes, runs: Runs, outcome, amplitude) -> dict:
     """What `rings_on` says of the cases that stick and ring on, by case."""
     sizes = sizes._replace(**{name: np.broadcast_to(getattr(sizes, name), len(amplitude)) for name in (
         "tolerance", "decay", "period")})
-    found = {case: rings_on(runs.extremes[case], runs.window, float(amplitude[case]), float(sizes.tolerance[case]),
-                            float(sizes.decay[case] * sizes.period[case]), runs.cycles)
+    floor = np.broadcast_to(floor_of(MAIN, sizes.moved), len(amplitude))
+    found = {case: rings_on(runs.extremes[case], runs.window, (float(amplitude[case]), float(floor[case])),
+                            (float(sizes.tolerance[case]), float(sizes.decay[case] * sizes.period[case])), runs.cycles)
              for case, one in enumerate(outcome) if one is Outcome.STUCK and amplitude[case]}
     return {case: one for case, one in found.items() if one}
 
