@@ -313,8 +313,8 @@ def test_exact_motions_that_graze_their_yield_are_those_of_a_run_from_event_to_e
 
 
 def test_exact_the_secant_of_a_slide_that_turns_beside_the_end_of_a_cycle_is_that_of_single_runs():
-    """Under Coulomb's law it is 0, as the force at a turn is in the mean. It was missing where the amplitude grew and
-    the slide turned just behind the end of a cycle."""
+    """Under Coulomb's law it is 0 of a block that never sticks, as the force at a turn is in the mean. It was missing
+    where the amplitude grew and the slide turned just behind the end of a cycle. A block that sticks has none."""
     base = base_of(load(SCENE.format(law=LAWS["coulomb"])))
     sets = {"normal.load": 100.0, "structure.moving_mass": 1.0, "structure.mode.axial.frequency": 98.48857801796105,
             "structure.mode.axial.damping": 0.003079639, "drive.frequency": 100.0, "drive.cycles": 40,
@@ -323,8 +323,11 @@ def test_exact_the_secant_of_a_slide_that_turns_beside_the_end_of_a_cycle_is_tha
              for level in (38.649656620695204, 39.275, 40.528, *np.geomspace(20, 60, 69).tolist())]
     found, ones = run_many(cases), lumped_answers(cases)
     assert {one["engine"] for one in found.numerics.values()} == {"lanes"}
-    np.testing.assert_array_equal(found.values["secant_stiffness"][:3], 0.0)
-    slides = ones.values["slip_amplitude"] > 0
+    np.testing.assert_array_equal(found.values["secant_stiffness"][1:3], 0.0)
+    slides = (ones.values["slip_amplitude"] > 0) & (ones.values["stick_fraction"] <= 1e-3)
+    assert slides.sum() > 20
     for column in (found.values, found.errors):
         np.testing.assert_array_equal(column["secant_stiffness"][slides], 0.0)
-    assert ones.values["secant_stiffness"][0] == 0 == np.nansum(np.abs(ones.values["secant_stiffness"][slides]))
+    assert np.nansum(np.abs(ones.values["secant_stiffness"][slides])) == 0
+    held = ones.values["stick_fraction"] > 0.02
+    assert held.any() and np.isnan(ones.values["secant_stiffness"][held]).all()

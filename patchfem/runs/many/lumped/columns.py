@@ -189,6 +189,8 @@ def _stops(found: Answers) -> None:
     with np.errstate(invalid="ignore"):
         holds = ~np.isnan(secant) & (stuck > TABLE["stick_fraction"].floor + np.nan_to_num(
             found.errors["stick_fraction"]))
+    if not holds.any():
+        return
     found.values["secant_stiffness"] = np.where(holds, np.nan, secant)
     found.errors["secant_stiffness"] = np.where(holds, np.nan, found.errors["secant_stiffness"])
     found.reasons.setdefault("secant_stiffness", {}).update(dict.fromkeys(np.flatnonzero(holds).tolist(), STOPS))
