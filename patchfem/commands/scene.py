@@ -12,7 +12,7 @@ from ..effects import has, shown_absent
 from ..export.written import brief
 from ..mesh import files as mesh_files
 from ..model import files as model_files
-from ..response.rows import of_first
+from ..response import rows
 from ..runs import plan as plans
 from ..runs.patch import faces, result
 from ..scales import short, tidied
@@ -121,7 +121,7 @@ def _print_plan(answer: dict, probe: bool, verbose: bool) -> None:
              for name, link in answer["stiffness_chain"].items()]
     print("chain    " + " -> ".join(links))
     above = not probe and any(not isinstance(link, str) for name, link in answer["stiffness_chain"].items()
-                              if of_first(name) == "pieces_shear")
+                              if rows.of_first(name) == "pieces_shear")
     if above:
         print("         the shear stiffness of the pieces is an upper estimate; use --probe to compute it")
     for one in answer.get("modes", ()):

@@ -55,7 +55,8 @@ def test_exact_no_cycle_more_is_the_state_before(place):
 def test_exact_compare_tells_from_where_the_cycles_count(place):
     ran(place, HALF, "wear.start=one/result.nc").save(place / "two")
     found = pf.compare(place / "one", place / "two")
-    assert "1e+06 cycles of wear after those of one/result.nc, 1e+06 before" in found["sentences"][0]
+    assert "1e+06 cycles of wear after those of one/result.nc (the surface before: 1e+06 cycles)" in \
+        found["sentences"][0]
     assert found["worn_depth_mean"]["value"] < 1.1e-6
 
 

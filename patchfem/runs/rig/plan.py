@@ -160,7 +160,7 @@ def run_away(model: Model) -> dict:
             or abs(rig.own_frequency * rig.drive.period - 1) > RESONANT:
         return {}
     knee = groups(model).get("knee")
-    return {} if knee is None else {"drive": float(largest(rig.drive)), "knee": float(knee)}
+    return {} if not knee else {"drive": float(largest(rig.drive)), "knee": float(knee)}
 
 
 def _lever(rig) -> float:

@@ -15,7 +15,6 @@ from ...response.outcome import settle, without_bars
 from ...response.rows import judged
 from ...response.settling import slip_period
 from ...structure.drive_sizes import decay_rate, sinusoidal
-from ...structure.drives import Sweep
 from ..patch import faces
 from ..results.result import FRAMES, Result, on_a_mesh_of_known_error, without_errors
 from ..results.travel import outcome_on_piece
@@ -250,7 +249,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
 def _at_the_top(model, found: Solution, go) -> Solution | None:
     """The Solution of a coarser or richer run of a curve over frequency, computed in the neighbourhood of the largest
     amplitude that was found; None where there is no curve, or where its own largest lies elsewhere."""
-    if "at_error" not in found.extra or not isinstance(model.rig.drive, Sweep) or model.rig.bends:
+    if "at_error" not in found.extra or model.rig.levels or model.rig.bends:
         return None
     from .steady.curves import around_the_top, at_an_end
 
