@@ -683,8 +683,10 @@ def _decayed(joint: Joint, amplitudes, progress=None) -> Curve:
                          "do not describe this mode alone"]
     unknown = known & np.isnan(others)
     if unknown.any() and joint.modes.omega.size > 1:
+        lacks = "with rigid friction it is not computed" if _rigid(joint.model) else \
+            "harmonic balance gave no free motion to compare with"
         notes = [*notes, f"method decay: how much other modes move in the decay is not known at {unknown.sum()} of "
-                         f"{known.sum()} amplitudes, because harmonic balance gave no free motion to compare with"]
+                         f"{known.sum()} amplitudes, because {lacks}"]
     return Curve(amplitudes, best[0], error[0], best[1], error[1], np.full(amplitudes.size, np.nan),
                  tuple(notes), others).at(known)
 

@@ -237,7 +237,9 @@ def head(rows: dict) -> list:
     said = [
         "A score is the root mean square of ln(computed/measured); smaller scores are better. Three scores separated "
         "by slashes are those of all readings / accelerations / displacements. For comparison: the logarithms of "
-        "repeated readings of the same acceleration scatter with a standard deviation of .086.",
+        "repeated readings of the same acceleration scatter with a standard deviation of .086. Two names say what the "
+        "accelerometer is taken to show: \"√2 x fundamental\", or \"peak x stuck\", the peak times the gain measured "
+        "while the block sticks.",
         "**Models that the data exclude.** Friction alone does not explain the data. The scores of a rigid "
         f"block are {three(one['rigid']['fitted'])} at 143 Hz. The scores of a patch with yaw are "
         f"{three(one['patch']['fitted'])} at 143 Hz and {three(one['patch']['others'])} at the other frequencies. A "
@@ -246,14 +248,14 @@ def head(rows: dict) -> list:
         "**Models fitted to 143 Hz alone.** The scores at 135, 150 and 155 Hz are "
         f"{none['constant'][0]} for a constant times the input; {none['power_input_frequency'][0]} for a power "
         f"law in input and frequency; {three(one['spring']['others'])} for \"spring and yaw\" with √2 x fundamental "
-        f"(three fitted parameters); {three(one['path']['others'])} for \"path of Fig. 27\" with peak x stuck (three "
-        f"fitted parameters; the path itself is not fitted); and {three(one['root']['others'])} for \"path of Fig. "
-        "27\" with √2 x fundamental.",
+        f"(three fitted parameters); {three(one['path']['others'])} for \"path of Fig. 27\" with \"peak x stuck\" "
+        f"(three fitted parameters; the path itself is not fitted); and {three(one['root']['others'])} for \"path of "
+        "Fig. 27\" with √2 x fundamental.",
         "Compared with a constant times the input, \"spring and yaw\" predicts the displacements better and the "
         "accelerations worse. \"Path of Fig. 27\" predicts displacements and accelerations better than the constant "
         "does. The advantage of \"path of Fig. 27\" in the accelerations is small: if the rows of Table 1 are "
         "resampled (bootstrap), \"path "
-        f"of Fig. 27\" predicts the accelerations better than the constant in {draws[0]:.0f} % (peak x stuck) and "
+        f"of Fig. 27\" predicts the accelerations better than the constant in {draws[0]:.0f} % (\"peak x stuck\") and "
         f"{draws[1]:.0f} % (√2 x fundamental) of the samples. \"Path of Fig. 27\" predicts the displacements worse "
         "than \"spring and yaw\" does. At 143 Hz all scores of \"path of Fig. 27\" are worse than those of \"spring "
         "and yaw\": "
@@ -263,11 +265,11 @@ def head(rows: dict) -> list:
             "**Each frequency left out in turn.** The scores are "
             f"{none['constant'][1]} for a constant times the input; {none['power_input_frequency'][1]} for a power "
             f"law in input and frequency; {left['spring']} for \"spring and yaw\" with √2 x fundamental; and "
-            f"{left['path']} for \"path of Fig. 27\" with peak x stuck. The last two models predict the displacements "
-            "better than the constant and the power law do. The scores of \"second path\" (a spring and a damper) with "
-            f"peak x stuck are {left['damped']}. These scores are no better than the scores of the constant, because "
-            "the fit without 143 Hz sets \"yaw arm\" to 0. If the accelerometer also measures the yaw mode, the "
-            "scores of "
+            f"{left['path']} for \"path of Fig. 27\" with \"peak x stuck\". The last two models predict the "
+            "displacements better than the constant and the power law do. The scores of \"second path\" (a spring and "
+            f"a damper) with \"peak x stuck\" are {left['damped']}. These scores are no better than the scores of the "
+            "constant, because the fit without 143 Hz sets \"yaw arm\" to 0. If the accelerometer also measures the yaw "
+            "mode, the scores of "
             f"this model are {left['seen']}. No model predicts the accelerations better "
             "than the power law in input and frequency, although this power law contains no mechanics.")
     said.append(

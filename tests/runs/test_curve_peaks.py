@@ -4,6 +4,8 @@ Each reference is the largest of the same scene's motions under sines, found by 
 frequency. The seeds from 71_000_000 on were drawn for no other use.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import brentq, minimize_scalar
@@ -13,6 +15,7 @@ from patchfem.core import BaseSine
 from patchfem.export.pages import peaks
 from patchfem.response.outcome import goes_on, settled
 from patchfem.response.settling import CLASSES, steady_amplitudes, windows_of
+from patchfem.runs.rig import rig
 from patchfem.runs.rig.steady import curves
 from patchfem.runs.rig.steady.curves import Followed, Shown
 from patchfem.runs.rig.steady.top import highest
@@ -254,7 +257,6 @@ def test_exact_a_run_that_checks_a_curve_looks_near_its_top_alone():
     two = curve | {"amplitude": curve["amplitude"] + 0.85 / (1 + ((f - 220) / 5)**2)}
     assert curves.around_the_top(sweep, two, 140.0) is None
     assert curves.around_the_top(sweep, curve | {"amplitude": np.ones(201)}, 140.0) is None
-    assert curves.at_an_end(curve, 50.0) and curves.at_an_end(curve, 250.0) and not curves.at_an_end(curve, 140.0)
 
 
 def test_a_curve_that_is_checked_near_its_top_has_the_errors_of_a_whole_one(monkeypatch):
@@ -262,10 +264,23 @@ def test_a_curve_that_is_checked_near_its_top_has_the_errors_of_a_whole_one(monk
     assert law == "iwan"
     text += f'[drive]\nkind = "force"\nwaveform = "sweep"\nfrom = "{low!r} Hz"\nto = "{high!r} Hz"\n' \
         f'rate = "1 Hz/s"\n{force}[accuracy]\nmethod = "harmonic"\n'
-    near, seen = pf.run(text).measures, []
-    monkeypatch.setattr(curves, "around_the_top", lambda *given: seen.append(given))
+    plain, own, taken = curves.around_the_top, rig._at_the_top, []
+
+    def told(*given):
+        taken.append(own(*given))
+        return taken[-1]
+
+    def beside(drive, curve, at):  # a neighbourhood whose largest lies at its end
+        near = plain(drive, curve, at)
+        return replace(near, low=at + 0.3 * (near.high - at))
+
+    monkeypatch.setattr(rig, "_at_the_top", told)
+    near = pf.run(text).measures
+    assert taken and None not in taken
+    taken.clear()
+    monkeypatch.setattr(curves, "around_the_top", beside)
     whole = pf.run(text).measures
-    assert seen
+    assert taken and set(taken) == {None}
     for name in (*MAIN, "peak_frequency"):
         assert near[name].value == whole[name].value
         assert near[name].error == pytest.approx(whole[name].error, rel=0.5)

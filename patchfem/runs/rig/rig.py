@@ -5,7 +5,7 @@ from math import ceil
 
 import numpy as np
 
-from ...core import Outcome, PatchfemError
+from ...core import NotConverged, Outcome, PatchfemError
 from ...effects import has
 from ...model.rig import BEYOND
 from ...response import reasons, run_events, stationary
@@ -251,17 +251,20 @@ def _at_the_top(model, found: Solution, go) -> Solution | None:
     amplitude that was found; None where there is no curve, or where its own largest lies elsewhere."""
     if "at_error" not in found.extra or model.rig.levels or model.rig.bends:
         return None
-    from .steady.curves import around_the_top, at_an_end
+    from .steady.curves import around_the_top
 
     drive = around_the_top(model.rig.drive, found.extra["curve"], found.extra["at"].omega / (2 * np.pi))
     if drive is None:
         return None
-    name = "relative_displacement_amplitude"
-    near = go(replace(model, rig=replace(model.rig, drive=drive)))
-    if "at_error" not in near.extra or at_an_end(near.extra["curve"], near.extra["at"].omega / (2 * np.pi)) \
-            or abs(near.values[name] / found.values[name] - 1) > OTHER:
+    try:
+        near = go(replace(model, rig=replace(model.rig, drive=drive)))
+    except NotConverged:  # the whole curve may begin where a motion is found
         return None
-    return near
+    name = "relative_displacement_amplitude"
+    if "at" not in near.extra or name not in near.values or remarks.at_an_end(
+            near.extra["at"].omega / (2 * np.pi), drive.low, drive.high) is not None:
+        return None
+    return near if abs(near.values[name] / found.values[name] - 1) <= OTHER else None
 
 
 class Passes:

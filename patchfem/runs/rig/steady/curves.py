@@ -130,11 +130,6 @@ def around_the_top(drive, curve: dict, at: float):
     return replace(drive, low=float(low), high=float(high), starts=FEW)
 
 
-def at_an_end(curve: dict, at: float) -> bool:
-    """Whether a frequency `at` [Hz] is the first or the last of a curve's."""
-    return not np.min(curve["frequency"]) < at < np.max(curve["frequency"])
-
-
 def largest_of(points) -> int:
     """Number of the point with the largest amplitude, among those that are stable where any is."""
     sizes = np.array([one.values.get(SHOWN["amplitude"], -1.0) for one in points])
