@@ -268,8 +268,8 @@ def head(rows: dict) -> list:
             f"{left['path']} for \"path of Fig. 27\" with \"peak x stuck\". The last two models predict the "
             "displacements better than the constant and the power law do. The scores of \"second path\" (a spring and "
             f"a damper) with \"peak x stuck\" are {left['damped']}. These scores are no better than the scores of the "
-            "constant, because the fit without 143 Hz sets \"yaw arm\" to 0. If the accelerometer also measures the yaw "
-            "mode, the scores of "
+            "constant, because the fit without 143 Hz sets \"yaw arm\" to 0. If the accelerometer also measures the "
+            "yaw mode, the scores of "
             f"this model are {left['seen']}. No model predicts the accelerations better "
             "than the power law in input and frequency, although this power law contains no mechanics.")
     said.append(
