@@ -12,6 +12,8 @@ from jupyter_client import KernelManager
 from nbclient import NotebookClient
 
 import patchfem as pf
+from patchfem.friction import flags_kernels
+from patchfem.friction.laws import bouc_wen_kernels
 
 ROOT = Path(__file__).parents[2]
 PICTURES = {"own_joint": 2, "misalignment": 1, "before_after": 1, "accuracy_time": 1, "backbone": 1, "measured_loop": 1,
@@ -76,6 +78,18 @@ def test_always_every_notebook_is_run_and_linked():
     assert [name for name, place in places.items() if f"({place})" not in pages] == []
     tasks = (ROOT / "studies/site/tasks").glob("*.md")
     assert {path.stem for path in tasks if "code-cell" in path.read_text("utf-8")} == set(TASKS)
+
+
+def test_always_the_own_law_exports_what_engines_call():
+    """The names that its compiled file takes from the package exist; it exports those of a law of the same form."""
+    text = next(cell for cell in sources("own_law", "code") if "dahl_kernels.py" in cell).split("'''")[1]
+    tree = ast.parse(text)
+    taken = {one.name for node in tree.body if isinstance(node, ast.ImportFrom) and node.module == "flags_kernels"
+             for one in node.names}
+    made = {node.name for node in tree.body if isinstance(node, ast.FunctionDef)}
+    shown = {one.value for node in tree.body if isinstance(node, ast.Assign) for one in node.value.elts}
+    assert taken <= set(flags_kernels.__all__) and shown <= taken | made
+    assert shown == set(bouc_wen_kernels.__all__) - {"flowing"}  # for lanes alone
 
 
 @pytest.mark.parametrize("name", NAMES)
