@@ -27,6 +27,7 @@ GROUPS = {  # group -> (what it is, SI unit of its value)
     "D": ("D: friction limit (static, if there are two) divided by the largest force of the drive", "1"),
     "D_kinetic": ("D with the kinetic friction limit", "1"),
     "knee": ("acceleration of the drive above which friction alone does not limit the amplitude at resonance", "m s-2"),
+    "knee_force": ("force of the drive above which friction alone does not limit the amplitude at resonance", "N"),
     "drive_amplitude_over_bond_length": ("displacement amplitude of the drive divided by the bond length", "1"),
     "amplitude_over_bond_length": ("amplitude of the slide divided by the bond length", "1"),
     "slip_length": ("elastic slide of the pieces before the whole patch slips", "m"),

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scene_texts import BLOCK, COULOMB, LINEAR, STRUCTURE, line_of, only
+from scene_texts import BLOCK, COULOMB, LINEAR, MODE, STRUCTURE, line_of, only
 
 from patchfem.core import PatchfemError
 from patchfem.model.model import build
@@ -120,6 +120,9 @@ def test_exact_numbers_for_the_plan():
     rub = build(loads(RUB + MASSES))
     assert [one.limits(one.load) for one in rub.rig.interfaces] == [pytest.approx((3.0, 3.0))]
     assert plan(rub).groups["D"] == pytest.approx(3.0 / (rub.rig.mass * 2.0))
+    pushed = loads(POINT + MODE + '[drive]\nkind = "force"\nfrequency = "143 Hz"\nforce = "4 N"\ncycles = 9\n')
+    limits = plan(pushed).groups
+    assert limits["knee_force"] == pytest.approx(4 / np.pi * 0.3) and "knee" not in limits
     second = loads(LINEAR, sets=["structure.mode.axial.frequency=0 Hz"])
     assert build(second).rig.own_frequency == 990.0
 

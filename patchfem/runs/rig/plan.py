@@ -135,8 +135,8 @@ def groups(model: Model) -> dict:
     """Dimensionless groups of the motion by name, those without a meaning left out.
 
     D: static friction limit over the largest force of the drive, which is D of 2.3 at resonance; D_kinetic: that of the
-    kinetic limit, where it is another; knee [m s-2]: input beyond which friction alone does not bound a motion at
-    resonance, that of a block that slides.
+    kinetic limit, where it is another; knee [m s-2], or knee_force [N] of a drive by force: input beyond which friction
+    alone does not bound a motion at resonance, that of a block that slides.
     """
     out, f, rig = {}, model.friction, model.rig
     limits = [one.limits(model.nominal_load if one.load is None else one.load) for one in rig.interfaces]
@@ -146,7 +146,8 @@ def groups(model: Model) -> dict:
         out |= {"D": limit / push} | ({} if kinetic == limit else {"D_kinetic": kinetic / push})
     ratio = rig.own_frequency * rig.drive.period if rig.frequency else inf
     if abs(ratio - 1) < 0.2:
-        out["knee"] = 4 / pi * kinetic / rig.mass * _lever(rig)
+        bound = 4 / pi * kinetic * _lever(rig)
+        out |= {"knee_force": bound} if rig.force else {"knee": bound / rig.mass}
     if f is not None and f.bond_length and f.stiffness is None and rig.drive.moving:
         out["drive_amplitude_over_bond_length"] = largest(rig.drive) / omega_of(rig.drive)**2 / f.bond_length
     return out

@@ -202,12 +202,14 @@ def _apart(place: Place, direction: str, band: tuple, removed: tuple) -> Compari
     before, after, why = place.before, place.after, place.why
     notes, step = _steps(before, after)
     if place.order:
-        notes.append("the two traces match only if the second is taken as the unworn one: material grew between the "
-                     "measurements, or the two files are in the wrong order")
+        why = "the two traces match only if the second is taken as the unworn one: material grew between the " \
+              "measurements, or the two files are in the wrong order"
     flanks = flanks_of(before, after)
+    if place.order and flanks is not None:
+        notes.append(why)
     abbott = None if flanks is not None else worn_depth.abbott_estimate(before, after)
     sides = [[before], [after] if flanks is None else beside_flanks(after, flanks, band[1])]
-    worn = worn_depth.of_flanks(flanks) if flanks is not None else worn_depth.nowhere(
+    worn = worn_depth.of_flanks(flanks) if flanks is not None else worn_depth.nowhere(why if place.order else
         f"{why}; the second trace shows no track between unworn flanks either; a worn depth needs one of the two")
     sizes = tuple(_pooled(side, step, band) for side in sides)
     freedom = [[scattered(one, step, band) for one in side] for side in sides]

@@ -14,7 +14,7 @@ PARTS = 40  # of the trace, in which the track is looked for
 LEAST = 4  # parts of each flank
 DRAWS = 100  # made traces that the track is put into for the intervals
 WIDER = 1.4  # for a spectrum that is itself estimated: without it 85 of 100 intervals hold the area
-CLEAR = 1.2  # times the largest step of all made traces without a track
+CLEAR = 1.2  # times the largest step, or roughness of the flanks, of all made traces without a track
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,8 @@ def flanks_of(before: Profile, after: Profile) -> Flanks | None:
 
     The trace is cut into 40 parts; a straight line with a box in it is fitted to their means for every place of the box
     that leaves a tenth of the trace on either side. The box counts where it is clearer than in each of 200 traces
-    without a track, made with the spectrum of `before`. A line is then fitted to the flanks, which counts what sticks
+    without a track, made with the spectrum of `before`, and the flanks are no rougher than theirs: unworn flanks have
+    the roughness of the trace before. A line is then fitted to the flanks, which counts what sticks
     out of them (pile-up) little, and the track runs as far as the mean depth of a part lies below the line. Intervals
     come from the same search with this track put into the made traces: the roughness that wore away is not known.
     """
@@ -60,18 +61,33 @@ def flanks_of(before: Profile, after: Profile) -> Flanks | None:
     if own.max() <= CLEAR * max((each.max() for each in best), default=0.0) or own.max() <= 1e-12:
         return None
     box = boxes[1][int(np.argmax(own))]
+    if _roughness(other, other.z, box) > CLEAR * max((_roughness(other, z, box) for z in made[:DRAWS]), default=np.inf):
+        return None
     line, depth, ends = _track(other.x, other.z, box)
     return _with_intervals(other, (line, depth, ends), box, made)
 
 
 def _track(x, z, box: tuple) -> tuple:
     """Line of the flanks, depth (n,) [m] below it, and the first and last sample of the track."""
-    edges = np.linspace(0, x.size, PARTS + 1).astype(int)
-    beside = np.ones(x.size, bool)
-    beside[edges[max(box[0] - 1, 1)]:edges[min(box[1] + 1, PARTS - 1)]] = False
+    edges, beside = _beside(x.size, box)
     line = _line(x[beside], z[beside])
     depth = line[0] + line[1] * x - z
     return line, depth, _ends(depth, edges, *box)
+
+
+def _beside(size: int, box: tuple) -> tuple:
+    """First samples (PARTS + 1,) of the parts, and which samples (size,) lie in the flanks, a part off the box."""
+    edges = np.linspace(0, size, PARTS + 1).astype(int)
+    beside = np.ones(size, bool)
+    beside[edges[max(box[0] - 1, 1)]:edges[min(box[1] + 1, PARTS - 1)]] = False
+    return edges, beside
+
+
+def _roughness(other: Profile, z, box: tuple) -> float:
+    """Median distance [m] of the flanks' heights from their line, which pile-up changes little."""
+    beside = _beside(z.size, box)[1]
+    offset, slope = _line(other.x[beside], z[beside])
+    return float(np.median(np.abs(z[beside] - offset - slope * other.x[beside])))
 
 
 def _made(spectrum, other: Profile, step: float) -> np.ndarray:

@@ -3,6 +3,8 @@
 The rule was tuned on seeds 1000 to 1040 and on 5000 to 5080; the seeds here are others, named before their score.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from pairs import KINDS, UM, pair, track
@@ -10,9 +12,10 @@ from pairs import KINDS, UM, pair, track
 from patchfem.core import frozen_array
 from patchfem.surface.compare.compare import compared
 from patchfem.surface.compare.depth import of_registration
+from patchfem.surface.compare.flanks import flanks_of
 from patchfem.surface.compare.registration import register
 from patchfem.surface.compare.verdict import verdicts
-from patchfem.surface.profile import Profile
+from patchfem.surface.profile import Profile, level
 
 HELD_OUT = 90000
 
@@ -79,6 +82,15 @@ def test_always_files_in_the_wrong_order_are_told_and_others_are_not(made):
         headline, sentences = verdicts([compared(one, other)])
         words = [text for text in (headline, *sentences) if "in the wrong order" in text]
         assert len(words) == 2 * told and all("material grew" in text or "deposits" in text for text in words)
+
+
+def test_always_flanks_rougher_than_the_trace_before_are_not_unworn():
+    """A box of 8 um in a trace of the same spectrum is a track; in one of four times the roughness it is none."""
+    before, other = (level(pair(seed).before) for seed in (90304, 90305))
+    cut = 8 * UM * (np.abs(other.x - 500 * UM) < 150 * UM)
+    found = flanks_of(before, replace(other, z=frozen_array(other.z - cut)))
+    assert found is not None and found.largest[0] > 8 * UM
+    assert flanks_of(before, replace(other, z=frozen_array(4 * (other.z - cut)))) is None
 
 
 def test_always_a_comparison_says_where_and_warns_of_the_wrong_order():
