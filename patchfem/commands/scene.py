@@ -68,7 +68,7 @@ def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Js
     if over is not None or read.sweep:
         if probe:
             raise Refused("--probe works for a single case, not for a sweep; give the values of this case with --set "
-                          "and leave out the sweep")
+                          "and no --over")
         _plan_sweep(scene, set_, over or Over(), json_, verbose)
         return
     found = plans.plan(read)

@@ -113,8 +113,9 @@ def build(scene: Scene) -> Model:
     """
     if scene.sweep:
         count = prod(len(axis.texts) for axis in scene.sweep)
+        one = " ".join(f'--set "{axis.key}={axis.texts[0]}"' for axis in scene.sweep)
         raise PatchfemError(f"{scene.where('sweep')}: has {count} cases, but a single run computes only one; use "
-                            "`patchfem sweep`, or leave [sweep] out")
+                            f"`patchfem sweep`, or choose a case, such as the first: {one}")
     patch = point = slide = rig = grooves = None
     if scene.contact is not None:
         with placed(scene):

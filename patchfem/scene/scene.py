@@ -191,13 +191,15 @@ def absent_files(found: tables.Tables | Scene, folder: Path) -> list[tuple[str, 
 def loads(text: str, path: str | Path = "scene.toml", sets: Iterable[str] = (), more: Callable | None = None) -> Scene:
     """Read a scene from its text; `path` only names it in messages and is what its own paths are relative to.
 
-    more(tables, whole) gives (key, message) of mistakes beside those of the text; whole: the tables have none.
+    more(tables, whole) gives (key, message) of mistakes beside those of the text; whole: the tables have none. A key
+    that `sets` holds is swept no more.
     """
     raw, lines = _parsed(text, path)
     sets, axes = tuple(sets), []
     draft = Draft(str(path), lines, raw)
     if "sweep" in raw:
-        axes = _axes(draft, raw.pop("sweep"))
+        fixed = {one.partition("=")[0].strip() for one in sets}
+        axes = [axis for axis in _axes(draft, raw.pop("sweep")) if axis.key not in fixed]
     given = [axis for axis in axes if not draft.given(axis.key)]  # a key that only [sweep] holds has its first value
     for one in (*(f"{axis.key}={axis.texts[0]}" for axis in given), *sets):
         apply_set(draft, one)

@@ -1,11 +1,14 @@
 """Values of a key from case to case: lists and ranges as --over and [sweep] write them."""
 
+import re
+
 import numpy as np
 import pytest
 from scene_texts import BENCH, line_of, mistakes
 
 import patchfem as pf
 from patchfem.core import PatchfemError
+from patchfem.model.model import build
 from patchfem.scene.axes import Span, _around, drawn_from, read
 from patchfem.scene.keys.quantities import parse
 from patchfem.scene.scene import loads
@@ -151,6 +154,19 @@ def test_refuses_mistakes_of_the_table_with_their_lines():
 def test_refuses_one_run_of_many_cases():
     with pytest.raises(PatchfemError, match=r"sweep: has 12 cases, but a single run computes only one; use `patch"):
         pf.run(SWEPT)
+
+
+def test_always_values_of_all_swept_keys_choose_one_case():
+    """As the refusal of the sweep proposes; a key that is still swept is refused alone."""
+    with pytest.raises(PatchfemError) as refused:
+        pf.run(SWEPT)
+    sets = re.findall(r'--set "([^"]*)"', str(refused.value))
+    whole = loads(SWEPT, "a.toml", sets)
+    assert len(sets) == 2 and not whole.sweep
+    assert build(whole).kind == "bench"
+    with pytest.raises(PatchfemError) as still:
+        build(loads(SWEPT, "a.toml", sets[:1]))
+    assert sets[0] not in str(still.value) and sets[1] in str(still.value)
 
 
 @pytest.mark.parametrize("text, low, high, unit", [
