@@ -20,7 +20,7 @@ from ...runs.many.meshes import Shared
 from .asked import Asked
 from .cases import Cases
 
-TRIES = 3  # a case whose worker died is tried twice more
+TRIES = 3  # deaths, the last of them alone, after which a case is given up
 SPAN = 1.0  # seconds that a chunk is to take: long beside its way to a worker, short beside a sweep
 MOST = 4096  # cases of a chunk
 LOOKED = 256  # cases that the meshes of a sweep are chosen by
@@ -137,18 +137,18 @@ class Chunks:
 
     def __init__(self, numbers: Sequence[int], workers: int, least: int = 1):
         self.least = least
-        self.left, self.alone, self.workers = deque(numbers), deque(), max(workers, 1)
+        self.left, self.suspect, self.workers = deque(numbers), deque(), max(workers, 1)
         self.deaths: dict[int, int] = {}
         self.each = SPAN  # seconds of a case, by the last chunk
 
     def take(self, idle: bool = True) -> list | None:
         """The next chunk; None where nothing is left for now.
 
-        idle: whether a case that died with its chunk may be handed out, alone and after all others; not while cases are
-        on their way of which nobody could tell which one killed a worker.
+        idle: whether cases that died may be handed out, by themselves and after all others; not while cases are on
+        their way of which nobody could tell which one killed a worker.
         """
         if not self.left:
-            return [self.alone.popleft()] if self.alone and idle else None
+            return self.suspect.popleft() if self.suspect and idle else None
         fair = -(-len(self.left) // (2 * self.workers))  # so that the last chunks end together
         fair = fair if self.workers > 1 else len(self.left)
         count = max(1, min(max(int(SPAN / max(self.each, 1e-9)), self.least), MOST, fair))
@@ -159,12 +159,15 @@ class Chunks:
         self.each = seconds / len(numbers)
 
     def died(self, numbers: Sequence[int]) -> list:
-        """Hand the cases of a dead chunk out again, one by one; those that were tried often enough come back."""
-        out = []
+        """Hand the cases of a dead chunk out again, half of them at a time; a case that was alone and has been tried
+        often enough comes back."""
         for number in numbers:
             self.deaths[number] = self.deaths.get(number, 0) + 1
-            (out if self.deaths[number] >= TRIES else self.alone).append(number)
-        return out
+        if len(numbers) == 1 and self.deaths[numbers[0]] >= TRIES:
+            return list(numbers)
+        half = (len(numbers) + 1) // 2
+        self.suspect += [part for part in (list(numbers[:half]), list(numbers[half:])) if part]
+        return []
 
 
 def solved(work: Work, numbers: Sequence[int], executor, say: Callable | None = None) -> Iterator[tuple]:
@@ -196,8 +199,8 @@ def _handed(chunks: Chunks, done: Iterator) -> Iterator[tuple]:
             lost = chunks.died(chunk)
             if lost:
                 failed = Answers.blank(len(lost))
-                for case in range(len(lost)):
-                    failed.fail(case, f"{found.reason}, {TRIES} times")
+                for case, number in enumerate(lost):
+                    failed.fail(case, f"{found.reason}, {chunks.deaths[number]} times")
                 yield lost, failed, None, seconds
             continue
         chunks.done(chunk, seconds)
