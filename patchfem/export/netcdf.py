@@ -149,8 +149,8 @@ def with_events(data: Contents, time, interface, kind, slide, count: int, meanin
     return data.also({
         "event_time": ("event", time, about),
         "event_interface": ("event", np.asarray(interface, np.int32),
-                            {"units": "1", "long_name": "number of the interface from 1 (of the strip, if strips yaw); "
-                                                        "0 for a change of the drive"}),
+                            {"units": "1", "long_name": "number of the interface, or of the strip if strips yaw, "
+                                                        "counted from 1; 0 if the drive changes"}),
         "event_kind": ("event", np.asarray(kind, np.int8), flags),
         "event_slide": ("event", slide, {"units": "m", "long_name": "relative displacement at the event; missing at a "
                                                                     "change of the drive"})})

@@ -77,8 +77,8 @@ def _channel(path, number: int, one: dict, scale, notes: list) -> Channel:
         if label or scale is None:
             notes.append(f"record {number} ({quantity}): " + (f"its unit '{label[:20]}' is not known" if label else
                          "it has no unit") + ("; the unit of dataset 164 is used" if scale is not None else
-                                              "; its values are taken as SI; if they are not, give the unit with "
-                                              "--map"))
+                                              "; its values are read as SI; if they are in another unit, name this "
+                                              "unit with --map"))
     direction = int(one["rsp_dir"])
     if direction < 0:
         notes.append(f"record {number} points along -{_axis(direction)}, so its sign is reversed here")

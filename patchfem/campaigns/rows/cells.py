@@ -63,8 +63,8 @@ class Cells:
             named = np.array([self._is(name, value, text) for value in here])
             if not named.any():
                 known = ", ".join(dict.fromkeys(_shown(name, value) for value in here))
-                raise PatchfemError(f"--hold {name}={text}: no row of {self.path.name} with a reading has this value; "
-                                    f"the values of this column are {known}")
+                raise PatchfemError(f"--hold {name}={text}: none of the rows of {self.path.name} that hold a reading "
+                                    f"has {text} in the column {name}; the values of this column are {known}")
             out |= named
         return out
 

@@ -133,8 +133,8 @@ class PeriodMap:
         """Set the clock to a sine; it is made once for each of the last drives."""
         if id(drive) not in self.clocks:
             if len(drive.segments) != 1:
-                raise PatchfemError('drive: a periodic motion is computed only under one sine that does not end; for '
-                                    'this drive use accuracy.method = "march"')
+                raise PatchfemError('drive: a periodic motion can be computed only if the drive is a single sine '
+                                    'without end; for this drive use accuracy.method = "march"')
             if len(self.clocks) >= DRIVES:
                 self.clocks.clear()
             stiff = max(float(one.stiffness.sum()) for one in self.groups)

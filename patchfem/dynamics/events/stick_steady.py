@@ -187,8 +187,8 @@ def steady(modes: ModalBasis, drive, groups, start: Start | None = None, cycles:
     PatchfemError for a drive that does not repeat.
     """
     if len(drive.segments) != 1:
-        raise PatchfemError('drive: a periodic response is computed only under one sine that does not end; for this '
-                            'drive use accuracy.method = "march"')
+        raise PatchfemError('drive: a periodic response can be computed only if the drive is a single sine without '
+                            'end; for this drive use accuracy.method = "march"')
     n = modes.omega.size
     begin = np.zeros(2 * n) if start is None else np.concatenate([start.z, start.v])
     shooting = Slips(modes, drive, groups, periods)

@@ -87,8 +87,8 @@ def sets_of(patch, spring: float = 0.0) -> ContactSets:
     PatchfemError for a smooth skin, strips, or a patch that carries no load.
     """
     if patch.skin is not None:
-        raise PatchfemError(unbuilt("contact.asperities.law: a law that is not linear together with a normal load that "
-                                    "changes", "linear"))
+        raise PatchfemError(unbuilt("contact.asperities.law: a nonlinear law under a normal load that changes",
+                                    "linear"))
     if patch.strips is not None:
         raise PatchfemError(unbuilt("[contact.strips] with a normal load that changes", "either"))
     force = patch.pressure.sigma_n * patch.pieces.interface.weight

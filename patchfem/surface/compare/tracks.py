@@ -28,12 +28,11 @@ DEPTH, BOTTOM = ("mean depth of the longest track: lost area divided by width",
 WIDTH, STEP = ("width of the longest track",
                "step: mean depth over the middle third of the longest track, as ISO 5436-1 defines for a groove of "
                "type A1")
-LEFT, RIGHT = (f"pile-up: area above the first trace (before wear), up to one track width {side} the longest "
-               "track" for side in
-               ("before", "behind"))
-GROSS, PILED, NET = ("area lost in the longest track", "pile-up: area above the first trace (before wear), up to one "
-                                                       "track width from the longest track, sum of both "
-                                                       "sides", "lost area less pile-up")
+LEFT, RIGHT = (f"pile-up {side} the longest track: area above the first trace (before wear) within one track width"
+               for side in ("before", "behind"))
+GROSS, PILED, NET = ("area lost in the longest track", "pile-up on both sides: area above the first trace (before "
+                                                       "wear), on each side within one track width of the "
+                                                       "longest track", "lost area less pile-up")
 
 
 class Valley(NamedTuple):

@@ -191,7 +191,7 @@ def test_always_a_point_nearby_leads_to_the_same_motion():
 
 def test_refuses_what_does_not_repeat():
     group = [elements_of([4.0], [0.05])]
-    with pytest.raises(PatchfemError, match="one sine that does not end"):
+    with pytest.raises(PatchfemError, match="a single sine without end"):
         steady(ONE, levels([1.0, 2.0], 1.0, 5), group)
     free = basis([1.0], [0.0], [1.0], [1.0], [1.0])
     with pytest.raises(NotConverged, match="grows from period to period"):  # 0.7 is below pi/4
