@@ -11,6 +11,7 @@ would cost their load, 1.4 % for the six of that patch.
 * Points with a memory law share the modes of D^1/2 C D^1/2, D = mu sigma_n weight. A few modes carry the resultant.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -25,6 +26,9 @@ TRIES = 2  # times that yields are sorted anew before neighbours are exchanged, 
 SWAPS = 20  # exchanges of neighbours per point before points are taken out one by one: patches ask for 1 at most
 SHEAR_MODES = 4  # modes a shear reduction starts from: of bare pieces they leave 1e-6 of the friction limit
 FEW, BEYOND = 16, 0.8  # modes that fewer are held against; share of a tolerance that they may miss these by
+# points from which on the most compliant FEW modes are found without the others; products that they take, two vectors
+# each; residual over the largest value that these leave: squared, it is what the values err by
+LARGE, PRODUCTS, LEFT = 128, 24, 1e-6
 GATHERED = 16, 32, 64  # points that may stand for all of a patch
 BACK = 2.0  # bond lengths: exp(2) of the stiffness at rest
 
@@ -64,7 +68,8 @@ class Spectrum:
     """All modes of D^1/2 C D^1/2, the most compliant first, whose backbones say what a few of them leave out.
 
     points: (a,) indices of the contact set; limit: D (a,) [N]; shape: (a, n) slide of a point per unit mode coordinate;
-    values: (n,) [m/N] of the coordinates; length [m]: of the bonds.
+    values: (n,) [m/N] of the coordinates; length [m]: of the bonds. tangential: C (m, m) [m/N] where these are the
+    first of more modes, which are made when they are asked for.
     """
 
     points: np.ndarray
@@ -72,16 +77,26 @@ class Spectrum:
     shape: np.ndarray
     values: np.ndarray
     length: float
+    tangential: np.ndarray | None = None
+
+    @cached_property
+    def whole(self) -> "Spectrum":
+        """The Spectrum of all modes."""
+        return self if self.tangential is None else _all_modes(self.tangential, self.points, self.limit, self.length)
 
     @cached_property
     def slides(self) -> np.ndarray:
         """Slides (24,) [m] that backbones are compared on."""
         # six bond lengths: exp(-6) of the bonds' stretch is left; the square sets more slides where the backbone bends
-        elastic = 2 * np.abs(self.shape @ (self.values * (self.shape.T @ self.limit))).max()
+        bends = self.shape @ (self.values * (self.shape.T @ self.limit)) if self.tangential is None else \
+            _between(self.tangential, self.points) @ self.limit
+        elastic = 2 * np.abs(bends).max()
         return (6 * self.length + elastic) * (np.arange(1, 25) / 24) ** 2
 
     def modes(self, count: int) -> "ShearModes":
         """The first `count` modes."""
+        if count > self.values.size and self.tangential is not None:
+            return self.whole.modes(count)
         return ShearModes(self.points, frozen_array(self.shape[:, :count]), frozen_array(1 / self.values[:count]), self)
 
     @cached_property
@@ -92,6 +107,8 @@ class Spectrum:
     def backbone(self, count: int, shape=None, limit=None) -> np.ndarray:
         """Resultant [N] on `slides` with `count` modes, of these points or of others with a shape (k, count) and limits
         (k,) [N]; found from that of the most modes below `count` that is known."""
+        if count > self.values.size and self.tangential is not None:
+            return self.whole.backbone(count, shape, limit)
         count = min(count, self.values.size)
         if shape is None and count in self.known:
             return self.known[count][0]
@@ -261,21 +278,68 @@ def shear_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, c
     return _spectrum(tangential, limit, bond_length, weakening).modes(count)
 
 
-def _spectrum(tangential, limit, bond_length: float, weakening: float) -> Spectrum:
-    """The Spectrum of points; arguments and refusals as of `shear_modes`."""
+def _spectrum(tangential, limit, bond_length: float, weakening: float, first: bool = False) -> Spectrum:
+    """The Spectrum of points; arguments and refusals as of `shear_modes`. first: of many points that of FEW modes."""
     index = np.flatnonzero(limit > 0)
-    root = np.sqrt(limit[index])
-    even = np.ptp(tangential) == 0  # a spring before points of one rigid piece: one mode is all of it
-    with one_thread():
-        values, vectors = np.linalg.eigh(root[:, None] * tangential[np.ix_(index, index)] * root)
-    values, vectors = values[::-1], vectors[:, ::-1]
-    jump = values[0] / bond_length * (weakening - 1)
+    found = _first_modes(tangential, index, limit[index], bond_length) if first and index.size >= LARGE else None
+    found = found or _all_modes(tangential, index, limit[index], bond_length)
+    jump = found.values[0] / bond_length * (weakening - 1)
     if jump >= 1:
         raise PatchfemError("contact.shear with friction.kinetic below static: the patch may slip suddenly without a "
                             f"change of the force on it (the stability number is {jump:.3g}, but must be below 1); "
                             "raise friction.bond_length or friction.kinetic")
-    shape, values = (np.ones((index.size, 1)), tangential[:1, 0]) if even else (vectors / root[:, None], values)
-    return Spectrum(frozen_array(index, np.int64), limit[index], shape, values, bond_length)
+    return found
+
+
+def _all_modes(tangential, index, limit, length: float) -> Spectrum:
+    """The Spectrum of the points `index` (a,) with limits (a,) [N], of all modes."""
+    if np.ptp(tangential) == 0:  # a spring before points of one rigid piece: one mode is all of it
+        return Spectrum(frozen_array(index, np.int64), limit, np.ones((index.size, 1)), tangential[:1, 0], length)
+    root = np.sqrt(limit)
+    with one_thread():
+        values, vectors = np.linalg.eigh(root[:, None] * tangential[np.ix_(index, index)] * root)
+    return Spectrum(frozen_array(index, np.int64), limit, vectors[:, ::-1] / root[:, None], values[::-1], length)
+
+
+def _first_modes(tangential, index, limit, length: float) -> Spectrum | None:
+    """The Spectrum of the points `index` (a,) with limits (a,) [N], of the FEW most compliant modes; None where they
+    are not found in PRODUCTS, as those of a soft skin, whose values lie close."""
+    root, c = np.sqrt(limit)[:, None], _between(tangential, index)
+    with one_thread():
+        values, vectors, left = largest(lambda x: root * (c @ (root * x)), root[:, 0], FEW, PRODUCTS)
+    if not left <= LEFT * values[0]:
+        return None
+    return Spectrum(frozen_array(index, np.int64), limit, vectors / root, values, length, tangential)
+
+
+def _between(tangential, index) -> np.ndarray:
+    """Compliance (a, a) of the points `index` (a,), of neighbours without a copy."""
+    inside = slice(index[0], index[-1] + 1)
+    return tangential[inside, inside] if index[-1] - index[0] < index.size else tangential[np.ix_(index, index)]
+
+
+def largest(times: Callable, near: np.ndarray, count: int, products: int) -> tuple:
+    """(the `count` largest eigenvalues (count,) of a symmetric matrix (n, n), falling; their vectors (n, count); the
+    largest residual of these), by Lanczos' method on two vectors at once, each made orthogonal to all before it (Golub
+    and Van Loan, Matrix Computations, 10.3.6).
+
+    times(x (n, 2)) -> the matrix times x; near: (n,) of one sign, which the first vector is like; products: so many.
+    """
+    basis, images = np.empty((2, len(near), 2 * products))
+    new = np.stack([near, near * np.linspace(-1, 1, len(near))], axis=1)
+    for k in range(0, 2 * products, 2):
+        for _ in range(2):  # once leaves the round-off of the first
+            new = new - basis[:, :k] @ (basis[:, :k].T @ new)
+            one = new[:, 0] / np.sqrt(new[:, 0] @ new[:, 0])
+            other = new[:, 1] - one * (one @ new[:, 1])
+            new = np.stack([one, other / np.sqrt(other @ other)], axis=1)
+        basis[:, k:k + 2] = new
+        images[:, k:k + 2] = new = times(new)
+    inner = basis.T @ images
+    values, parts = np.linalg.eigh((inner + inner.T) / 2)
+    values, parts = values[:-count - 1:-1], parts[:, :-count - 1:-1]
+    vectors = basis @ parts
+    return values, vectors, float(np.sqrt(((images @ parts - vectors * values)**2).sum(axis=0).max()))
 
 
 def enough_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, count: int, tolerance: float,
@@ -296,8 +360,9 @@ def fewest_modes(tangential: np.ndarray, limit: np.ndarray, bond_length: float, 
                  weakening: float = 1.0, most: int = 64) -> ShearModes:
     """The fewest `shear_modes`, two at least, whose backbone misses one of four times as many, FEW at least, by less
     than BEYOND of `tolerance`: the rest is left to what more modes than these would add."""
-    spectrum = _spectrum(tangential, limit, bond_length, weakening)
+    spectrum = _spectrum(tangential, limit, bond_length, weakening, first=True)
     for count in range(2, most):
+        spectrum.backbone(count)  # the first: that of more is found from it
         more = max(FEW, 4 * count)
         if spectrum.share(spectrum.backbone(more), spectrum.backbone(count)) <= BEYOND * tolerance:
             return spectrum.modes(count)
@@ -359,12 +424,15 @@ def _backbone(limit, shape, values, length, slides, start) -> tuple:
     No step takes a point further back than BACK lengths, where the law is so steep that Newton does not come back. NaN
     where it does not come to an end.
     """
-    b, going = start, np.arange(slides.size)
+    b, going, r = start, np.arange(slides.size), values.size
+    first, second = np.tril_indices(r)
+    products, upper = (shape.T[first] * shape.T[second]).T, np.empty((r, r), np.int64)
+    upper[first, second] = upper[second, first] = np.arange(first.size)
     for _ in range(400):
         xi = slides[going, None] - b[going] @ shape.T
         decay = np.exp(np.minimum(-xi / length, 700.0))
         missing = b[going] / values - (limit * (1 - decay)) @ shape
-        tangent = np.diag(1 / values) + shape.T @ ((limit * decay / length)[:, :, None] * shape)
+        tangent = ((limit * decay / length) @ products)[:, upper] + np.diag(1 / values)
         try:
             step = np.linalg.solve(tangent, missing[:, :, None])[:, :, 0]
         except np.linalg.LinAlgError:  # a law too steep for numbers

@@ -14,11 +14,16 @@ from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.unilateral import press
 from patchfem.core import PatchfemError
 from patchfem.slip.shear_modes import (
+    FEW,
+    LARGE,
+    _first_modes,
+    _spectrum,
     enough_modes,
     fewest_modes,
     gathered,
     gauss,
     jenkins_set,
+    largest,
     normal_stiffness,
     scaled,
     shear_modes,
@@ -299,6 +304,41 @@ def test_always_the_fewest_modes_meet_a_tolerance_that_one_fewer_misses(angle, t
     fewer = shear_modes(pair.tangential, limit, 1e-6, count - 1)
     assert found.backbone_error <= tolerance and (count == 2 or tolerance < 1.3 * fewer.backbone_error)
     np.testing.assert_allclose(found.shape, shear_modes(pair.tangential, limit, 1e-6, count).shape)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-5, 2e-5])
+def test_exact_the_first_modes_of_many_points_are_those_of_all(angle):
+    """Found without the others, the modes span what theirs span, and miss the backbone by as much; more modes than
+    these are asked of all."""
+    pair, limit = coated_pair(240), friction_limit(240, angle)
+    first, whole = (_spectrum(pair.tangential, limit, 1e-6, 1.0, one) for one in (True, False))
+    assert first.points.size >= LARGE and first.values.size == FEW < whole.values.size == first.points.size
+    assert first.values == pytest.approx(whole.values[:FEW], rel=1e-9)
+    few, all_ = (one.shape[:, :8] * np.sqrt(limit[first.points])[:, None] for one in (first, whole))
+    assert np.abs(np.linalg.norm(few.T @ all_, axis=1) - 1).max() <= 1e-10
+    for count in (2, 4, FEW):
+        assert first.backbone(count) == pytest.approx(whole.backbone(count), rel=1e-9)
+    assert first.backbone(64) == pytest.approx(whole.backbone(64), rel=1e-12)
+    assert first.modes(64).stiffness == pytest.approx(whole.modes(64).stiffness, rel=1e-12)
+
+
+def test_exact_largest_eigenvalues_of_a_matrix():
+    r = np.random.default_rng(5)
+    turn = np.linalg.qr(r.normal(size=(150, 150)))[0]
+    matrix = turn * 0.7**np.arange(150) @ turn.T
+    values, vectors, left = largest(lambda x: matrix @ x, np.ones(150), 8, 24)
+    assert values == pytest.approx(0.7**np.arange(8), rel=1e-12) and left <= 1e-12
+    assert np.abs(matrix @ vectors - vectors * values).max() <= 1e-12
+    assert largest(lambda x: turn * np.linspace(1, 2, 150) @ turn.T @ x, np.ones(150), 8, 6)[2] > 1e-3  # no end of it
+
+
+def test_always_modes_of_a_soft_skin_are_those_of_all_points():
+    """The values of a skin lie close, so that a few products do not part them."""
+    c = coated_pair(240).tangential
+    limit = np.ones(len(c))
+    assert _first_modes(np.diag(np.linspace(1, 2, len(c))) + 1e-9 * c / c.max(), np.arange(len(c)), limit, 1.0) is None
+    found = _spectrum(np.diag(np.linspace(1, 2, len(c))) + 1e-9 * c / c.max(), limit, 1.0, 1.0, True)
+    assert found.values.size == len(c) and found.tangential is None
 
 
 def test_always_a_backbone_does_not_depend_on_those_asked_before():
