@@ -28,8 +28,11 @@ class Layout:
         """Wanted cell length (k,) [m] of the layout at x (k,) [m]."""
         x = np.asarray(x, float)
         out = np.full(x.shape, self.largest)
-        for low, high, least in self.bands:
-            out = np.minimum(out, least + self.slope * _beside(x, low, high))
+        for low, high, least in self.bands:  # in place: bands are many
+            wanted = _beside(x, low, high)
+            wanted *= self.slope
+            wanted += least
+            np.minimum(out, wanted, out=out)
         return np.minimum(out, self.inside + self.slope * _beside(x, *self.span))
 
     def times(self, share: float) -> "Layout":
@@ -40,6 +43,8 @@ class Layout:
 
 
 def _beside(x, low: float, high: float) -> np.ndarray:
+    if low == high:
+        return np.abs(x - low)
     return np.maximum(0.0, np.maximum(low - x, x - high))
 
 

@@ -145,11 +145,14 @@ def _lumped(scene: Scene) -> bool:
 
 def _pressed(scene: Scene) -> bool:
     """Whether a scene is a patch under a load, with or without the modes of a rig under a sine of the base, in which
-    plain numbers are what PLAIN says: no load line, no strips, no grooves and no file."""
+    plain numbers are what PLAIN says: no load line, no strips, no grooves and no file but [measured], which no answer
+    hangs on."""
     contact, rig = scene.contact, scene.kind == "rig"
     if not contact or contact.load is None or scene.kind not in ("patch", "rig") or scene.normal or scene.wear:
         return False
-    if contact.load_line or contact.strips or contact.grooves or contact.holder or files_of(scene):
+    if contact.load_line or contact.strips or contact.grooves or contact.holder:
+        return False
+    if any(key != "measured.file" for key, _ in files_of(scene)):
         return False
     law, drive = scene.friction, scene.drive
     return not rig or bool(law and law.temperature is None and law.spread is None and scene.structure.mode

@@ -112,8 +112,19 @@ def shared_pairs(asked) -> tuple:
 
 def shared_pair(asked, level: int) -> Pair:
     """The condensed pieces of one level of a `PatchModel`, as `shared_pairs` has them."""
-    pieces = asked.lower, asked.upper, asked.plane, asked.width * asked.pairs
-    return _shared(Keyed(asked, (asked.meshes.name, *pieces)), level)
+    return _shared(_keyed(asked, asked.meshes.name), level)
+
+
+def hand_over(asked, meshes, pairs) -> None:
+    """Give the condensed pieces (Pair, level by level) of `Meshes` that are just made to `shared_pair`, in place of
+    those of the last ones; asked: one of the patches that share them."""
+    _HANDED.clear()
+    _HANDED.update(((_keyed(asked, meshes.name), level), pair) for level, pair in enumerate(pairs))
+
+
+def _keyed(asked, name: str) -> "Keyed":
+    """What the condensed pieces of a `PatchModel` on meshes of this name depend on."""
+    return Keyed(asked, (name, asked.lower, asked.upper, asked.plane, asked.width * asked.pairs))
 
 
 def pair_beside(asked, pair: Pair) -> Pair:
@@ -137,9 +148,12 @@ class Keyed:
         return hash(self.key)
 
 
+_HANDED: dict = {}  # (Keyed, level) -> Pair of meshes that are just made, until it is asked for
+
+
 @lru_cache(maxsize=SHARED)
 def _shared(one: Keyed, level: int) -> Pair:
-    pair = condensed(one.asked, *one.asked.meshes.levels[level])
+    pair = _HANDED.pop((one, level), None) or condensed(one.asked, *one.asked.meshes.levels[level])
     for piece in (pair.piece, pair.upper):
         if isinstance(piece, Piece) and not piece.rounding:
             piece.made.clear()  # factors are far larger than the compliance, and made again where fields are wanted

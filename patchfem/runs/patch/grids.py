@@ -7,6 +7,7 @@ climbed a run decides in `ladder`, a plan expects in `expected_grids`. Read `bas
 """
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ from ...mesh.nested import coarser, finer, plan_of
 from ...mesh.tensor import TensorGrid
 from ...model.patch import bars
 from ...model.pieces import grid_of, outlined, rounded_edges
-from .condensed import condensed
+from .condensed import Pair, condensed
 from .press import Patch, pressed
 from .values import contact_ends
 
@@ -65,22 +66,38 @@ class ContactExtent:
         return self.span[1] - self.span[0]
 
 
-def base_grids(asked) -> list:
+class Search:
+    """The pieces on the even columns of the first search for a contact, made once for patches of one geometry."""
+
+    def __init__(self, asked):
+        self.asked, self.cell = asked, search_layout(asked).inside
+
+    @cached_property
+    def pair(self) -> Pair:
+        return condensed(self.asked, *grids_of(self.asked, search_layout(self.asked)))
+
+    def of(self, asked) -> Pair | None:
+        """The pieces for another patch of this geometry; None where its gap asks for other columns."""
+        return self.pair if search_layout(asked).inside == self.cell else None
+
+
+def base_grids(asked, search: Search | None = None) -> list:
     """The coarsest grids of a `PatchModel`, one where its pieces are alike, graded to the contact that they find.
+
+    search: of a patch of the same geometry, whose pieces serve where they are on the same columns.
 
     Where a load that varies moves the edges of the contact, the columns are fine over the bands that they sweep between
     SWING of the load; where wear does, no column is longer than WORN of the interface.
     """
     sweep = [replace(asked, load=share * asked.load) for share in SWING
              if asked.sweeps == "load" and asked.load is not None]
-    layout = search_layout(asked)
+    layout, pair = search_layout(asked), search and search.of(asked)
     for _ in range(SEARCHES if asked.nominal_load > 0 else 0):  # without a load nothing bears, and no edge is found
-        grids = grids_of(asked, layout)
-        pair = condensed(asked, *grids)
-        seen = [contact_extent(pressed(each, pair)) for each in (asked, *sweep)]
-        layout = layout_of(asked, seen)
+        pair = pair or condensed(asked, *grids_of(asked, layout))
+        seen, x = [contact_extent(pressed(each, pair)) for each in (asked, *sweep)], pair.grid.x
+        layout, pair = layout_of(asked, seen), None
         cells = max(one.cell / one.wide for one in seen)
-        if cells <= 1 / (EDGE[asked.still] - 1) and _shows_crests(asked, grids[0].x, layout):
+        if cells <= 1 / (EDGE[asked.still] - 1) and _shows_crests(asked, x, layout):
             break
     return grids_of(asked, layout)
 

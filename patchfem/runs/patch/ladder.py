@@ -9,7 +9,7 @@ from ...mesh.nested import coarser, finer, plan_of
 from ...model.pieces import bodies_of
 from . import fine, high_order
 from .condensed import Keyed, condensed, shared_pairs
-from .grids import LEAST_LEVELS, SPENT, base_grids, seconds_of
+from .grids import LEAST_LEVELS, SPENT, Search, base_grids, seconds_of
 from .kept import KEPT, by_content, shares
 from .measures import measures, met, missed
 from .press import pressed, solve
@@ -94,15 +94,15 @@ def meshes_beside(low, high) -> list:
     return out
 
 
-def climb(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
+def climb(asked, tolerance: float, estimate: bool = True, fresh: bool = False, search: Search | None = None) -> tuple:
     """A patch on the coarsest mesh of the ladder that meets its tolerance, and on all coarser ones, fine to coarse.
 
     Where the tolerance is below FINE, or the next mesh is dear, cells of order 4 add sharper measures if they can, or
     points as fine as a trace; then the mesh serves fields and motion. The climb ends where the next mesh would take
     more than the work that is spent on a patch. Without an estimate it is the third mesh, and nothing is solved on the
-    others.
+    others. search: as of `base_grids`.
     """
-    grids, out, sharp = base_grids(asked), [], None
+    grids, out, sharp = base_grids(asked, search), [], None
     while True:
         try:
             wanted = estimate or len(out) == LEAST_LEVELS - 1

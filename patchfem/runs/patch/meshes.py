@@ -17,7 +17,7 @@ from ...mesh.nested import finer
 from ...mesh.tensor import TensorGrid
 from ...model.patch import Meshes
 from . import grids, ladder
-from .condensed import condensed
+from .condensed import condensed, hand_over
 from .measures import measures, missed
 from .press import pressed
 from .static import missed_on, patches_on
@@ -55,9 +55,11 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None
     swept = [replace(one, load=share * one.load) for one in cases if one.sweeps == "load" and one.load is not None
              for share in grids.SWING]
     slips = any(one.gives_way for one in patches)
-    halvings = _halvings(cases, tolerance) if slips else {}
+    search = grids.Search(cases[0])
+    halvings = _halvings(cases, tolerance, search) if slips else {}
     common = min(halvings.values(), default=0)  # what all of them halve are levels of the ladder
-    layout = _layout([*cases, *swept], not (every and all_), {key: one - common for key, one in halvings.items()})
+    layout = _layout([*cases, *swept], not (every and all_), {key: one - common for key, one in halvings.items()},
+                     search)
     # a contact that moves on the way, or slips part by part, has measures that its first state tells nothing of
     shares, own = START[-1:] if asked.sweeps or slips else START, None
     if layout is None:
@@ -69,9 +71,11 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None
             own = own or grids.grids_of(asked, layout)
             if bodies[0].x.size >= own[0].x.size:  # both have the most columns
                 continue
-        levels, missed_by = _climbed(cases, bodies, tolerance, bool(shares), grids.LEAST_LEVELS + common)
+        pairs, missed_by = _climbed(cases, bodies, tolerance, bool(shares), grids.LEAST_LEVELS + common)
         if missed_by <= 1 or not shares:
-            return with_digest(levels)
+            found = with_digest([(one.grid, None if one.upper is one.piece else one.upper_grid) for one in pairs])
+            hand_over(cases[0], found, pairs)
+            return found
         enough = share * missed_by**(-1 / FASTEST)  # times the cells, above which no mesh meets it
         shares = tuple(one for one in shares if one <= max(enough, START[-1]))
 
@@ -116,28 +120,29 @@ def _numbers(asked) -> tuple:
     return (*(float(value or 0.0) for value in own), *shapes, *skin)
 
 
-def _halvings(cases: list, tolerance: float) -> dict:
+def _halvings(cases: list, tolerance: float, search: grids.Search) -> dict:
     """How often the run of a case by itself halves its cells beyond the least levels, of CORNERS cases by `_numbers`.
     """
     out = {}
     for one in farthest_apart(cases, CORNERS)[0]:
         try:
-            out[_numbers(one)] = len(ladder.climb(one, one.mesh_tolerance or tolerance)) - grids.LEAST_LEVELS
+            out[_numbers(one)] = len(ladder.climb(one, one.mesh_tolerance or tolerance, search=search)) \
+                - grids.LEAST_LEVELS
         except PatchfemError:  # its own run says why
             continue
     return out
 
 
-def _layout(cases: list, between: bool, halvings: dict) -> Layout | None:
+def _layout(cases: list, between: bool, halvings: dict, search: grids.Search) -> Layout | None:
     """The layout of the coarsest grids, that no case wants finer; None where no case can be pressed.
 
     between: there are more cases than these, and their contacts end between those of neighbouring ones; halvings: as
     `_halvings`, beyond those of all of them; the cells of these cases are so much shorter from the first level on.
     """
     first, along = cases[0], grids.EDGE[cases[0].still]
-    layout = grids.search_layout(first)
+    layout = None
     for _ in range(ROUNDS):
-        pair = condensed(first, *grids.grids_of(first, layout))
+        pair = condensed(first, *grids.grids_of(first, layout)) if layout else search.pair
         known = patches_on(cases, pair)
         seen = [(one, found) for one, patch in zip(cases, known) if (found := _loaded(one, pair, patch)) is not None]
         if not seen:
@@ -163,13 +168,17 @@ def _merged(layouts: list, between: bool) -> Layout:
     bands = {band for one in layouts for band in (*one.bands, (*one.span, one.inside))}
     if between:
         bands |= set(_filled(layouts))
-    first = layouts[0]
+    first, bands = layouts[0], sorted(bands, key=lambda band: (band[2], band))
     out = Layout(first.start, first.stop, (), (first.start, first.stop), *2 * [min(one.largest for one in layouts)],
                  min(one.slope for one in layouts))
-    for low, high, least in sorted(bands, key=lambda band: (band[2], band)):  # those that others make needless are many
-        if (out.size(np.linspace(low, high, 5)) > least * (1 + 1e-9)).any():
-            out = replace(out, bands=(*out.bands, (low, high, least)))
-    return out
+    low, high, _ = np.array(bands).T
+    places = np.linspace(low, high, 5, axis=1)
+    size, kept = out.size(places), []  # of the bands that are kept: those that others make needless are many
+    for k, band in enumerate(bands):
+        if (size[k] > band[2] * (1 + 1e-9)).any():
+            kept.append(band)
+            size = np.minimum(size, replace(out, bands=(band,)).size(places))
+    return replace(out, bands=tuple(kept))
 
 
 def _filled(layouts: list) -> list:
@@ -187,7 +196,7 @@ def _filled(layouts: list) -> list:
 
 
 def _climbed(cases: list, bodies, tolerance: float, once: bool, least: int) -> tuple:
-    """Levels of nested meshes from the coarsest `bodies`, fine to coarse, up to one on which every case meets the
+    """The pieces on nested meshes from the coarsest `bodies`, fine to coarse, up to one on which every case meets the
     tolerance, or the dearest that is worth it; and the largest error over the tolerance where a case misses it: of
     those that press together, where all these meet it of the first other one. once: no more than the `least` levels."""
     pairs, tolerance = [], cases[0].mesh_tolerance or tolerance
@@ -203,7 +212,7 @@ def _climbed(cases: list, bodies, tolerance: float, once: bool, least: int) -> t
                 by := _missed(one, pairs, tolerance)) > 1), missed_by)
         dear = bodies[0].x.size > MOST_NODES or grids.seconds_of(bodies) > grids.SPENT[cases[0].still]
         if missed_by <= 1 or once or dear:
-            return [(pair.grid, None if pair.upper is pair.piece else pair.upper_grid) for pair in pairs], missed_by
+            return pairs, missed_by
 
 
 def _missed(asked, pairs: list, tolerance: float) -> float:
