@@ -18,7 +18,7 @@ from ..patch import result as of_patch
 from ..patch.meshes import geometry_of
 from ..remedies import Finding, beyond_tolerance
 from ..results.patch_rows import TABLE
-from ..results.result import without_folders
+from ..results.result import without_folders, without_folders_of
 from . import one_by_one
 from .answers import Answers
 
@@ -102,10 +102,9 @@ def _solved(models: Sequence[Model], say: Callable | None) -> Answers:
     out.numerics.update(dict.fromkeys(np.flatnonzero(good).tolist(), nodes))
     strained = of_patch.beyond_small_strains(first.patch, found.top, found.approach)
     mean = found.values["normal_load"] / (first.patch.length * first.patch.width * first.patch.pairs)
-    always, path = bool(first.source.remarks) or not alike, first.source.path
+    always, told = bool(first.source.remarks) or not alike, without_folders_of(first.source.path)
     for case in np.flatnonzero(good & (wide | strained | always)).tolist():
-        model, measures = models[case], {name: replace(one, floor=float(floors[name][case]))
-                                         for name, one in found.measures(case).items()}
+        model, measures = models[case], found.measures(case, floors)
         warned = [*model.source.remarks,
                   *of_patch.strained_by(model.patch, float(found.top[case]), float(found.approach[case])),
                   *beyond_tolerance(Finding(model, measures, _Nodes(found.levels[0].x)))]
@@ -114,7 +113,7 @@ def _solved(models: Sequence[Model], say: Callable | None) -> Answers:
     for case in np.flatnonzero(good).tolist():
         notes = [*of_patch.slender(first.patch, mean[case]), *found.band(first.patch, case)]
         if notes:
-            out.notes[case] = without_folders(notes, path)
+            out.notes[case] = told(notes)
     single = np.flatnonzero(~good)
     out.seconds[:] = (perf_counter() - begin) / len(models)
     if single.size:

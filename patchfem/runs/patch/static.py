@@ -4,7 +4,7 @@ It takes bare pieces, or pieces behind a linear skin, under a load: contacts of 
 presses otherwise is left to single runs.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from types import MappingProxyType
 from typing import NamedTuple
@@ -99,9 +99,10 @@ class Together(NamedTuple):
         return one_by_one.band_words(asked, *({name: float(column[k]) for name, column in one.items()}
                                               for one in self.planes)) if self.planes else []
 
-    def measures(self, k: int) -> dict:
-        """The measures of the k-th patch by name."""
-        return {name: Measure(float(column[k]), TABLE[name].unit, float(self.errors[name][k]), TABLE[name].floor)
+    def measures(self, k: int, floors: Mapping | None = None) -> dict:
+        """The measures of the k-th patch by name; floors: name -> (q,) in place of those of the table."""
+        return {name: Measure(float(column[k]), TABLE[name].unit, float(self.errors[name][k]),
+                              TABLE[name].floor if floors is None else float(floors[name][k]))
                 for name, column in self.values.items()}
 
 

@@ -1,6 +1,7 @@
 """The result of a run, with the parts that every kind of run shares."""
 
 import re
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -135,10 +136,19 @@ def choices(result) -> dict:
 def without_folders(texts, path: Path) -> list:
     """Remarks in which a file is named without its folder where that is absolute, and numbers are written for people;
     path: of the scene, beside which files lie."""
+    return without_folders_of(path)(texts)
+
+
+def without_folders_of(path: Path) -> Callable[[Iterable[str]], list]:
+    """`without_folders` of many remarks on scenes at one path."""
     folders = [f"{folder}/" for folder in (path.parent, path.parent.absolute()) if folder.is_absolute()]
-    out = []
-    for text in texts:
-        for folder in folders:
-            text = text.replace(folder, "")
-        out.append(tidied(_BEFORE.sub("", text, count=1) if text.startswith("/") else text))
-    return out
+
+    def told(texts) -> list:
+        out = []
+        for text in texts:
+            for folder in folders:
+                text = text.replace(folder, "")
+            out.append(tidied(_BEFORE.sub("", text, count=1) if text.startswith("/") else text))
+        return out
+
+    return told
