@@ -17,7 +17,7 @@ import numpy as np
 
 from .. import rates
 from ..core import NotConverged
-from .lapack import dpotrf, dtrsm
+from .lapack import dgemm, dpotrf, dtrsm
 
 LEAF = 24  # cells of a part that is not halved any further
 CHUNK = 256  # leaves assembled at once
@@ -103,18 +103,25 @@ def _runs(shape: Shape, half: int) -> tuple:
 
 @lru_cache(maxsize=1024)
 def _entries(shape: Shape) -> tuple:
-    """Couplings that a leaf brings in: numbers of both nodes, place (column, row) of the first, steps (dc, dr).
+    """Couplings that a leaf brings in, for each of top, side and rest of its stiffness: places (k,) of entries in the
+    flat matrix; columns and rows (k,) of their first nodes, and places (k,) in the 36 numbers of these in a stencil.
 
     A coupling belongs to the leaf that has the cell right below the lesser column and row of its two nodes.
     """
     place, (columns, lines) = plan(shape).place, (shape.columns, shape.lines)
-    c, r, dc, dr = (part.ravel() for part in np.broadcast_arrays(*np.ogrid[:columns + 1, :lines, -1:2, -1:2]))
+    c, r, dc, dr, a, b = (part.ravel() for part in np.broadcast_arrays(
+        *np.ogrid[:columns + 1, :lines, -1:2, -1:2, :2, :2]))
     d, s = c + dc, r + dr
     mine = (d >= 0) & (d <= columns) & (s >= 0) & (s < lines)
     mine &= (np.minimum(c, d) < columns) | (not shape.right)
     mine &= (np.minimum(r, s) < shape.rows) | (not shape.bottom)
-    c, r, d, s = c[mine], r[mine], d[mine], s[mine]
-    return place[c, r], place[d, s], c, r, 1 + d - c, 1 + s - r
+    c, r, d, s, a, b, dc, dr = (part[mine] for part in (c, r, d, s, a, b, dc, dr))
+    first, second, of = 2 * place[c, r] + a, 2 * place[d, s] + b, 12 * (1 + dc) + 4 * (1 + dr) + 2 * a + b
+    own, ring, out = 2 * len(plan(shape).own), 2 * len(plan(shape).ring), []
+    for below, beside in ((False, False), (False, True), (True, True)):
+        here, width = ((first >= own) == below) & ((second >= own) == beside), ring if beside else own
+        out.append(((first[here] - own * below) * width + second[here] - own * beside, c[here], r[here], of[here]))
+    return tuple(out)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -197,7 +204,8 @@ def eliminate_parts(root: Shape, leaves) -> GridFactor:
                          for part in (plan(shape).own, plan(shape).ring))
             if own.size:
                 _factorise(top, side)
-                rest -= np.matmul(side.transpose(0, 2, 1), side)
+                for left, beside in zip(rest, side) if rest.size else ():  # in place: a product by itself costs as much
+                    dgemm(-1.0, beside.T, beside.T, beta=1.0, c=left.T, trans_b=1, overwrite_c=1)
                 stacks.append(Stack(own, ring, top, side))
             here[shape] = rest
         below = here
@@ -223,17 +231,14 @@ def _levels(root: Shape) -> list:
 
 def _leaves(stencil, shape: Shape, corner) -> tuple:
     """Stiffness (top, side, rest) of parts that are not halved, from the stencil."""
-    first, second, c, r, dc, dr = _entries(shape)
-    nodes, own = plan(shape).place.size, 2 * len(plan(shape).own)
-    out = _blank(len(corner), own, 2 * nodes - own)
-    for start in range(0, len(corner), CHUNK):
-        some = slice(start, start + CHUNK)
-        place = corner[some, None] + np.stack([c, r], axis=1)
-        whole = np.zeros((len(place), nodes, 2, nodes, 2))
-        whole[:, first, :, second] = stencil[place[..., 0], place[..., 1], dc, dr].swapaxes(0, 1)
-        whole = whole.reshape(len(place), 2 * nodes, 2 * nodes)
-        for part, block in zip(out, (whole[:, :own, :own], whole[:, :own, own:], whole[:, own:, own:])):
-            part[some] = block
+    flat, rows = stencil.reshape(-1), stencil.shape[1]
+    own, ring = 2 * len(plan(shape).own), 2 * len(plan(shape).ring)
+    out, begins = _blank(len(corner), own, ring), 36 * (corner[:, :1] * rows + corner[:, 1:])
+    for part, (place, c, r, of) in zip(out, _entries(shape)):
+        part, here = part.reshape(len(corner), part[0].size), 36 * (c * rows + r) + of
+        for start in range(0, len(corner), CHUNK):
+            some = slice(start, start + CHUNK)
+            part[some, place] = flat[begins[some] + here]
     return out
 
 
@@ -254,9 +259,13 @@ def _joined(shape: Shape, updates) -> tuple:
                     target = out[1] if i < own else out[2]
                     if i >= own > j:
                         continue  # the mirror image of an entry of `side`
-                    target[:, rows:rows + m, j - own:j - own + n] += update[:, a:a + m, b:b + n]
+                    place = target[:, rows:rows + m, j - own:j - own + n]
                 else:
-                    out[0][:, i:i + m, j:j + n] += update[:, a:a + m, b:b + n]
+                    place = out[0][:, i:i + m, j:j + n]
+                if half:
+                    place += update[:, a:a + m, b:b + n]
+                else:  # nothing is there yet
+                    place[:] = update[:, a:a + m, b:b + n]
     return out
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-__all__ = ["cho_factor", "cho_solve", "dpotrf", "dpotri", "dpotrs", "dtrsm", "dtrtri", "one_thread"]
+__all__ = ["cho_factor", "cho_solve", "dgemm", "dpotrf", "dpotri", "dpotrs", "dtrsm", "dtrtri", "one_thread"]
 
 
 def _module(name: str):
@@ -30,7 +30,7 @@ def _module(name: str):
 
 _LAPACK, _BLAS = _module("_flapack"), _module("_fblas")
 dpotrf, dpotri, dpotrs, dtrtri = _LAPACK.dpotrf, _LAPACK.dpotri, _LAPACK.dpotrs, _LAPACK.dtrtri
-dtrsm = _BLAS.dtrsm
+dgemm, dtrsm = _BLAS.dgemm, _BLAS.dtrsm
 
 
 def cho_factor(matrix) -> np.ndarray:
