@@ -123,7 +123,8 @@ class Backbone(NamedTuple):
 class Joint(NamedTuple):
     """The rig of a backbone: its Model, pressed Patch or None, coarser Patch or None, number of the mode's coordinate,
     held: (omega [rad/s], shape (n,)) of the mode with the contact held by `stiffness` (i,) [N/m], omega None where
-    nothing gives way. apart: all coarser Patches or Nones."""
+    nothing gives way. apart: all coarser Patches or Nones; errors: whether those of the mesh and of the cells of a law
+    are asked for."""
 
     model: Model
     patch: object
@@ -132,6 +133,7 @@ class Joint(NamedTuple):
     held: tuple
     stiffness: np.ndarray
     apart: tuple = (None,)
+    errors: bool = True
 
     @property
     def reach(self) -> float:
@@ -157,21 +159,23 @@ class Joint(NamedTuple):
         return not (_limit(self) or others or self.model.rig.bends)
 
 
-def backbone(model: Model, mode: str = "", amplitudes=None, methods=WAYS, progress=None) -> Backbone:
+def backbone(model: Model, mode: str = "", amplitudes=None, methods=WAYS, progress=None,
+             errors: bool = True) -> Backbone:
     """Curves of a rig's mode, of its first where none is named.
 
     amplitudes (k,) [m] at the output, rising; None: from a hundredth of the slide at which all of the contact slips to
     15 times it, or to where the mode slides as if it were free. progress: called with a way that begins, and with what
-    a decay will take where that is more than TOLD. Where no friction acts and no spring bends the curves are level.
+    a decay will take where that is more than TOLD. errors: without them those of the mesh, of the cells of a law and of
+    modes left out are not computed, and the values are the same in less than half the time. Where no friction acts and no spring bends the curves are level.
     PatchfemError for a scene that has no rig or no such mode.
     """
     with placed(model.source):
-        joint = _joint(model, mode)
+        joint = _joint(model, mode)._replace(errors=errors)
         wanted = _default(joint) if amplitudes is None else np.unique(np.asarray(amplitudes, float))
         if wanted[-1] > joint.model.rig.travel:
             raise PatchfemError(f"the largest amplitude, {say(wanted[-1], 3)}, is larger than the travel of the "
                                 "flexure; give smaller amplitudes with --amplitudes", "structure.travel")
-        curves, missing, richer = {}, {}, model.rig.richer
+        curves, missing, richer = {}, {}, model.rig.richer if errors else None
         other = None if richer is None else _joint(replace(model, rig=richer), mode)
         for way in methods:
             if progress is not None:
@@ -419,7 +423,7 @@ def _in_space(joint: Joint, read) -> np.ndarray:
     model, error = joint.model, 0.0
     celled = any(has(one.numbers.law, "cells") for one in model.rig.interfaces)
     soft = model.soft or model.rig.soft
-    if not celled and not soft:
+    if not joint.errors or not (celled or soft):
         return error
     fine = _group(joint, joint.patch)
     best = read(fine)
