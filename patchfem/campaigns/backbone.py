@@ -166,7 +166,8 @@ def backbone(model: Model, mode: str = "", amplitudes=None, methods=WAYS, progre
     amplitudes (k,) [m] at the output, rising; None: from a hundredth of the slide at which all of the contact slips to
     15 times it, or to where the mode slides as if it were free. progress: called with a way that begins, and with what
     a decay will take where that is more than TOLD. errors: without them those of the mesh, of the cells of a law and of
-    modes left out are not computed, and the values are the same in less than half the time. Where no friction acts and no spring bends the curves are level.
+    modes left out are not computed, and the values are the same in less than half the time. Where no friction acts and
+    no spring bends the curves are level.
     PatchfemError for a scene that has no rig or no such mode.
     """
     with placed(model.source):

@@ -7,10 +7,11 @@ from time import perf_counter
 
 import numpy as np
 
-from ..core import Outcome, PatchfemError
+from ..core import NotConverged, Outcome, PatchfemError
 from ..core import say as words
 from ..identify.least_squares import Fit, fit
 from ..identify.space import space, spread_points
+from ..identify.two_models import TwoModels
 from ..identify.words import remarks
 from ..inputs.cells import text_of
 from ..inputs.columns import read_columns
@@ -28,9 +29,9 @@ HEADER = "decay_amplitude [m],decay_frequency [Hz],decay_damping [1]"
 HALVES = 0.5 * np.array([1e-3, 5e-2])  # of frequency and damping, standard deviations of rows without errors
 LEAST = 1e-6  # of a value, a standard deviation at least
 WAYS = ("balance", "quasi-static")  # the first tells, the last is quick
+STARTS = 6  # of the search, unless given
 OTHERS = 8  # values tried besides the scene's own, until a curve is known
 SECONDS = 10.0  # from line to line of progress
-ROUNDS, SAME = 8, 1e-3  # of the search, until the balance over the static curve changes by less standard deviations
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -90,15 +91,15 @@ def read_curve(path) -> tuple:
     return columns["amplitude"][order], value[:, order], np.maximum(spread, LEAST * np.abs(value))[:, order]
 
 
-def fit_decay(scene: Scene, to: Path, free, say=None, starts: int = 3) -> FittedDecay:
+def fit_decay(scene: Scene, to: Path, free, say=None, starts: int = STARTS) -> FittedDecay:
     """Fit the keys `free` ("table.key=low..high" texts) of a rig's scene to the curve in the file `to`.
 
     The model's curve is that of a periodic motion at the same amplitudes, by balance. The values are searched by the
-    curve of one static force, which takes a hundredth of the time, times the share of the balance in it at the values
-    found before, until that share stays; where it does not, by the balance from the best values seen; where one of the
-    two is not known, by the other. Each row counts by its error. Values at which the mode does not oscillate at all
-    amplitudes are passed over; rows that only the balance lacks have its share of the nearest row, with a warning.
-    starts: of the search. SceneError and PatchfemError name bad input.
+    curve of one static force, which takes a hundredth of the time, made to touch the balance (`identify.two_models`);
+    where this does not settle, by the balance itself; where one of the two is not known, by the other. Each row counts
+    by its error. Values at which the mode does not oscillate at all amplitudes are passed over; rows that only the
+    balance lacks have its share of the nearest row, with a warning. starts: of the search by the static curve.
+    SceneError and PatchfemError name bad input.
     """
     begin = perf_counter()
     wanted, wrong = ranges(free)
@@ -132,36 +133,32 @@ def fit_decay(scene: Scene, to: Path, free, say=None, starts: int = 3) -> Fitted
         if (lost := np.isnan(found[0])).any():
             raise PatchfemError("the mode of the model does not oscillate at the amplitudes "
                                 f"{_listed(amplitude[lost])}; leave out these rows, or narrow the ranges of --free")
-        return found * share
+        return found
 
     def balanced(values) -> np.ndarray:
         found, beside = curve(values, ways[0]), curve(values, ways[-1])
         return np.where(np.isnan(found), beside * _nearest(found / beside, amplitude), found)
 
-    def fitted(model, bars: str = "") -> Fit:
-        return fit(lambda values: ((model(values) - measured) / error).ravel(), box.low, box.high, start=start,
-                   starts=starts, bars=bars)
+    def off(one) -> np.ndarray:
+        return ((one - measured) / error).ravel()
 
     start, box = own_values(scene, wanted), space([one.low for one in wanted], [one.high for one in wanted])
     ways = _known(curve, [start, *map(box.values, spread_points(OTHERS, len(start)))])
     if say:
         say(f"{amplitude.size} amplitudes computed by {' and '.join(ways)}")
-    share, settled, tried = np.ones_like(measured), len(ways) == 1, []
-    while not settled and len(tried) < ROUNDS:
-        start = fitted(quick).values
+    model = quick
+    if len(ways) > 1:
         try:
-            told = balanced(start)
+            model, start = TwoModels(quick, balanced, off, box).searched(start, starts)
+        except NotConverged:
+            raise
         except PatchfemError as reason:
             raise PatchfemError("with the fitted values harmonic balance finds no oscillation at the amplitudes "
                                 f"{_listed(amplitude)}: "
                                 f"{reason}; leave out the rows with the largest damping, or narrow the ranges of "
                                 "--free") from None
-        settled = np.abs((told - quick(start)) / error).max() < SAME
-        tried.append((float(np.square((told - measured) / error).sum()), len(tried), start))
-        share, starts = share * told / quick(start), 1
-    model = quick if settled else balanced
-    start = start if settled else min(tried)[2]
-    found = fitted(model, "series")
+        model, starts = model or balanced, 1
+    found = fit(lambda values: off(model(values)), box.low, box.high, start=start, starts=starts, bars="series")
     best, lost = model(found.values), amplitude[np.isnan(curve(found.values, ways[0])[0])]
     warned = [f"harmonic balance found no oscillation at the amplitudes {_listed(lost)}; there, the values of the "
               "static curve are used, multiplied by the ratio of the two methods at the nearest amplitude at which "
@@ -212,7 +209,7 @@ def _curve(model, amplitude, method: str) -> np.ndarray:
     """Frequency [Hz] and damping ratio (2, k) at rising amplitudes (k,) [m], NaN where the mode does not oscillate;
     PatchfemError where it does so nowhere."""
     with placed(model.source):
-        found = backbone(model, "", amplitude, (method,))
+        found = backbone(model, "", amplitude, (method,), errors=False)
     if method not in found.curves:
         raise PatchfemError(found.missing[method])
     one, out = found.curves[method], np.full((2, amplitude.size), np.nan)

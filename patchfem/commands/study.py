@@ -106,7 +106,7 @@ class Rows:
     leave_out: word("column for cross-validation, such as frequency, input or run: each value of the column is left "
                     "out in turn, and the fit to the other rows is scored on the rows left out") = ""
     starts: Annotated[int | None, Parameter(
-        help="number of random starts inside the ranges, such as 20; the best result is used; default: 8, or 3 for a "
+        help="number of random starts inside the ranges, such as 20; the best result is used; default: 8, or 6 for a "
              "curve of frequency and damping against amplitude")] = None
     seed: Annotated[int, Parameter(help="seed of the random starts, such as 1")] = 0
     unstable: Annotated[Literal["bound", "out", "read"], Parameter(

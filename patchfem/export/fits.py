@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 from .. import scales
+from ..campaigns import fit_decay as decays
 from ..campaigns import wear_coefficient
 from ..campaigns.fit import fit_loop
 from ..campaigns.fit_decay import fit_decay, is_curve
@@ -26,7 +27,7 @@ from . import fit_rows as written
 from .results import PAGE, STARTS, Folder
 
 LOOP, ROWS = ("offset", "warm_up"), ("leave_out", "seed", "unstable", "placebo", "resume")
-STARTED = {"rows": 8, "curve": 3}  # starts of a search, unless given
+STARTED = {"rows": 8, "curve": decays.STARTS}  # starts of a search, unless given
 BELONG = {"hold": "fits to a loop under a prescribed slide "
                   "or to rows of a rig", **dict.fromkeys(LOOP, "fits to a loop under a prescribed slide"),
           "starts": "fits to rows of a rig or to its curve of frequency and damping against "

@@ -66,7 +66,7 @@ def fit(residual: Callable, low, high, log=None, start=None, starts: int = 3, ba
     """
     box = space(low, high, log)
     model, n = Counted(residual, box), box.low.size
-    begins = _starts(model, None if start is None else box.unit(start), starts)
+    begins = starting_points(model, None if start is None else box.unit(start), starts)
     if model.rows < n:
         raise ValueError(f"{model.rows} rows of data cannot determine {n} values")
     return answered(model, descents(model, begins, every=False), bars)
@@ -131,13 +131,14 @@ def _frozen(model: Counted, u, answer: Answer, rms: float, agreed: int, outcome:
                model.failures, model.reason, agreed, outcome)
 
 
-def _starts(model: Counted, own, count: int) -> list:
-    """Starting points: the own start where it works, then the best of a set that fills the cube."""
+def starting_points(model: Counted, own, count: int, tries: int = 0) -> list:
+    """Points (n,) of the unit cube to begin at, `count` at most: the own one (n,), or None, where it works, then the
+    best of some `tries`, 8 n unless given, that fill the cube. NotConverged where all of them fail."""
     n = model.space.low.size
     if count == 1 and own is not None and model(own) is not None:
         return [own]
     scored = []
-    for u in spread_points(8 * n, n):
+    for u in spread_points(tries or 8 * n, n):
         r = model(u)
         if r is not None:
             scored.append((float(r @ r), len(scored), u))

@@ -1,0 +1,64 @@
+"""Least squares of a dear model by a cheap one, against the descent by the dear one alone."""
+
+import numpy as np
+import pytest
+
+from patchfem.core import PatchfemError
+from patchfem.identify.least_squares import fit
+from patchfem.identify.space import space
+from patchfem.identify.two_models import TwoModels
+
+X = np.linspace(0.1, 3.0, 30)
+DATA = np.array([np.exp(-X) + 0.3 * np.sin(3 * X), 0.5 * X])  # no values of the models below leave nothing over
+BOX = space([0.1, 0.1], [5.0, 5.0])
+
+
+def dear(values) -> np.ndarray:
+    a, b = values
+    return np.array([np.exp(-a * X) * (1 + 0.3 * b * X), b * X / (1 + a * X)])
+
+
+def cheap(values) -> np.ndarray:
+    a, b = values
+    return np.array([np.exp(-a * X), b * X])
+
+
+def off(one) -> np.ndarray:
+    return (one - DATA).ravel()
+
+
+def test_exact_the_least_squares_are_those_of_the_dear_model():
+    """With much left over; the share alone, without slopes, ends 1 % above."""
+    best = fit(lambda values: off(dear(values)), BOX.low, BOX.high, starts=4, bars="")
+    models = TwoModels(cheap, dear, off, BOX)
+    model, values = models.searched([4.0, 0.2], 4)
+    assert np.square(off(dear(values))).sum() == pytest.approx(best.rms**2 * DATA.size, rel=2e-4)
+    np.testing.assert_allclose(model(values), dear(values), rtol=1e-12)
+    u = BOX.unit(best.values)
+    for _ in range(8):
+        u = models._descended(models.touching(u, dear(BOX.values(u))), u)
+    assert np.square(off(dear(BOX.values(u)))).sum() > 1.01 * best.rms**2 * DATA.size
+
+
+def test_exact_the_touching_model_has_the_slopes_of_the_dear_one():
+    models, u = TwoModels(cheap, dear, off, BOX), np.array([0.3, 0.6])
+    model, step = models._tangent(u), 1e-6
+    for i in range(2):
+        beside = u + step * (np.arange(2) == i)
+        slope, own = (((one(BOX.values(beside)) - one(BOX.values(u))) / step) for one in (model, dear))
+        np.testing.assert_allclose(slope, own, atol=1e-3 * np.abs(own).max())
+
+
+def test_always_a_share_of_nothing_is_a_sum():
+    """A cheap model that is 0 in a row, as the damping of a joint that sticks."""
+    models = TwoModels(lambda values: cheap(values) * [[1.0], [0.0]], dear, off, BOX)
+    u = np.array([0.3, 0.6])
+    np.testing.assert_allclose(models.touching(u, dear(BOX.values(u)))(BOX.values(u)), dear(BOX.values(u)))
+
+
+def test_refuses_a_dear_model_that_fails_everywhere():
+    def failing(values):
+        raise PatchfemError("no motion")
+
+    with pytest.raises(PatchfemError, match="no motion"):
+        TwoModels(cheap, failing, off, BOX).searched([1.0, 1.0], 2)
