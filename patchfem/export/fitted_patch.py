@@ -5,7 +5,7 @@ import tomllib
 import numpy as np
 
 from .. import __version__
-from ..campaigns.fit_patch import SEARCHED, FittedPatch
+from ..campaigns.fit_patch import SEARCHED, FittedPatch, OneLaw
 from ..disk.whole import write_rows, write_text
 from ..model.model import build, resolved
 from ..scales import SPOKEN, axis_unit, plain, short
@@ -24,7 +24,8 @@ def answer_of(fitted: FittedPatch) -> dict:
     """The object of fit.json, in SI."""
     laws = {law: {"values": {f"friction.{key}": {"value": value, "unit": SEARCHED[law].units.get(key, "1")}
                              for key, value in one.values.items()},
-                  "outcome": str(one.found.outcome), **_sizes(one.off, fitted.slides)}
+                  "outcome": str(one.found.outcome), **(sizes := _sizes(one.off, fitted.slides)),
+                  "dissipation": sizes["dissipation"] | _relative(one, fitted)}
             for law, one in fitted.laws.items()}
     return {"patchfem": __version__, "title": fitted.scene.title, "measured": fitted.scene.path.name,
             "quantity": "patch", "outcome": laws[fitted.best]["outcome"], "law": fitted.best,
@@ -39,6 +40,15 @@ def _sizes(off, slides) -> dict:
     """Largest difference by size, where, and rms of those (2, k) of stiffness and loss."""
     return {name: {"largest": float(row[at := np.abs(row).argmax()]), "at": float(slides[at]),
                    "rms": float(np.sqrt(np.mean(row**2)))} for name, row in zip(PARTS, off)}
+
+
+def _relative(one: OneLaw, fitted: FittedPatch) -> dict:
+    """Largest difference of the loss of a law over the loss of the patch itself, however small that is, and where; as
+    in `off` where the patch loses nothing."""
+    own, loss = fitted.own.loss, one.curves.loss
+    share = np.where(own > 0, loss / np.where(own > 0, own, 1.0) - 1, one.off[1])
+    at = np.abs(share).argmax()
+    return {"relative": float(share[at]), "relative_at": float(fitted.slides[at])}
 
 
 def scene_text(fitted: FittedPatch, law: str, path) -> str:
@@ -106,7 +116,7 @@ def lines_of(answer: dict) -> list:
     out = [f"{answer['outcome']}: laws of a single point fitted to a patch under a load of "
            f"{short(answer['load'], 'N', 4)}; the patch slips as a whole at {short(answer['slip_force'], 'N', 4)} and "
            f"has {_held(answer)} while the whole patch sticks; "
-           f"{answer['rows']} amplitudes of the slide from {low} to {high}",
+           f"{answer['rows']} amplitudes of the slide from {low} to {high}. {_headline(answer)}",
            f"  {'law':<16}{'error of stiffness':>22}{'error of loss':>22}   values"]
     for law, one in answer["laws"].items():
         parts = (f"{_percent(one[part]['largest'])} (rms {_percent(one[part]['rms'])})" for part in PARTS)
@@ -124,6 +134,14 @@ def lines_of(answer: dict) -> list:
     return out
 
 
+def _headline(answer: dict) -> str:
+    """The law that fits best, with the signs and sizes of its largest errors over the range of amplitudes."""
+    stiff, loss = (answer["laws"][answer["law"]][part] for part in PARTS)
+    return (f"Law '{answer['law']}' fits best; its largest errors over this range are "
+            f"{_signed(stiff['largest'])} of the stiffness (at {short(stiff['at'], 'm', 3)}) and "
+            f"{_signed(loss['relative'])} of the energy loss per cycle (at {short(loss['relative_at'], 'm', 3)})")
+
+
 def sentences(law: str, answer: dict) -> list:
     """What a law costs against the patch; answer: the object of fit.json."""
     (low, high), (stiff, loss) = answer["amplitudes"], (answer["laws"][law][part] for part in PARTS)
@@ -133,14 +151,25 @@ def sentences(law: str, answer: dict) -> list:
             f"The energy that this law dissipates per cycle is up to {_percent(abs(loss['largest']))} "
             f"{'larger' if loss['largest'] > 0 else 'smaller'} than that of the patch (at {there}) and differs by "
             f"{_percent(loss['rms'])} rms; where this energy is below a thousandth of 4 x force x slide, the "
-            f"difference is given relative to that thousandth.",
+            f"difference is given relative to that thousandth.{_small(loss)}",
             "If this law replaces the patch, the relative error of a mode's frequency is at most about half the error "
             "of the stiffness. The relative error of the friction damping of this mode is at most the sum of the "
             "errors of the stiffness and of the dissipated energy."]
 
 
+def _small(loss: dict) -> str:
+    """The largest difference over the energy that the patch itself dissipates, where that is another."""
+    return "" if loss["relative"] == loss["largest"] else (
+        " Relative to the energy that the patch itself dissipates, the largest difference is "
+        f"{_signed(loss['relative'])} (at {short(loss['relative_at'], 'm', 3)}).")
+
+
 def _percent(share: float) -> str:
     return f"{plain(100 * share, 2)} %"
+
+
+def _signed(share: float) -> str:
+    return f"{'+' * (share > 0)}{_percent(share)}"
 
 
 def _value(value: float, unit: str) -> str:

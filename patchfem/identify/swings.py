@@ -23,6 +23,10 @@ GRID = np.linspace(0.75, 1.3, 56)  # of the highest line, frequencies of the fir
 STEADY = 0.3  # by which the next half period may differ from the last
 
 
+class FewSamples(PatchfemError):
+    """Too few samples of a cycle."""
+
+
 class _Half(NamedTuple):
     """One half swing: middle [s], size with its sign, half period [s], standard deviations of middle and size per unit
     of noise, sum of squares left over and degrees of freedom."""
@@ -71,7 +75,7 @@ def _first(time, value) -> tuple:
     for f in line * GRID:
         part = time - time[0] <= 1 / f
         if np.count_nonzero(part) < 2 * FEWEST:
-            raise PatchfemError(f"the record has {np.count_nonzero(part)} samples per cycle of {f:.4g} Hz; at least "
+            raise FewSamples(f"the record has {np.count_nonzero(part)} samples per cycle of {f:.4g} Hz; at least "
                                 f"{2 * FEWEST} are needed")
         turn = 2 * np.pi * f * (time[part] - time[0])
         columns = np.stack([np.ones(turn.size), np.cos(turn), np.sin(turn)], axis=1)

@@ -6,11 +6,15 @@ from pathlib import Path
 
 from ..faults import PatchfemError
 from .cells import cells_of, header_of, number_of, text_of
+from .laboratory import UNIVERSAL
+from .loops import OWN
 
 UNITS = {"frequency": {"Hz": 1.0, "kHz": 1e3},
          "input": {"g": 9.80665, "m/s^2": 1.0, "m s-2": 1.0},
          "acceleration": {"g": 9.80665, "m/s^2": 1.0, "m s-2": 1.0},
          "displacement": {"mil": 25.4e-6, "in": 0.0254, "m": 1.0, "mm": 1e-3, "um": 1e-6}}
+MOTIONS = ("displacement", "velocity", "acceleration", *OWN["displacement"], "relative_velocity",
+           "absolute_acceleration")  # columns that make a table with `time` a record
 FLAGS = {"U": "unstable", "*": "the gauge gave no reading", "R": "repeat run"}
 
 
@@ -35,6 +39,7 @@ def read_table(path: Path) -> list:
     frequency and input must stand in every row. PatchfemError names line and column of a mistake, Missing where there
     is no file.
     """
+    _refuse_record(Path(path))
     lines = text_of(Path(path), "a measured table").split("\n")
     names, factors = header_of(path, lines[0], UNITS, ("frequency", "input"), "frequency [Hz],input [g],flag", False)
     unknown = [name for name in names if name not in (*UNITS, "flag")]
@@ -43,6 +48,23 @@ def read_table(path: Path) -> list:
                             f"{', '.join(UNITS)}")
     return [_row(path, number, cells_of(path, number, line, names), factors)
             for number, line in enumerate(lines[1:], 2) if line.strip(", \t")]
+
+
+def _refuse_record(path: Path) -> None:
+    """PatchfemError for a record over time, which no row of a table is."""
+    ending = path.suffix.lower()
+    if not path.is_file():
+        return
+    if ending not in (".mat", *UNIVERSAL):
+        names = [cell.partition("[")[0].strip().lower() for cell in
+                 text_of(path, "a measured table").split("\n", 1)[0].split(",")]
+        if "time" not in names or not set(MOTIONS) & set(names) or "frequency" in names:
+            return
+    which = ' --map "time=VARIABLE [s]" --map "displacement=VARIABLE [m]"' if ending == ".mat" else ""
+    raise PatchfemError(f"{path}: this file contains records over time; a rig is fitted to rows of frequency, input, "
+                        "acceleration and displacement, or to frequency and damping against amplitude. Compute the "
+                        f"latter from a free decay with `patchfem import {path} --decay{which} -o decay.csv`, then fit "
+                        "to decay.csv")
 
 
 def _row(path, number: int, cells: dict, factors: dict) -> Row:

@@ -86,3 +86,15 @@ def test_exact_cells_may_stand_in_quotes(tmp_path):
     (tmp_path / "t.csv").write_text(HEAD + '"143",5,"6.0",,"UR"\n')
     row, = read_table(tmp_path / "t.csv")
     assert (row.frequency, row.acceleration, row.flag) == (143.0, 6.0 * G_N, "UR")
+
+
+@pytest.mark.parametrize("head", ["time [s],displacement [m]", "Time [ms],velocity [m/s]",
+                                  "time [s],relative_displacement [m],friction_force [N]"])
+def test_refuses_a_record_with_the_way_to_fit_it(tmp_path, head):
+    """A ring-down is fitted by way of its frequency and damping."""
+    path = tmp_path / "ring.csv"
+    path.write_text(head + "\n" + ("1,2,3"[:2 * head.count(",") + 1] + "\n") * 3)
+    (tmp_path / "ring.mat").write_bytes(b"MATLAB 5.0\xff")
+    for one in (path, tmp_path / "ring.mat"):
+        with pytest.raises(PatchfemError, match=rf"records over time.*`patchfem import {one} --decay"):
+            read_table(one)

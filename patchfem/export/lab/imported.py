@@ -8,12 +8,18 @@ from ... import scales
 from ...core import PatchfemError
 from ...disk import whole
 from ...identify import measured_modes as measured
+from ...identify.swings import FewSamples
 from ...inputs import laboratory, records
 from ...inputs import universal as universal_files
+from ...inputs.loops import OWN
 from ...scene.keys import quantities
 from ...structure import universal as universal_modes
 from . import modes as mode_lines
 from . import write
+
+COMPUTED = ("; a run keeps only the turning points of its motion before its last cycles, so its export is no full "
+            "record. To get frequency and damping against amplitude, run `patchfem backbone SCENE --method decay -o "
+            "DIR` on the scene of this run; `fit --to DIR/backbone.csv` reads the result")
 
 
 class Estimate(NamedTuple):
@@ -63,7 +69,10 @@ def _table(file: Path, out: Path, asked, zero: bool) -> dict:
 
 def _decay(file: Path, out: Path, asked, begin: str) -> dict:
     values, notes = _records(file, asked)
-    found = measured.decay_curve(values, _quantity(begin, "time", f"--begin {begin}"))
+    try:
+        found = measured.decay_curve(values, _quantity(begin, "time", f"--begin {begin}"))
+    except FewSamples as reason:
+        raise PatchfemError(f"{file}: {reason}{COMPUTED * _ours(file)}") from None
     write.write_table(out, {f"decay_{name}": one for name, one in found._asdict().items()},
                       {f"decay_{name}": unit for name, unit in write.DECAY.items()})
     ends = [f"{scales.told(found.frequency[k], found.frequency_error[k], unit='Hz')} with a damping ratio of "
@@ -71,6 +80,11 @@ def _decay(file: Path, out: Path, asked, begin: str) -> dict:
             for k in (0, -1)]
     return {"points": found.time.size, **{f"decay_{name}": one.tolist() for name, one in found._asdict().items()},
             "notes": notes, "told": f"{found.time.size} amplitudes, from {ends[0]} to {ends[1]}"}
+
+
+def _ours(file: Path) -> bool:
+    """Whether `patchfem export` has written a file of records."""
+    return OWN["displacement"][-1].encode() in file.read_bytes()
 
 
 def _modes(file: Path, out: Path, asked, how: Estimate) -> dict:
