@@ -1,5 +1,7 @@
 """The structure of a scene written for other programs: read back it is the rig, its elements give its friction."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from command_line import cli
@@ -86,6 +88,30 @@ def test_exact_matlab_has_the_structures_of_nlvib(tmp_path):
         np.testing.assert_allclose(cell["friction_limit_force"][0, 0].item(), law.numbers.static * law.load, rtol=1e-12)
         np.testing.assert_allclose(cell["stiffness"][0, 0].item(), law.numbers.static * law.load
                                    / law.numbers.bond_length, rtol=1e-12)
+
+
+FORCED = RUB.replace('kind = "base"', 'kind = "force"').replace('acceleration = "5 g"', 'force = "40 N"')
+
+
+def test_exact_the_guide_names_every_variable_of_both_files(tmp_path):
+    """Its table against files of a base, a force and tanh: the variables, their sizes, and the fields of an element."""
+    page = (Path(pf.__file__).parent / "scene/GUIDE.md").read_text("utf-8")
+    part = page.split("### Matrices and friction elements of a scene\n")[1].split("\n## ")[0]
+    rows = {row[1].strip("` "): [cell.strip("` ") for cell in row[2:-1]] for row in
+            (line.split("|") for line in part.splitlines() if line.startswith("| `"))}
+    found = {".mat": {}, ".npz": {}}
+    for text in (RUB, FORCED, POINT + friction_of("tanh") + STRUCTURE):
+        for ending, one in found.items():
+            path = written(tmp_path, text, ending)[1]
+            values = loadmat(path) if ending == ".mat" else dict(np.load(path))
+            one |= {name: value.shape for name, value in values.items() if not name.startswith("__")}
+    for ending, one in found.items():
+        assert set(one) == {name for name, row in rows.items() if row[0] in ("both", ending)}, ending
+        for name, shape in one.items():
+            size = rows[name][1]
+            assert len(shape) == (2 if ending == ".mat" else 0 if size in ("1", "text") else 1 + size.count("×")), name
+    cell = loadmat(tmp_path / "rig.mat")["nonlinear_elements"].ravel()[0].dtype.names
+    assert all(f"`{field}`" in part for field in (*cell, "stiffness"))
 
 
 def test_exact_tanh_has_its_speed(tmp_path):

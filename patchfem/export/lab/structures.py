@@ -5,7 +5,8 @@ interfaces, as elements of pyHarm act on coordinates, the others motions without
 another, all are those of the modes. NLvib takes M, D, K, Fex1 and the structures of `nonlinear_elements`:
 elasticDryFriction with stiffness and friction_limit_force, or tanhDryFriction with friction_limit_force and eps, its
 speed [m/s]. TMDSimPy takes M, K, C, and Q, T, kt, Fs of each JenkinsForce: one row of `direction`, its transpose,
-`stiffness` and `limit`. M, K, C, slide, output and force or base are those that structure.file reads.
+`stiffness` and `limit`. M, K, C, slide, output and force or base are those that structure.file reads. The guide has a
+table of all variables.
 """
 
 from pathlib import Path
