@@ -1,13 +1,13 @@
 """Identification of a joint from frequency and damping over the amplitude: a decay, or any backbone."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
 
-from ..core import NotConverged, Outcome, PatchfemError
+from ..core import NotConverged, Outcome, PatchfemError, frozen_array
 from ..core import say as words
 from ..identify.least_squares import Fit, fit
 from ..identify.space import space, spread_points
@@ -17,6 +17,7 @@ from ..inputs.cells import text_of
 from ..inputs.columns import read_columns
 from ..model.model import build
 from ..model.source import placed
+from ..response.errors import OF_MODES
 from ..runs import joint
 from ..scene.changed import Base
 from ..scene.ranges import Range, ranges
@@ -38,7 +39,7 @@ SECONDS = 10.0  # from line to line of progress
 class FittedDecay:
     """A fitted curve: the ranges `free`, `found` in their order; amplitude (k,) [m]; measured, error, model (2, k):
     frequency [Hz] and damping ratio; method: how the model's were found; sets: that make the scene fitted; warnings:
-    sentences."""
+    sentences; notes: sentences on what is compared, and on what the intervals have of the modes left out."""
 
     scene: Scene
     path: Path
@@ -52,6 +53,7 @@ class FittedDecay:
     sets: list
     warnings: list
     seconds: float
+    notes: tuple = ()
 
     @property
     def outcome(self) -> Outcome:
@@ -71,10 +73,7 @@ def is_curve(path) -> bool:
 def read_curve(path) -> tuple:
     """(amplitude (k,) [m], frequency [Hz] and damping (2, k), their standard deviations (2, k)) of a table of `import
     --decay`, or of a curve such as one of backbone.csv."""
-    units = {f"{before}{name}{after}": unit for before in ("decay_", "") for name, unit in UNITS.items()
-             for after in ("", "_error")}
-    table = read_columns(path, units, tuple(f"decay_{name} {name}" for name in UNITS), HEADER, "a decay",
-                         labels=True)
+    table = _table(path)
     if len(set(table.labels.get("method", ("",)))) > 1:
         raise PatchfemError(f"{path}: the file contains the curves of several methods; keep the rows of one method "
                             "only")
@@ -91,15 +90,21 @@ def read_curve(path) -> tuple:
     return columns["amplitude"][order], value[:, order], np.maximum(spread, LEAST * np.abs(value))[:, order]
 
 
+def _table(path):
+    units = {f"{before}{name}{after}": unit for before in ("decay_", "") for name, unit in UNITS.items()
+             for after in ("", "_error")}
+    return read_columns(path, units, tuple(f"decay_{name} {name}" for name in UNITS), HEADER, "a decay", labels=True)
+
+
 def fit_decay(scene: Scene, to: Path, free, say=None, starts: int = STARTS) -> FittedDecay:
     """Fit the keys `free` ("table.key=low..high" texts) of a rig's scene to the curve in the file `to`.
 
     The model's curve is that of a periodic motion at the same amplitudes, by balance. The values are searched by the
     curve of one static force, which takes a hundredth of the time, made to touch the balance (`identify.two_models`);
     where this does not settle, by the balance itself; where one of the two is not known, by the other. Each row counts
-    by its error. Values at which the mode does not oscillate at all amplitudes are passed over; rows that only the
-    balance lacks have its share of the nearest row, with a warning. starts: of the search by the static curve.
-    SceneError and PatchfemError name bad input.
+    by its error. Of a reduced structure the intervals contain what more of its modes change. Values at which the mode
+    does not oscillate at all amplitudes are passed over; rows that only the balance lacks have its share of the nearest
+    row, with a warning. starts: of the search by the static curve. SceneError and PatchfemError name bad input.
     """
     begin = perf_counter()
     wanted, wrong = ranges(free)
@@ -164,8 +169,67 @@ def fit_decay(scene: Scene, to: Path, free, say=None, starts: int = STARTS) -> F
               "static curve are used, multiplied by the ratio of the two methods at the nearest amplitude at which "
               "both have a value"] if lost.size else []
     sets = [one.assigned(value) for one, value in zip(wanted, found.values)]
+    notes = _compared(to, ways[0], amplitude, measured[1])
+
+    def moved(change) -> np.ndarray:
+        return np.abs(fit(lambda values: off(model(values) + change), box.low, box.high, start=found.values, starts=1,
+                          bars="").values - found.values)
+
+    richer = _of_more_modes(joint.freed(build(base.changed(sets))), apart, ways[0])
+    if richer is not None:
+        rows = np.searchsorted(apart, amplitude)
+        found, more = _widened(found, box, richer if isinstance(richer, str) else richer[:, rows], moved,
+                               curve(found.values, ways[0]), [one.key for one in wanted])
+        notes += more
     return FittedDecay(scene, Path(to), wanted, found, amplitude, measured, error, best, ways[0], sets,
-                       [*scene.remarks, *warned, *remarks(found, [one.key for one in wanted])], perf_counter() - begin)
+                       [*scene.remarks, *warned, *remarks(found, [one.key for one in wanted])], perf_counter() - begin,
+                       notes)
+
+
+def _compared(path, method: str, amplitude, damping) -> tuple:
+    """Sentences on what is compared, where the curve in a file is not itself found by a method."""
+    label = (*_table(path).labels.get("method", ()), "decay")[0]
+    if label == method:
+        return ()
+    k = int(np.argmax(damping))
+    lost = -np.expm1(-2 * np.pi * damping[k])
+    return (f"the measured curve is compared with the curve by {method} at the same amplitudes, not with a computed "
+            f"decay; a decay gives mean values over a cycle, so the two differ most where the damping is largest: at "
+            f"{words(amplitude[k], 3)} one cycle reduces the amplitude by {100 * lost:.2g} %. The intervals do not "
+            "contain this difference; `patchfem backbone scene.fitted.toml` computes both curves",)
+
+
+def _of_more_modes(model, amplitude, method: str):
+    """The curve (2, k) of more modes of a reduced structure, or why there is none; None of any other structure."""
+    if model.rig.richer is None:
+        return None
+    try:
+        return _curve(replace(model, rig=model.rig.richer), amplitude, method)
+    except PatchfemError as reason:
+        return str(reason)
+
+
+def _widened(found: Fit, box, richer, moved, own, names) -> tuple:
+    """(the Fit with intervals wider by what more modes of the structure change, sentences).
+
+    richer: the curve of more modes (2, k), or why there is none; own: that of the modes (2, k); moved(a change of the
+    curve (2, k)) -> how much the values move (n,).
+    """
+    if isinstance(richer, str):
+        return found, (f"the intervals do not contain the error of the modes left out of the structure: {richer}",)
+    change = np.nan_to_num(OF_MODES * (richer - own))
+    by = moved(change)
+    ends = found.intervals + by[:, None] * [-1, 1]
+    shares = ", ".join(f"{name} by {_share_of(part, value)}" for name, part, value in zip(names, by, found.values))
+    return replace(found, intervals=frozen_array(np.clip(ends, box.low[:, None], box.high[:, None]))), (
+        "the intervals contain the error of the modes left out of the structure, found with more modes: it changes "
+        f"frequencies by up to {100 * np.nanmax(np.abs(change[0] / own[0])):.2g} % and damping ratios by up to "
+        f"{100 * np.nanmax(np.abs(change[1] / own[1])):.2g} %, and moves {shares}",)
+
+
+def _share_of(part: float, value: float) -> str:
+    """A change as a share of a value."""
+    return f"{100 * part / abs(value):.2g} %" if value else f"{part:.2g}"
 
 
 def _known(curve, tried: list) -> list:

@@ -27,7 +27,7 @@ def answer_of(fitted: FittedDecay) -> dict:
             "values": {one.key: fit_folder.value_of(one, found, k) for k, one in enumerate(fitted.free)},
             "rms": {"frequency": rms[0], "damping": rms[1]}, "evaluations": found.evaluations,
             "failures": found.failures, "descents_agreed": found.agreed, "warnings": fitted.warnings,
-            "seconds": round(fitted.seconds, 6)}
+            "notes": list(fitted.notes), "seconds": round(fitted.seconds, 6)}
 
 
 def fit_into(fitted: FittedDecay, folder: Folder) -> dict:
@@ -66,4 +66,5 @@ def lines_of(answer: dict) -> list:
             f"{answer['evaluations']} evaluations",
             *(line_of(f"{key:<26}", one) for key, one in answer["values"].items()),
             f"  rms of the residual   {100 * rms['frequency']:.2g} % of the frequency, {100 * rms['damping']:.2g} % of "
-            "the damping ratio"]
+            "the damping ratio",
+            *(f"  note: {text}" for text in answer["notes"])]

@@ -125,3 +125,65 @@ def test_too_few_amplitudes_say_how_many_are_needed(tmp_path):
     free = {**FREE, "friction.static": (0.1, 0.6), "friction.beta": (0.1, 2)}
     with pytest.raises(PatchfemError, match="too few to determine 4 values; at least 3 are needed"):
         fit_decay.fit_decay(pf.load(IWAN), path, [f"{key}={low}..{high}" for key, (low, high) in free.items()])
+
+
+CHAIN = """\
+[structure]
+output_mass = 2
+[structure.reduced]
+stiffness = "both.npz"
+mass = "both.npz"
+damping = "both.npz"
+boundary = [20, 12]
+modes = {modes}
+[[structure.interface]]
+between = [1, 0]
+law = "elastic-plastic"
+static = 0.4
+load = "50 N"
+bond_length = "100 um"
+[drive]
+kind = "base"
+frequency = "100 Hz"
+acceleration = "5 g"
+cycles = 10
+"""
+
+
+def test_the_intervals_contain_the_error_of_modes_left_out(tmp_path):
+    """A curve of all modes of a chain fitted by a reduction to one: an interval without that error misses the truth."""
+    k, m, n = 1e7, 0.02, 20
+    K = k * (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
+    K[-1, -1] = k
+    np.savez(tmp_path / "both.npz", K=K, M=m * np.eye(n), C=1e-6 * K)
+    for name, modes in (("whole", 18), ("few", 1)):
+        (tmp_path / f"{name}.toml").write_text(CHAIN.format(modes=modes))
+    path = written(tmp_path / "decay.csv", tmp_path / "whole.toml", amplitudes=np.geomspace(2e-5, 3e-4, 6))
+    key = "structure.interface[1].bond_length"
+    found = pf.fit(tmp_path / "few.toml", to=path, free={key: ("50 um", "200 um")}, out=tmp_path / "out")
+    low, high = found["values"][key]["interval"]
+    assert low < 100e-6 < high
+    note = next(one for one in found["notes"] if "the error of the modes left out" in one)
+    share = float(note.rsplit(f"{key} by ", 1)[1].removesuffix(" %")) / 100
+    value = found["values"][key]["value"]
+    assert not low + share * value * 1.01 < 100e-6 < high - share * value * 1.01
+    assert key in note and not any("modes left out" in one for one in pf.fit(
+        tmp_path / "whole.toml", to=path, free={key: ("50 um", "200 um")}, out=tmp_path / "all")["notes"])
+
+
+def test_a_fit_says_what_a_decay_is_compared_with(tmp_path):
+    """With the share of the amplitude that a cycle takes, and a command that shows both curves, which was tried; a
+    curve by balance is compared with its own kind."""
+    path = written(tmp_path / "decay.csv", HEAVY, amplitudes=np.geomspace(1e-5, 2e-5, 3))
+    ask = {"free": {"friction.static": (0.01, 0.04)}}
+    found = pf.fit(HEAVY, to=path, out=tmp_path / "out", **ask)
+    amplitude, damping = np.loadtxt(path, delimiter=",", skiprows=1)[:, [0, 3]].T
+    k = damping.argmax()
+    lost = 100 * (1 - np.exp(-2 * np.pi * damping[k]))
+    share = f"at {amplitude[k] * 1e6:.3g} um one cycle reduces the amplitude by {lost:.2g} %"
+    assert "curve by balance" in found["notes"][0] and share in found["notes"][0], found["notes"]
+    both = pf.backbone(tmp_path / "out/scene.fitted.toml", amplitudes=amplitude)
+    assert {"balance_damping", "decay_damping"} <= set(both)
+    lines = path.read_text().replace("decay_", "").splitlines()
+    path.write_text("\n".join([f"method,{lines[0]}", *(f"balance,{line}" for line in lines[1:])]) + "\n")
+    assert pf.fit(HEAVY, to=path, out=tmp_path / "out", **ask)["notes"] == []
