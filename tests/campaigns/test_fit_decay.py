@@ -69,7 +69,7 @@ def test_a_row_that_the_balance_lacks_is_corrected_as_its_neighbour(tmp_path, mo
     monkeypatch.setattr(fit_decay, "_curve", lacking)
     found = pf.fit(HEAVY, to=path, free={"friction.static": (0.005, 0.1)}, out=tmp_path / "out", starts=1)
     assert found["values"]["friction.static"]["value"] == pytest.approx(0.02, rel=0.02)
-    assert "balance found no oscillation at 12.6 um" in found["warnings"][0]
+    assert "balance found no oscillation at the amplitudes 12.6 um" in found["warnings"][0]
 
 
 @pytest.mark.slow

@@ -97,22 +97,26 @@ def released(k, limit, damping: float, start: float) -> tuple:
 
 
 def made(seed: int, place: Path) -> Made:
-    """Write the decay of a seed to `place`."""
+    """Write the decay of a seed to `place`; one that dies within three half cycles is drawn again."""
     rng = np.random.default_rng(seed)
 
     def even(low, high) -> float:
         return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
-    law = ("iwan", "elastic-plastic")[seed % 2]
-    damping, stiffness, force = even(1e-3, 3e-3), even(0.1, 2) * MASS * OWN**2, even(10, 80)
-    chi = float(rng.uniform(-0.8, -0.1))
-    start = even(2, 10) * force / stiffness
-    time, x = released(*sliders(law, stiffness, force, chi), damping, start)
-    x = x + even(2e-4, 2e-3) * start * rng.standard_normal(x.size)
-    record = place.with_name("record.csv")
-    record.write_text("time [s],displacement [m]\n" + "".join(f"{t!r},{y!r}\n" for t, y in zip(time.tolist(),
-                                                                                             x.tolist())))
-    imported.imported(record, place, (), False, imported.Estimate(decay=True))
+    law, record = ("iwan", "elastic-plastic")[seed % 2], place.with_name("record.csv")
+    while True:
+        damping, stiffness, force = even(1e-3, 3e-3), even(0.1, 2) * MASS * OWN**2, even(10, 80)
+        chi = float(rng.uniform(-0.8, -0.1))
+        start = even(2, 10) * force / stiffness
+        time, x = released(*sliders(law, stiffness, force, chi), damping, start)
+        x = x + even(2e-4, 2e-3) * start * rng.standard_normal(x.size)
+        record.write_text("time [s],displacement [m]\n" + "".join(f"{t!r},{y!r}\n" for t, y in zip(time.tolist(),
+                                                                                                 x.tolist())))
+        try:
+            imported.imported(record, place, (), False, imported.Estimate(decay=True))
+            break
+        except PatchfemError:
+            continue
     static = force / LOAD
     truth = {"friction.static": static, "friction.stiffness": stiffness, "friction.chi": chi} if law == "iwan" else \
         {"friction.static": static, "friction.bond_length": force / stiffness}
