@@ -9,6 +9,7 @@ out, and those of the R turning points, most of them zero too. An element that n
 its own memory, an offset that no cycle changes (multiplier 1), is left out as well. Bonds remember one number per row.
 
 Cells of constant coefficients, each by its matrix exponential: order 2 in the width of the cells for corners in time.
+Neighbours with the same coefficients, as elements that stick or slip have for most of a cycle, are one wide cell.
 """
 
 from dataclasses import dataclass
@@ -47,7 +48,12 @@ def monodromy(modes: ModalBasis, rows, omega: float, slope, by_rate, marks=(), f
     rows (i, n); slope, by_rate (i, N): means per cell of the local stiffness [N/m] and damping [N s/m] of every row;
     by_bend (i, N): of the mass that rises with it [kg], None of none.
     """
-    n, cells = modes.omega.size, slope.shape[1]
+    n, count = modes.omega.size, slope.shape[1]
+    remembered = [np.broadcast_to(part, count) for one in fading for part in (one.gain, one.loss, one.limit)]
+    first = _runs([slope, by_rate, *([] if by_bend is None else [by_bend]), *(mark.hold for mark in marks),
+                   *remembered], marks)
+    width, cells = np.diff(first, append=count) * (2 * np.pi / count), first.size
+    slope, by_rate = slope[:, first], by_rate[:, first]
     size = 2 * n + len(marks) + len(fading)
     a = np.zeros((cells, size, size))
     grip = rows.T / (modes.mass * omega**2)
@@ -55,20 +61,31 @@ def monodromy(modes: ModalBasis, rows, omega: float, slope, by_rate, marks=(), f
     a[:, n:2 * n, :n] = -np.diag(modes.omega**2) / omega**2 - np.einsum("ai,in,ib->nab", grip, slope, rows)
     a[:, n:2 * n, n:2 * n] = -modes.dampers / omega - omega * np.einsum("ai,in,ib->nab", grip, by_rate, rows)
     for k, mark in enumerate(marks):
-        a[:, n:2 * n, 2 * n + k] = -mark.hold[:, None] * grip[:, mark.row]
+        a[:, n:2 * n, 2 * n + k] = -mark.hold[first][:, None] * grip[:, mark.row]
     for k, one in enumerate(fading, 2 * n + len(marks)):
-        a[:, n:2 * n, k] = -np.multiply.outer(np.broadcast_to(one.limit, cells), grip[:, one.row])
-        a[:, k, n:2 * n] = one.gain[:, None] * rows[one.row]
-        a[:, k, k] = -one.loss
+        a[:, n:2 * n, k] = -np.multiply.outer(np.broadcast_to(one.limit, count)[first], grip[:, one.row])
+        a[:, k, n:2 * n] = one.gain[first][:, None] * rows[one.row]
+        a[:, k, k] = -one.loss[first]
     if by_bend is not None:
-        risen = np.eye(n) + np.einsum("ia,in,ib->nab", rows, by_bend, rows) / modes.mass
+        risen = np.eye(n) + np.einsum("ia,in,ib->nab", rows, by_bend[:, first], rows) / modes.mass
         a[:, n:2 * n] = np.linalg.solve(risen, a[:, n:2 * n])
-    steps = exponentials(a * (2 * np.pi / cells))
+    steps = exponentials(a * width[:, None, None])
     for k, mark in enumerate(marks, 2 * n):
         across = np.zeros(size)
         across[:n] = rows[mark.row]
-        steps[mark.cell, k] = (1 - mark.share) * across + mark.share * (across @ steps[mark.cell])
+        cell = np.searchsorted(first, mark.cell)
+        steps[cell, k] = (1 - mark.share) * across + mark.share * (across @ steps[cell])
     return product(steps)
+
+
+def _runs(coefficients: list, marks) -> np.ndarray:
+    """First cells (r,) of the runs of neighbours whose coefficients, (..., N) each, are the same; a cell with a turning
+    point is one of its own."""
+    table = np.concatenate([one.reshape(-1, one.shape[-1]) for one in coefficients])
+    new = np.append(True, (table[:, 1:] != table[:, :-1]).any(axis=0))
+    for mark in marks:
+        new[mark.cell:mark.cell + 2] = True
+    return np.flatnonzero(new)
 
 
 def product(steps) -> np.ndarray:

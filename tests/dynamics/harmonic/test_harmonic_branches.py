@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from harmonic_cases import bonds, five, many, march, of_speed, plain_jenkins, sdof
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 from scipy.optimize import brentq
 from scipy.special import ellipk
 
@@ -12,7 +13,7 @@ from patchfem.dynamics.harmonic.backbone import FreeBalance, trace
 from patchfem.dynamics.harmonic.balance import periodic_response
 from patchfem.dynamics.harmonic.branch import backbone, branches, levels, response
 from patchfem.dynamics.harmonic.continuation import follow
-from patchfem.dynamics.harmonic.floquet import product
+from patchfem.dynamics.harmonic.floquet import Fading, TurningPoint, monodromy, product
 from patchfem.dynamics.harmonic.forces import Group
 from patchfem.dynamics.harmonic.harmonic import Balance
 from patchfem.dynamics.harmonic.laws import Jenkins, OfSpeed, Spring, synthesis
@@ -391,3 +392,30 @@ def test_refuses_amplitudes_that_fall():
     with pytest.raises(PatchfemError, match="mode 3"):
         backbone(RIG, Spring(1.0), np.array([2.0]), mode=3)
     assert synthesis(np.array([1.0, 1.0 + 0j]), 4) == pytest.approx([2, 1, 0, 1])
+
+
+def test_exact_neighbours_of_the_same_coefficients_are_one_cell():
+    """Against the product of SciPy's exponential of every cell: of modes, two rows, a turning point that holds and
+    bonds that fade, in cells that are the same for most of a cycle."""
+    rng, n, count = np.random.default_rng(5), 3, 64
+    omega, rows = np.array([0.9, 3.1, 12.0]) * 600, rng.normal(size=(2, n))
+    modes = ModalBasis(("a", "b", "c"), omega, np.full(n, 0.01), np.ones(n), np.ones(n), np.ones(n), MASS)
+    slope = np.repeat(rng.uniform(0, 1e5, (2, 4)), 16, axis=1)
+    hold = np.where((np.arange(count) > 20) & (np.arange(count) < 40), -2e4, 0.0)
+    mark = TurningPoint(1, 20, 0.3, hold)
+    one = Fading(0, np.repeat([0.0, 40.0], 32), np.repeat([0.1, 0.0], 32), 3.0)
+    found = monodromy(modes, rows, 600.0, slope, 0 * slope, [mark], [one])
+    size, grip, true = 2 * n + 2, rows.T / (MASS * 600.0**2), np.eye(2 * n + 2)
+    for k in range(count):
+        a = np.zeros((size, size))
+        a[:n, n:2 * n] = np.eye(n)
+        a[n:2 * n, :n] = -np.diag(omega / 600)**2 - grip @ np.diag(slope[:, k]) @ rows
+        a[n:2 * n, n:2 * n] = -np.diag(0.02 * omega / 600)
+        a[n:2 * n, 2 * n], a[n:2 * n, 2 * n + 1] = -hold[k] * grip[:, 1], -3.0 * grip[:, 0]
+        a[2 * n + 1, n:2 * n], a[2 * n + 1, 2 * n + 1] = one.gain[k] * rows[0], -one.loss[k]
+        step = expm(a * 2 * np.pi / count)
+        if k == 20:
+            across = np.append(rows[1], np.zeros(size - n))
+            step[2 * n] = 0.7 * across + 0.3 * across @ step
+        true = step @ true
+    np.testing.assert_allclose(found, true, atol=1e-10 * np.abs(true).max())
