@@ -24,8 +24,10 @@ TIMINGS = 3  # of a run, the shortest of which counts: other work only adds to i
 LONG = 10.0  # CPU seconds of a run that is timed once
 APART = 1.5  # ratio of the seconds by the clock to those of the processor from which both are told
 NOISE = 1.1  # ratio of seconds up to which two runs cost the same
+JITTER = 2e-3  # CPU seconds by which timings of one short run differ
 STUCK = 0.9  # ratio of the least error over the largest from which a knob does not help
 UNTURNED = 1e-11  # relative change of a measure that a knob leaves as it is
+ROUND = 1e-6  # of the floor of a measure, below which its change is one of round-off
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -171,9 +173,11 @@ def _tried(setting: Setting, label: str, say, coarse: bool = True) -> dict | Non
 
 
 def turned_by(runs: list) -> list:
-    """Names of the measures that the knob changes at all, beyond 1e-11 of their value, in the order of the runs."""
-    return [name for name, value in runs[0].values.items()
-            if any(one.distances.get(name, 0.0) > UNTURNED * abs(one.values[name]) for one in runs)]
+    """Names of the measures that the knob changes at all, beyond 1e-11 of their value and the round-off of their floor,
+    in the order of the runs."""
+    return [name for name in runs[0].values
+            if any(one.distances.get(name, 0.0) > max(UNTURNED * abs(one.values[name]), ROUND * one.floors[name])
+                   for one in runs if name in one.values)]
 
 
 def cheapest(runs: list, tolerance: float) -> dict:
@@ -202,12 +206,12 @@ def _confirmed(runs: list, good) -> list:
 
 
 def quickest(runs: list, tolerance: float) -> Cost | None:
-    """The run with least CPU seconds that has all measures within a tolerance, of those that cost the same the finest;
-    None where no run has."""
+    """The run with least CPU seconds that has all measures within a tolerance, of those that cost the same the one
+    with the smallest setting; None where no run has."""
     names = _stated(runs)
     good = _confirmed(runs, lambda one: all(one.within(name, tolerance) for name in names if name in one.values))
     least = min((one.seconds for one in good), default=inf)
-    return next((one for one in reversed(runs) if one in good and one.seconds <= NOISE * least), None)
+    return next((one for one in runs if one in good and one.seconds <= NOISE * least + JITTER), None)
 
 
 def sentence(runs: list, tolerance: float) -> str:
@@ -216,8 +220,8 @@ def sentence(runs: list, tolerance: float) -> str:
     names, percent = _stated(runs), f"{100 * tolerance:g} %"
     if one := quickest(runs, tolerance):
         return f"{one.words}: {_seconds(one)} per run, with an error of at most {percent} in every measure" \
-               + _by_floor(one, names, tolerance)
-
+               + _by_floor(one, names, tolerance) \
+               + _effect(runs, tolerance)
     known = [one for one in runs if one.errors or one.distances]
     share, name, least = min(((*_worst(one, names, tolerance), one) for one in known), key=lambda found: found[0])
     if share >= STUCK * max(_worst(one, [name], tolerance)[0] for one in known if name in one.values):
@@ -225,6 +229,16 @@ def sentence(runs: list, tolerance: float) -> str:
                 f"{100 * share:.2g} %")
     return (f"no run has an error of at most {percent} in every measure: the best run, with {least.words}, has an "
             f"error of {100 * share:.2g} % in {name} and takes {_seconds(least)}")
+
+
+def _effect(runs: list, tolerance: float) -> str:
+    """That a setting changes nothing, or nothing that counts, as words behind the sentence on its errors; "" where it
+    does."""
+    turned = turned_by(runs)
+    if len(runs) < 2 or any(one.distances.get(name, 0.0) > allowed(tolerance, abs(one.values[name]), one.floors[name])
+                            for one in runs for name in turned if name in one.values):
+        return ""
+    return "; the other settings change no result" + (" by more than the tolerance" if turned else " of this scene")
 
 
 def _by_floor(one: Cost, names: list, tolerance: float) -> str:

@@ -31,7 +31,7 @@ class Over:
                 "or :9lin fixes the spacing); may be repeated", "--over") = ()
     cases: Annotated[Path | None, Parameter(name="--cases", help="file of cases, such as cases.csv: one column "
                                                                  "`table.key [unit]` for each key, one row for each "
-                                                                 "case")] = None
+                                                                 "case; or the sweep.csv of another sweep")] = None
     random: Annotated[int, Parameter(name="--random", show_default=False, help=
                                      "number of random cases, such as 200, drawn from the ranges in --over, such as 1 "
                                      "mm..9 mm")] = 0

@@ -16,9 +16,9 @@ TOUCHING = 0.14  # share of the width within which two labels would touch
 
 def shown(runs: list, tolerance: float) -> list:
     """Names of the measures that a picture and the table of a knob show: those of MAIN that it turns, and each that is
-    farthest from the tolerance in a run, by which the sentence judges."""
+    farthest from the tolerance in a run, by which the sentence judges; where these are none, all that it turns."""
     turned, worst = turned_by(runs), worst_of(runs, tolerance)
-    return [name for name in (*MAIN, *sorted(worst.difference(MAIN))) if name in turned]
+    return [name for name in (*MAIN, *sorted(worst.difference(MAIN))) if name in turned] or turned
 
 
 def write(folder: Path, curves: dict) -> Path:

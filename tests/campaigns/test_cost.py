@@ -96,6 +96,19 @@ def test_exact_the_sentence_names_the_cheapest_run_or_the_worst_measure():
     assert sentence(bold, 1e-2) == "a knob at 4: 2 CPU s per run, with an error of at most 1 % in every measure"
 
 
+def test_exact_of_settings_that_cost_the_same_the_smallest_is_named_and_one_without_effect_is_told():
+    """1600 steps per cycle at 0.042 CPU s were named where 100 at 0.040 s met the tolerance, with the same results."""
+    seconds = {"100": 0.0402, "200": 0.0401, "400": 0.0404, "800": 0.0415, "1600": 0.0423}
+    still = [made(label, each, 1e-3, 0.0) for label, each in seconds.items()]
+    assert quickest(still, 1e-2).label == "100" and sentence(still, 1e-2) == (
+        "a knob at 100: 0.04 CPU s per run, with an error of at most 1 % in every measure; the other settings change "
+        "no result of this scene")
+    slow = [made("2", 1.0, 8e-3, 6e-3), made("4", 0.96, 2e-3, 1e-3), made("8", 1.2, 1e-3)]
+    assert quickest(slow, 1e-2).label == "2" and quickest(slow, 5e-3).label == "4"
+    assert sentence(slow, 1e-2).endswith("; the other settings change no result by more than the tolerance")
+    assert sentence(slow, 5e-3).endswith("at most 0.5 % in every measure")
+
+
 def test_exact_the_table_has_the_measure_that_the_sentence_judges_by():
     """Stored energy decided on the cheapest run and stood in no column."""
     share = {"pressure_peak": 1 / 9, "energy_stored": 1.0, "moment": 1 / 3}

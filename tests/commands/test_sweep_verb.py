@@ -1,9 +1,11 @@
 """patchfem sweep, as a person calls it."""
 
 import csv
+import html
 import json
 import os
 import re
+import shlex
 import shutil
 from time import sleep
 
@@ -19,6 +21,7 @@ from patchfem.campaigns.sweeps import sweep
 from patchfem.commands.sweep import Progress
 from patchfem.export.summary import summary_of
 from patchfem.export.sweeps.folder import TABLES, Folder
+from patchfem.export.sweeps.page import read_table
 from patchfem.runs.many import many
 
 RIG = POINT + COULOMB + SHORT
@@ -453,6 +456,26 @@ amplitude = "1 mm"
 frequency = "10 Hz"
 cycles = 2
 """
+
+
+@pytest.mark.parametrize("words", [("--random", "5", "--seed", "3"), ("--sobol", "8")])
+def test_exact_the_printed_command_of_drawn_cases_draws_them_again(tmp_path, monkeypatch, words):
+    scene, (first, again, listed) = tmp_path / "bench.toml", (tmp_path / name for name in ("first", "again", "listed"))
+    scene.write_text(BENCH, encoding="utf-8")
+    cli("sweep", scene, "--over", "friction.static=0.3 +- 20 %", *words, "--set", "normal.load=90 N", "-o", first)
+    monkeypatch.chdir(tmp_path)
+
+    def printed(folder):
+        return shlex.split(html.unescape(re.search("its scene:</p><pre>(.*?)</pre>",
+                                                   (folder / "report.html").read_text("utf-8"))[1]))
+
+    command = printed(first)
+    assert command[:2] == ["patchfem", "sweep"] and cli(*command[1:], "-o", again).code == 0
+    assert read_table(first)["command"] == shlex.join(command)  # what `patchfem report` prints
+    assert cli("sweep", scene, "--set", "normal.load=90 N", "--cases", first / "sweep.csv", "-o", listed).code == 0
+    assert cli(*printed(listed)[1:], "-o", tmp_path / "third").code == 0
+    for other in (again, listed, tmp_path / "third"):
+        assert (other / "sweep.csv").read_bytes() == (first / "sweep.csv").read_bytes()
 
 
 def test_exact_the_answer_begins_with_the_measure_that_is_asked_for(tmp_path):

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from math import prod
 from pathlib import Path
@@ -92,8 +93,19 @@ def cases_of(asked: Asked, request: Request) -> Cases:
     elif axes:
         parts.append(Cases(tuple(axes)))
     cases = product(parts)
+    if cases.rows:
+        cases = replace(cases, words=_words(request, asked.path.parent))
     _refuse_all(asked, cases)
     return cases
+
+
+def _words(request: Request, folder: Path) -> tuple[str, ...]:
+    """What asks for the same cases again in a folder, as words of a command; () where their file is a pipe."""
+    if request.file is not None and not request.file.is_file():
+        return ()
+    file = () if request.file is None else ("--cases", os.path.relpath(request.file, folder))
+    drawn = ("--sobol" if request.sobol else "--random", str(request.count), "--seed", str(request.seed))
+    return (*file, *(word for one in request.over for word in ("--over", one)), *(drawn if request.count else ()))
 
 
 def _unknown(measure: str) -> list[str]:

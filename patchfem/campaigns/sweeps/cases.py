@@ -23,12 +23,14 @@ class Cases:
     """Cases numbered from 0.
 
     axes: the keys with their values. rows: case k has the k-th value of every axis; otherwise the cases are all
-    combinations, the last axis fastest. drawn: the rows are drawn at chance.
+    combinations, the last axis fastest. drawn: the rows are drawn at chance. words: of the command that asks for the
+    same rows, () where these are not known.
     """
 
     axes: tuple[Axis, ...]
     rows: bool = False
     drawn: bool = False
+    words: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.axes[0].texts) if self.rows else prod(self.shape)

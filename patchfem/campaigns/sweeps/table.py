@@ -1,4 +1,7 @@
-"""Cases from a comma-separated file: a column per key, with its unit in the header or in the cells, a case per row."""
+"""Cases from a comma-separated file: a column per key, with its unit in the header or in the cells, a case per row.
+
+The tables that a sweep writes can be read, too.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +16,7 @@ from ...scene.axes import Axis, values_of
 from .cases import Cases
 
 _HEAD = re.compile(r"\s*((?:[^\[\]]|\[[1-9][0-9]*\](?=\.))+?)\s*(?:\[\s*([^\[\]]*?)\s*\])?\s*")
+OUTCOME = "outcome"  # of a sweep.csv: this column and those behind it are answers
 HEADER = "contact.load [lbf],contact.tilt.angle [mrad]"
 
 
@@ -27,13 +31,14 @@ def read(path: Path) -> tuple[Cases | None, list[str]]:
     if len(lines) < 2:
         return None, [f"{path}: the first line must be a header such as `{HEADER}`, and each line after it must give "
                       "one case"]
-    heads = [_HEAD.fullmatch(cell) for cell in lines[0][1]]
-    if not all(heads):
+    first = lines[0][1]
+    heads = [_HEAD.fullmatch(cell) for cell in first[:first.index(OUTCOME) if OUTCOME in first else None]]
+    if not heads or not all(heads):
         return None, [f"{path}:{lines[0][0]}: the first line must be a header such as `{HEADER}`, not "
-                      f"'{','.join(lines[0][1])[:80]}'"]
-    wrong = [f"{path}:{number}: the line must have {len(heads)} cells, as the header has, not "
+                      f"'{','.join(first)[:80]}'"]
+    wrong = [f"{path}:{number}: the line must have {len(first)} cells, as the header has, not "
              f"{len(row)}" for number, row in lines[1:]
-             if len(row) != len(heads)]
+             if len(row) != len(first)]
     keys = [head[1] for head in heads]
     wrong += [f"{path}:{lines[0][0]}: {key}: two columns have this key; remove one of "
               "them" for key in dict.fromkeys(keys) if keys.count(key) > 1]

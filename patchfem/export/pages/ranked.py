@@ -33,7 +33,7 @@ def told(table: dict, trusted: dict, settled: np.ndarray) -> tuple:
     left = of - int(np.sum(trusted[next(iter(ranks))])) if ranks else 0
     moves = not settled.any() or Outcome.TRANSIENT.value in list(table["outcome"])
     names, first = asked_first(SPREAD, table), table.get("first", "")
-    rank = sentence(ranks, left, moves) if not first or first in ranks or first not in table["measures"] else \
+    rank = sentence(ranks, left, moves, of) if not first or first in ranks or first not in table["measures"] else \
         (f"These {of} cases do not show on which key the {label(first)} depends most; more cases may show this."
          if ranks else "")
     rank = joined([one for one in (rank, trend(table, ranks, settled)) if one])
@@ -127,35 +127,96 @@ def ranks_of(table: dict) -> dict:
     return table["ranks"]
 
 
-def sentence(ranks: dict, left: int = 0, moves: bool = True) -> str:
-    """Which keys matter how much for the first measure that is ranked, "" where none is; left: cases that miss the
-    tolerance, or whose motion has not settled, where any `moves` on: they count as they ended."""
+def sentence(ranks: dict, left: int = 0, moves: bool = True, of: int = 0) -> str:
+    """Which keys matter how much for the first measure that is ranked, "" where none is; left: of `of` cases those that
+    miss the tolerance, or whose motion has not settled, where any `moves` on: they count as they ended. Keys whose
+    intervals overlap stand in no order."""
     name = next(iter(ranks), None)
     if name is None:
         return ""
-    first, *others = ranks[name]
-    said = [f"depends most on {first.key}, which contributes to {percent(first)} of the variance{_between(first)}"]
-    said += [f"then on {one.key} ({percent(one)})" for one in others[:NAMED - 1]]
+    first, *others = _alike(ranks[name])
+    said = [f"depends most on {_listed(first)}" if others or len(first) == 1 else f"depends on {_listed(first)}"]
+    if len(first) == 1:
+        said[0] += f", which contributes to {percent(first[0])} of the variance{_between(first[0])}"
+    else:
+        said[0] += f"{' about equally' * _equal(first)} ({_shares(first)} of the variance; their intervals overlap)"
+    said += [f"then on {_listed(one)} ({_shares(one)})" for one in others[:NAMED - 1]]
     if len(others) >= NAMED:
-        said.append(f"least on {others[-1].key} ({percent(others[-1])})")
+        said.append(f"least on {_listed(others[-1])} ({_shares(others[-1])})")
     if sum(round(100 * each.total) for each in ranks[name]) > 100:
         said.append("where each share includes interactions between keys, so that the shares can sum to more than "
                     "100 %")
-    one = left == 1
-    why = f"ha{'s' if one else 've'} not settled {'is' if one else 'are'} included with {'its' if one else 'their'} " \
-        f"last value{'s' * (not one)}" if moves else f"miss{'es' * one} the tolerance {'is' if one else 'are'} included"
-    ended = f"; {left} case{'s' * (not one)} that {why}" if left else ""
-    return f"{called(name).capitalize()} {', '.join(said)}{ended}."
+    what, said = called(name), ", ".join(said)
+    has, is_, its = ("has", "is", "its") if left == 1 else ("have", "are", "their")
+    last = f"last value{'s' * (left != 1)}"
+    ended = f"{has} not settled" if moves else f"miss{'es' * (left == 1)} the tolerance"
+    if 2 * left > of > 0:
+        return f"{left} of {of} cases {ended}; with {its} {last if moves else 'values'} included, {what} {said}."
+    counted = f"; {left} case{'s' * (left != 1)} that {ended} {is_} included" if left else ""
+    return f"{what.capitalize()} {said}{counted}{f' with {its} {last}' if left and moves else ''}."
+
+
+def _alike(shares: list) -> list:
+    """The shares in groups, the largest first: of the keys of one the intervals overlap that of its first."""
+    out = []
+    for one in shares:
+        if out and one.high > out[-1][0].low and one.low != one.high:
+            out[-1].append(one)
+        else:
+            out.append([one])
+    return out
+
+
+def _equal(group: list) -> bool:
+    """Whether no share of a group lies outside the interval of another."""
+    return all(one.low <= other.total <= one.high for one in group for other in group)
+
+
+def _listed(group: list) -> str:
+    """The keys of a group, of many the first."""
+    names = [one.key for one in group]
+    if len(names) > NAMED + 1:
+        names[NAMED:] = [f"{len(names) - NAMED} other keys"]
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _shares(group: list) -> str:
+    """The shares of a group as people read them."""
+    if len(group) == 1:
+        return percent(group[0])
+    if all(map(_small, group)):
+        most = max(map(_most, group))
+        return f"at most {most} % each" if most else "below 1 % each"
+    if len(group) > NAMED + 1:
+        ends = dict.fromkeys(f"{100 * one.total:.0f}" for one in (group[-1], group[0]))
+        return f"{' to '.join(ends)} % each"
+    *before, end = (percent(one) for one in group)
+    if not any(map(_small, group)):
+        before = [one.removesuffix(" %") for one in before]
+    return f"{', '.join(before)} and {end}"
 
 
 def percent(one) -> str:
-    """The total share of a key as people read it."""
-    return "below 1 %" if one.total < 0.01 else f"{100 * one.total:.0f} %"
+    """The total share of a key as people read it, the end of its interval where this begins at 0."""
+    if not _small(one):
+        return f"{100 * one.total:.0f} %"
+    return f"at most {_most(one)} %" if _most(one) else "below 1 %"
+
+
+def _small(one) -> bool:
+    """Whether a share may be nothing."""
+    return one.total < 0.01 or (one.low < 0.005 and one.total < 0.1)
+
+
+def _most(one) -> int:
+    """The upper end [%] of the interval of a share, rounded upwards; 0 up to 1 %."""
+    most = int(np.ceil(100 * one.high - 1e-9))
+    return most if most > 1 else 0
 
 
 def _between(one) -> str:
     low, high = round(100 * one.low), round(100 * one.high)
-    return f" ({low} to {high} %)" if low != high else ""
+    return f" ({low} to {high} %)" if low != high and not _small(one) else ""
 
 
 def quantiles(table: dict, trusted: dict) -> dict:

@@ -195,5 +195,5 @@ def _meanings(table: dict) -> str:
 
 
 def _again(table: dict) -> str:
-    return (f"<p>The sweep was run with this command:</p><pre>{escape(table['command'])}</pre>"
-            f"<details><summary>Scene</summary><pre>{escape(table['scene'])}</pre></details>")
+    return ("<p>The sweep was run with this command in the folder of its scene:</p>"
+            f"<pre>{escape(table['command'])}</pre><details><summary>Scene</summary><pre>{escape(table['scene'])}</pre></details>")

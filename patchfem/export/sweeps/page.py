@@ -26,6 +26,7 @@ from ..readback import HUGE, wanted
 from ..written import NUMBER
 from .tables import FACTS, facts, names_of
 
+AGAIN = "--cases", "sweep.csv"  # rows whose command is not known
 WHOLE, SHORT = "report.html", "summary.json"  # what a click on a case opens: its page where it has one
 
 
@@ -106,7 +107,7 @@ def command(asked: Asked, cases: Cases) -> str:
     words = ["patchfem", "sweep", asked.path.name, *(word for one in asked.sets for word in ("--set", one)),
              *(("--of", asked.of) if asked.of else ())]
     if cases.rows:
-        return shlex.join(words) + "  # with the cases of sweep.csv"
+        return shlex.join([*words, *(cases.words or AGAIN)])
     return shlex.join([*words, *(word for axis in cases.axes for word in
                                  ("--over", f"{axis.key}={','.join(axis.texts)}"))])
 
@@ -165,12 +166,13 @@ def _table(folder: Path, rows: list, keys: list, file) -> dict:
                        if f"{name}_floor" in file.variables else np.zeros(len(rows))}
                 for name in file.variables if f"{name}_error" in file.variables}
     text, sets = str(file.attrs["scene"]), json.loads(str(file.attrs["sets"]))
-    overs = [] if "case" in file.dimensions else [word for one in columns for word in
-                                                  ("--over", f"{one['name']}={','.join(dict.fromkeys(one['texts']))}")]
+    words = json.loads(str(file.attrs.get("words", "[]"))) or AGAIN
+    overs = words if "case" in file.dimensions else [
+        word for one in columns for word in ("--over", f"{one['name']}={','.join(dict.fromkeys(one['texts']))}")]
     held = {name: float(file.attrs[name]) for name in (*FACTS, "knee") if name in file.attrs}
     title = tomllib.loads(text).get("title") or folder.resolve().name
-    wanted(isinstance(title, str) and isinstance(sets, list), "sweep.nc: the scene or the --set stored in this file "
-                                                              "cannot be read")
+    wanted(isinstance(title, str) and all(isinstance(one, list | tuple) for one in (sets, words)),
+           "sweep.nc: the scene, the --set or the cases stored in this file cannot be read")
     return {**titles(columns, title), **_shared(held, columns),
             "version": str(file.attrs["source"]).removeprefix("patchfem "), "scene": text,
             "command": shlex.join(["patchfem", "sweep", str(file.attrs["scene_file"]),

@@ -96,7 +96,8 @@ def contents(asked: Asked, cases: Cases, found: Answers, keys: Sequence[str] = (
     return netcdf.Contents(data, coordinates, {
         "Conventions": "CF-1.11", "title": f"sweep over {', '.join(axis.key for axis in cases.axes)}",
         "source": f"patchfem {__version__}", "scene": asked.text, "scene_file": asked.path.name,
-        "sets": json.dumps(list(asked.sets)), "answer": answer, "drawn": int(cases.drawn), **facts(asked, cases),
+        "sets": json.dumps(list(asked.sets)), "answer": answer, "drawn": int(cases.drawn),
+        "words": json.dumps(list(cases.words)), **facts(asked, cases),
         "scene_sha256": hashlib.sha256(asked.text.encode()).hexdigest(), "versions": json.dumps(versions())})
 
 

@@ -28,7 +28,16 @@ def test_exact_items_stand_in_the_header_as_they_are_printed(tmp_path):
         assert cases.axes[0].values == (2.0, 5.0) and cases.axes[1].unit == "m"
 
 
+def test_exact_the_answers_of_another_sweep_are_left_out(tmp_path):
+    cases, wrong = read(written(tmp_path, "contact.load,friction.law,outcome,loop_area,message,case\n"
+                                          "26 lbf,tanh,failed,,\"a, b\",1f\n10 lbf,coulomb,steady,0.1,,2f\n"))
+    assert wrong == [] and [axis.key for axis in cases.axes] == ["contact.load", "friction.law"]
+    assert cases.texts(1) == ("10 lbf", "coulomb")
+
+
 @pytest.mark.parametrize("text, says", [
+    ("outcome,loop_area\nsteady,1\n", ["the first line must be a header such as"]),
+    ("contact.load,outcome,loop_area\n1 N,steady\n", ["cases.csv:2: the line must have 3 cells"]),
     ("contact.load [lb]\n1\n2\n", ["cases.csv:2: contact.load: 'lb' is ambiguous", "cases.csv:3: contact.load"]),
     ("contact.load [N],friction.static\n1 N,0.3\n2,a\n", ["cases.csv:2: contact.load: '1 N' must be a number",
                                                         "cases.csv:3: friction.static: a plain number"]),

@@ -393,3 +393,22 @@ def test_exact_a_case_is_named_with_the_digits_of_the_table():
              "measures": {name: {"unit": "m", "means": "", "values": values, "errors": 0 * values}}}
     assert lead_of(table).least.endswith("is least at normal.load 11.8383 N: 1 um (neighbouring cases: 1.0 N and "
                                          "140.145 N).")
+
+
+def test_exact_keys_whose_intervals_overlap_stand_in_no_order():
+    name, load = "loop_area", Share("contact.load", 0.5, 0.58, 0.46, 0.66)
+    friction, damping, tilt = (Share("friction.static", 0.5, 0.56, 0.44, 0.6), Share("damping", 0.01, 0.02, 0.0, 0.06),
+                               Share("tilt", 0.0, 0.001, 0.0, 0.04))
+    said = ranked.sentence({name: [load, friction, damping, tilt]}, 56, True, 64)
+    assert said.startswith("56 of 64 cases have not settled; with their last values included, loop area depends most "
+                           "on contact.load and friction.static about equally (58 and 56 % of the variance; their "
+                           "intervals overlap), then on damping and tilt (at most 6 % each), where each share")
+    apart = ranked.sentence({name: [load, damping]}, 3, True, 64)
+    assert apart == ("Loop area depends most on contact.load, which contributes to 58 % of the variance (46 to 66 %), "
+                     "then on damping (at most 6 %); 3 cases that have not settled are included with their last "
+                     "values.")
+    far = Share("far", 0.3, 0.3, 0.25, 0.47)
+    assert "depends on contact.load and far (58 and 30 % of the variance; their" in ranked.sentence({name: [load, far]})
+    grid = [Share("a", 0.6, 0.6, 0.6, 0.6), Share("b", 0.4, 0.4, 0.4, 0.4), Share("c", 0.005, 0.005, 0.005, 0.005)]
+    assert ranked.sentence({name: grid}) == ("Loop area depends most on a, which contributes to 60 % of the variance, "
+                                             "then on b (40 %), then on c (below 1 %).")
