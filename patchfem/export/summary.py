@@ -16,6 +16,7 @@ from ..runs.patch import values
 from ..runs.results.result import Result, choices
 from ..runs.rig.plan import run_away
 
+KNOWN = 10.0  # errors of a stiffness, up to which nothing is divided by it
 PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
 
 
@@ -103,7 +104,7 @@ def summary_of(result: Result) -> dict:
     answer = summary(__version__, what.model.source.title, what.kind, str(result.outcome), result.measures,
                      effects_of(result), list(what.not_in_scene), (result.warnings, result.extra.get("notes", [])),
                      result.seconds)
-    return answer | {"numerics": choices(result)} | contact_of(result) | run_away_of(result)
+    return answer | {"numerics": choices(result)} | contact_of(result) | run_away_of(result) | loop_of(result)
 
 
 def run_away_of(result: Result) -> dict:
@@ -111,6 +112,22 @@ def run_away_of(result: Result) -> dict:
     amplitude at resonance}} [m s-2] of a motion that did not settle above it; {} of any other."""
     found = run_away(result.plan.model) if result.outcome in (Outcome.TRANSIENT, Outcome.GROWS) else {}
     return {"run_away": found} if found and found["drive"] > found["knee"] else {}
+
+
+def loop_of(result: Result) -> dict:
+    """{"loop": {"slide_amplitude" [m], "loss_factor", "error"}} of a bench whose slide repeats: the work of a cycle
+    over 2 pi times the largest elastic energy, W/(pi k A^2), k the equivalent stiffness; {} where this is not positive
+    beyond its error, and of any other run."""
+    stiffness, work = (result.measures.get(name) for name in ("equivalent_stiffness", "loop_area"))
+    if result.plan.kind != "bench" or None in (stiffness, work) or None in (stiffness.value, work.value):
+        return {}
+    amplitude, open_ = result.plan.model.slide.amplitude, stiffness.error or stiffness.floor
+    if stiffness.value <= KNOWN * open_ or work.value < 0:
+        return {}
+    factor = work.value / (math.pi * stiffness.value * amplitude**2)
+    error = None if None in (stiffness.error, work.error) else \
+        work.error / (math.pi * stiffness.value * amplitude**2) + factor * stiffness.error / stiffness.value
+    return {"loop": {"slide_amplitude": amplitude, "loss_factor": factor, "error": error}}
 
 
 def contact_of(result: Result) -> dict:

@@ -5,10 +5,12 @@ import re
 import shlex
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from command_line import cli
-from scene_texts import JOINT_SHAKEN
+from scene_texts import BENCH, JOINT_SHAKEN, POINT
 
+import patchfem as pf
 from patchfem.__main__ import SCREEN, app, known
 from patchfem.commands import shared
 from patchfem.core import Measure, Outcome
@@ -23,6 +25,7 @@ from patchfem.export.pages.words import (
     verdict,
     zero_below,
 )
+from patchfem.export.summary import loop_of
 from patchfem.response.rows import ROWS as MOTION
 from patchfem.runs.bench.result import OPENED
 from patchfem.runs.results.patch_rows import ROWS as STATIC
@@ -221,11 +224,36 @@ def test_always_a_bench_says_whether_it_slipped():
             "slip_amplitude": {"value": value, "error": error, "unit": "m", "floor": 1e-10}}})
 
     done = Outcome.DONE.sentence
+    stiffness = {"equivalent_stiffness": {"value": 2e6, "error": 2e3, "unit": "N m-1", "floor": 1.0}}
+
+    def looped(factor, error):
+        return verdict({"outcome": "done", "kind": "bench", "measures": stiffness, "loop": {
+            "slide_amplitude": 2e-6, "loss_factor": factor, "error": error}})
+
+    assert looped(0.5, 0.01) == (
+        "At a slide amplitude of 2 um the interface has an equivalent stiffness of 2.0000 ± 0.0020 N/um and a loss "
+        "factor of 0.500 ± 0.010 (equivalent damping ratio 0.2500 ± 0.0050).")
+    assert "a loss factor of at most 0.03 (equivalent damping ratio at most 0.015)." in looped(0.01, 0.02)
     assert said(1.5e-6, 1e-9) == \
         f"{done} Slip amplitude (half the peak-to-peak slip, averaged over the interface): 1.5000 ± 0.0010 um."
     for holds in ((1e-12, 2e-12), (1e-23, 1e-33), (1e-11, None)):
         assert said(*holds) == f"{done} The interface sticks: no slip in the last cycle."
     assert verdict({"outcome": "done", "kind": "bench", "measures": {}}) == done
+
+
+def test_exact_the_loss_factor_of_an_elastic_plastic_bench():
+    """Of a parallelogram of force mu N, stiffness k and slide A: W = 4 mu N (A - mu N/k), and the first harmonic of the
+    force in phase with the slide is k A (a - sin(a) cos(a))/pi with cos(a) = 1 - 2 mu N/(k A)."""
+    law = '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nstiffness = "10 N/um"\n'
+    result = pf.run(POINT + law + '[slide]\nkind = "sine"\namplitude = "10 um"\nfrequency = "1 Hz"\ncycles = 2\n')
+    slide = result.plan.model.slide.amplitude
+    pull, k = result.plan.model.friction.static * result.measures["normal_load"].value, 1e7
+    a = np.arccos(1 - 2 * pull / (k * slide))
+    work, stiffness = 4 * pull * (slide - pull / k), k * (a - np.sin(a) * np.cos(a)) / np.pi
+    found = loop_of(result)["loop"]
+    truth = work / (np.pi * stiffness * slide**2)
+    assert abs(found["loss_factor"] - truth) <= found["error"] + 1e-9 * truth and found["error"] < 1e-2 * truth
+    assert loop_of(pf.run(BENCH)) == {}  # rigid: no stiffness to refer to
 
 
 def test_always_a_ratio_written_as_per_cent_is_remarked(tmp_path):

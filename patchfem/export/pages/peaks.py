@@ -207,8 +207,25 @@ def _known(peaks: list) -> str:
     head = f"{label(first.name).capitalize()} peaks at {_at(first)}"
     if len(peaks) == 1:
         return f"{head}, {_high(first)}{_width(first)}."
+    trend = _trend(len(peaks), np.array([one.frequency for one in peaks]), np.array([one.height for one in peaks]))
     return (f"{head} with {first.held} ({_high(first)}{_width(first)}) and at {_at(last)} with {last.held} "
-            f"({_high(last)}{_width(last)}).")
+            f"({_high(last)}{_width(last)}){trend}.")
+
+
+def _trend(count: int, frequency: np.ndarray, height: np.ndarray) -> str:
+    """How frequency and height, each (count, 2) with errors, go from peak to peak, as words behind those of the first
+    and the last; "" where they turn or move by less than their errors, and of fewer than three peaks."""
+    ways = [f"{name} {way}" for name, of in (("the peak frequency", frequency), ("the height", height))
+            if (way := _way(*of.T))]
+    return f"; over these {count} values {' and '.join(ways)} from each value to the next" * (count > 2 and bool(ways))
+
+
+def _way(value: np.ndarray, error: np.ndarray) -> str:
+    """Whether a sequence "grows" or "falls" throughout, by more than its errors in all; "" where it turns."""
+    step = np.diff(value)
+    if abs(value[-1] - value[0]) <= error[0] + error[-1]:
+        return ""
+    return "grows" if (step > 0).all() else "falls" if (step < 0).all() else ""
 
 
 def _at(one: Peak) -> str:
@@ -245,7 +262,8 @@ def over(keys: list, measures: dict, trusted: dict, shown: dict) -> str:
     still = [int(case) for case in order if height[0][case] == 0 and not np.isfinite(value[case])]
     ends = [at(case) for case in (still[:1] + still[-1:] if len(still) > 1 else still)]
     lost = f"; with {key} {' to '.join(ends)} the output does not move, so there is no peak" if still else ""
-    return f"{label(HEIGHTS[0]).capitalize()} peaks at {first} and at {last}{lost}."
+    trend = _trend(len(known), *(np.transpose([of[0], np.nan_to_num(of[1])])[known] for of in ((value, error), height)))
+    return f"{label(HEIGHTS[0]).capitalize()} peaks at {first} and at {last}{trend}{lost}."
 
 
 def table(peaks: list) -> str:

@@ -133,7 +133,8 @@ def verdict(summary: dict) -> str:
     """
     outcome, measures = Outcome(summary["outcome"]), summary["measures"]
     if summary["kind"] == "bench" and outcome is Outcome.DONE:
-        return _slid(measures.get("slip_amplitude"), outcome.sentence, "contact_fraction" in measures)
+        found = _looped(summary["loop"], measures["equivalent_stiffness"]) if "loop" in summary else outcome.sentence
+        return _slid(measures.get("slip_amplitude"), found, "contact_fraction" in measures)
     if away := summary.get("run_away"):
         drive, knee = (short("", away[name], "m s-2", 4) for name in ("drive", "knee"))
         return (f"{outcome.sentence} The drive, {drive}, is larger than {knee}, above which friction alone does not "
@@ -171,6 +172,21 @@ def _slid(slip: dict | None, done: str, patch: bool) -> str:
         return f"{done} {_holds(patch, 'cycle')}"
     return (f"{done} Slip amplitude (half the peak-to-peak slip, averaged over the interface): "
             f"{pair('slip_amplitude', slip)}.")
+
+
+def _looped(loop: dict, stiffness: dict) -> str:
+    """The sentence on stiffness and damping of a bench; loop: as `summary.loop_of` has it."""
+    factor, error = loop["loss_factor"], loop["error"]
+
+    def number(scale: float) -> str:
+        if error is not None and factor <= error:
+            return f"at most {scales.plain((factor + error) * scale, 2)}"
+        value, off = scales.rounded(factor * scale, None if error is None else error * scale, 1e-9, True)
+        return scales.paired(value, off, "")
+
+    return (f"At a slide amplitude of {scales.short(loop['slide_amplitude'], 'm', 4)} the interface has an equivalent "
+            f"stiffness of {pair('equivalent_stiffness', stiffness)} and a loss factor of {number(1.0)} (equivalent "
+            f"damping ratio {number(0.5)}).")
 
 
 def _open(one: dict) -> float:

@@ -42,6 +42,11 @@ def test_exact_the_peak_and_width_of_a_resonance(damping):
         for (value, error), true in zip((one.frequency, one.height, one.width), truth):
             assert abs(value - true) <= error + 1e-9 * true and error < 1e-6 * true
     said = peaks.sentence(found)
+    assert "over these" not in said
+    three = [found[0], found[1]._replace(frequency=(97.0, 0.1)), found[1]]
+    assert peaks.sentence(three).endswith("; over these 3 values the peak frequency falls from each value to the next.")
+    assert "over these" not in peaks.sentence([three[1], three[0], three[2]])
+    assert "over these" not in peaks.sentence([one._replace(frequency=(one.frequency[0], 9.0)) for one in three])
     assert "with drive.acceleration 1 g" in said and "with drive.acceleration 2 g" in said
     assert "(cases lie 0.25 Hz apart)" in said
     some = np.where(np.abs(np.tile(x, 2) - 99.6) < 0.4, np.nan, both)  # beside the first peak alone
