@@ -3,7 +3,8 @@
 A limit stands between two cases, the last one surely within and the first one surely beyond. Where these are
 neighbours and the curve through them and the cases next to them bends one way, the limit lies between the chord of the
 two and the lines through their neighbours: of a curve without an inflection this is exact. The errors of the cases
-widen this interval. Where the curve bends both ways the two cases alone are told. Where curves through the cases agree
+widen this interval. Where the curve bends both ways the two cases alone are told, and where it has an inflection beside
+them, as behind a kink, the interval reaches to the case on that side. Where curves through the cases agree
 about a place in it, the key may reach this place, else the lower end. A limit and the lower end are written rounded
 down, the upper end rounded up. A case that did not settle, or whose measure misses its tolerance, is neither within nor
 beyond.
@@ -27,6 +28,7 @@ WITHIN = 0.05  # of its value in the first case, in which a measure is said to s
 MOVES = ("relative_displacement_amplitude", "absolute_acceleration_peak", "slip_amplitude", "loop_area",
          "friction_force_peak", "friction_ratio_peak", "onset_level")
 STIFF = ("normal_stiffness", "tangential_stiffness")
+ONSET = 3.0  # times the slope before, by which one begins to change
 ALIKE = 0.15  # of the place, within which both lines are to agree: a change may begin anywhere between two cases
 CHANGES = dict.fromkeys((*MOVES, *STIFF, "contact_fraction"), WITHIN) | {"pressure_peak": 1.0}  # 1: it doubles
 LEAST = 0.0101  # number of a key below which another unit is taken: 0.011 mrad, 10 mrad
@@ -129,7 +131,9 @@ def _along(name: str, change: float, line: np.ndarray, size: np.ndarray, measure
         return ends
     near = slice(inside - 1, beyond + 2)  # the case before both, both, the case after them where there is one
     at = size[line[known[near]]]
-    low, high = _interval(at, share[near], bar[near], ends.change, factors)
+    wide = slice(max(inside - 2, 0), beyond + 3)  # and those next to them, which show an inflection
+    beside = size[line[known[wide]]], share[wide], bar[wide], inside - wide.start
+    low, high = _interval(at, share[near], bar[near], ends.change, factors, beside)
     place = _about(at, share[near], ends.change, factors and at[0] > 0)
     return ends._replace(value=float(np.clip(place, low, high)) if isfinite(place) else low, lower=low, upper=high)
 
@@ -174,32 +178,52 @@ def _arched(way: np.ndarray, at: list) -> float:
     return min((float(one.real) for one in roots if abs(one.imag) < 1e-12 and 0 <= one.real <= 1), default=1.0)
 
 
-def _interval(at: np.ndarray, share: np.ndarray, bar: np.ndarray, wanted: float, factors: bool) -> tuple:
+def _interval(at: np.ndarray, share: np.ndarray, bar: np.ndarray, wanted: float, factors: bool, far: tuple) -> tuple:
     """Between which values of the key a curve without an inflection reaches a wanted relative change.
 
     at (3 or 4,): values of the key in the case before the last one within, in that one, in the first one beyond, in the
-    one after it; share, bar: relative change in each and its error. The interval holds the place of a curve that bends
+    one after it; share, bar: relative change in each and its error; far: the same with one case more on either side,
+    where there are some, and the place of the last one within. The interval holds the place of a curve that bends
     one way over the key; of a key that grows by factors also that of one that does so over its logarithm, of a measure
-    that doubles then that of its own logarithm alone. A curve that bends both ways may be anywhere between both cases.
+    that doubles then that of its own logarithm alone. A curve that bends both ways may be anywhere between both cases,
+    and one that has a kink between them, with an inflection beside, up to the case on that side.
     """
     low, high = float(at[1]), float(at[2])
     ways = [(lambda one: one, lambda one: one)] + [(np.log, np.exp)] * bool(factors and at[0] > 0)
     if wanted >= 1 and len(ways) > 1 and np.min(share - bar) > -1:  # what doubles is near a power of the key
         bar = np.log1p(share + bar) - np.log1p(share)
         ways, share, wanted = ways[1:], np.log1p(share), float(np.log1p(wanted))
+        far = far[0], np.log1p(far[1]), np.log1p(far[1] + far[2]) - np.log1p(far[1]), far[3]
     told = [tuple(float(back(one)) for one in found) for to, back in ways
-            if (found := _bent(to(at), share, bar, wanted)) is not None]
+            if (found := _bent(to(at), share, bar, wanted, _inflected(to(far[0]), *far[1:]))) is not None]
     if not told:
         return low, high
     return max(min(one[0] for one in told), low), min(max(one[1] for one in told), high)
 
 
-def _bent(at: np.ndarray, share: np.ndarray, bar: np.ndarray, wanted: float) -> tuple | None:
+def _inflected(at: np.ndarray, share: np.ndarray, bar: np.ndarray, inside: int) -> tuple:
+    """Whether the curve bends back beside the two cases, on the left and on the right: where it does the branch that
+    comes from that side may be steeper between them than the line through its cases. Where there is no case on the
+    right that tells it, a curve that was flat to the left and falls away is taken to bend back. inside: place of the
+    first of the two cases; the others as of `_interval`."""
+    step = np.diff(at)
+    slope, open_ = np.diff(share) / step, (bar[1:] + bar[:-1]) / step
+    bend = np.diff(slope)
+    sure = np.abs(bend) > open_[1:] + open_[:-1] + 1e-9 * np.abs(slope).max()
+    middle = inside - 1  # of the cases before, within and beyond
+    left, right = (0 <= k < bend.size and bool(sure[k] and sure[middle] and bend[k] * bend[middle] < 0)
+                   for k in (inside - 2, inside + 1))
+    told = inside + 1 < bend.size or inside + 2 >= share.size
+    return left, right or bool(not told and abs(slope[inside]) > ONSET * abs(slope[inside - 1]))
+
+
+def _bent(at: np.ndarray, share: np.ndarray, bar: np.ndarray, wanted: float, back: tuple) -> tuple | None:
     """Ends of the places where a curve that bends one way reaches `wanted`, widened by what errors of the cases move
-    them; None where the cases themselves bend both ways. Arguments as of `_interval`."""
+    them; None where the cases themselves bend both ways. back: as of `_inflected`, a branch that bends back reaches
+    between its line and the case on its side; the others as of `_interval`."""
     if _turns(at, share) == 0:
         return None
-    ends = []
+    ends, sides = [], [at[1]] * back[0] + [at[2]] * back[1]
     for signs in product((-1, 1), repeat=share.size):
         value = share + np.array(signs) * bar
         if not min(value[1], value[2]) <= wanted <= max(value[1], value[2]):
@@ -207,7 +231,9 @@ def _bent(at: np.ndarray, share: np.ndarray, bar: np.ndarray, wanted: float) -> 
         places = _lines(at, value, wanted)
         chord, beside = places[0], places[1:]
         bend = _turns(at, value)
-        if bend == 0:
+        if sides:
+            ends += [*places, *sides]
+        elif bend == 0:
             ends += places
         else:  # the lines beside lie on the other side of the curve than the chord
             early = bend * np.sign(wanted) > 0
