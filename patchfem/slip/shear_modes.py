@@ -165,8 +165,8 @@ def jenkins_set(tangential: np.ndarray, limit: np.ndarray, local_length: float =
         return JenkinsSet(frozen_array([stiffness]), frozen_array([force.sum() / stiffness]),
                           frozen_array(points, np.int64), frozen_array(force), none, np.zeros((0, 0)), none, 0)
     with one_thread():  # more wait for each other: 5 ms of one are 270 ms of two beside other work
-        order, low, root, at, reluctant = _in_order(tangential[np.ix_(points, points)] + np.diag(local_length / force),
-                                                    force)
+        c = _between(tangential, points)
+        order, low, root, at, reluctant = _in_order(c + np.diag(local_length / force) if local_length else c, force)
     starts = np.flatnonzero(np.diff(at, prepend=-np.inf) > SAME * at)
     return JenkinsSet(frozen_array(np.add.reduceat(root[::-1] ** 2, starts)), frozen_array(at[starts]),
                       frozen_array(points, np.int64), frozen_array(force), order, low, starts, reluctant)
