@@ -1,5 +1,6 @@
 """Parameters of a joint from frequency and damping over the amplitude."""
 
+import decay_fits
 import numpy as np
 import pytest
 from command_line import cli
@@ -187,3 +188,10 @@ def test_a_fit_says_what_a_decay_is_compared_with(tmp_path):
     lines = path.read_text().replace("decay_", "").splitlines()
     path.write_text("\n".join([f"method,{lines[0]}", *(f"balance,{line}" for line in lines[1:])]) + "\n")
     assert pf.fit(HEAVY, to=path, out=tmp_path / "out", **ask)["notes"] == []
+
+
+@pytest.mark.parametrize("seed", [8025, *(pytest.param(k, marks=pytest.mark.slow) for k in range(8000, 8030)
+                                          if k != 8025)])
+def test_the_chi_square_found_is_the_least_one_beside_the_truth(seed):
+    """A made decay with noise, by the recipe of `decay_fits`; of seed 8025 the fit once found 4.6 times as much."""
+    assert decay_fits.compared(seed, {})["ratio"] <= 1.01
