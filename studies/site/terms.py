@@ -64,6 +64,8 @@ TERMS = {
     "path": "The total length that a point of the interface has slid; sliding in either direction makes the path "
             "longer. In the nonlocal law, R is the part of the path since a bond formed.",
     "prescribed slide": "A relative motion of the two surfaces that the table `[slide]` gives.",
+    "preload": "The load that presses the pieces together before they slide, such as the tension of a bolt: "
+               "`contact.load`. See [questions](../questions.md#bolt-preload).",
     "reading of an instrument": "The value that an accelerometer or a gauge shows: the peak of a motion, the "
                                 "amplitude of its first harmonic or its root mean square.",
     "reading of the law": "One of two versions of equation 2.17: `stretch`, which never creates energy, or `report`, "
@@ -77,6 +79,8 @@ TERMS = {
                    "number of shear modes follows from the tolerance.",
     "skin": "The compliant rough layer of `[contact.asperities]`.",
     "stick": "The state without slip, of a whole contact or of a part of a contact.",
+    "stick-slip": "A motion in which an interface sticks and slips in turns. See "
+                  "[questions](../questions.md#stick-slip).",
     "stiffness chain": "The springs that act in series between the holder and the interface. `patchfem plan` prints "
                        "their stiffnesses.",
     "strip": "A part of the patch. `[contact.strips]` divides the width of the patch into strips that lie side by "
@@ -90,4 +94,7 @@ TERMS = {
             "called misalignment.",
     "tolerance": "The relative error that no measure should exceed: `accuracy.tolerance`. The mesh, the time step and "
                  "the number of modes follow from the tolerance.",
+    "transient": "The part of a motion that dies away before the motion becomes steady; also the outcome of a run that "
+                 "ends in this part because its motion did not settle. See "
+                 "[questions](../questions.md#the-motion-did-not-settle).",
 }
