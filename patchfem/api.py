@@ -36,7 +36,7 @@ from .export.surfaces import roughness, worn
 from .export.sweeps import folder, page, tables
 from .export.sweeps import run as sweep_run
 from .mesh import files as mesh_files
-from .model.model import Model
+from .model.model import Model, build_unswept
 from .model.model import build as build_model
 from .runs import joint
 from .runs.many import many, meshes
@@ -378,7 +378,7 @@ def export(folder: str | Path, out: str | Path, /, *, frame: int | None = None, 
     else:
         from .export.lab import structures  # its folder holds more than words
 
-        structures.export(build(folder), out)
+        structures.export(build_unswept(load(folder)), out)
     return out
 
 

@@ -7,7 +7,7 @@ from cyclopts import Parameter
 
 from ..export import chosen, reports
 from ..export.lab import structures
-from .shared import Refused, Sets, flag, model_of, out_in, word
+from .shared import Refused, Sets, flag, out_in, unswept_of, word
 
 Frame = Annotated[int | None, Parameter(help="number of the frame, such as 0 for the pressed state; default: the last "
                                              "frame")]
@@ -36,7 +36,7 @@ def export(folder: Path, /, *, out: Annotated[Path, Parameter(
     if frame is not None or histories or of:
         raise Refused("--frame, --histories and --of can be used only with a results folder; from a scene only the "
                       "structure is exported")
-    print(structures.export(model_of(folder, sets), out))
+    print(structures.export(unswept_of(folder, sets), out))
 
 
 def view(folder: Path, /, *, out: out_in("file to write instead of opening a window: picture.png for one frame; .gif, "

@@ -105,6 +105,15 @@ def model_of(path: Path, sets):
     return model.build(scene_of(path, sets))
 
 
+def unswept_of(path: Path, sets):
+    """`model_of` with the scene's own values where [sweep] has others, which a note names."""
+    found = scene_of(path, sets)
+    if found.sweep:
+        note(f"[sweep] is left out: {', '.join(axis.key for axis in found.sweep)} as the scene gives "
+             f"{'it' if len(found.sweep) == 1 else 'them'} (a key that only [sweep] has: its first value)")
+    return model.build_unswept(found)
+
+
 class progress_bar:
     """A bar on a terminal; elsewhere a line every ten seconds; nothing where it is to be silent. The call takes the
     done share."""

@@ -11,9 +11,12 @@ REST = 1e-12  # of the square of the largest rate of a cycle, the size of a prod
 MOST_TURNS = 100  # samples of a cycle that are kept outside the last ones
 
 
-def thinned(rows, run) -> list:
+def thinned(rows, run, even: int = 0) -> list:
     """Numbers of the samples worth keeping of each cycle, rows (c, k, width): its first, every reversal of the output
-    and of a slide, every stop and release (slip speed falls below or rises above 1e-2 of its peak in the cycle)."""
+    and of a slide, every stop and release (slip speed falls below or rises above 1e-2 of its peak in the cycle).
+
+    even: equally spaced samples of a whole cycle that are kept besides, at least.
+    """
     n, output, (count, size), flat = run.modes.omega.size, run.modes.output, rows.shape[:2], rows.reshape(
         -1, rows.shape[2])
     speeds, slips = run.watched(flat)
@@ -26,7 +29,9 @@ def thinned(rows, run) -> list:
     kept = (way[:, :, 1:] != way[:, :, :-1]).any(axis=0)
     kept[:, 1:] |= (slipping[:, :, 1:] != slipping[:, :, :-1]).any(axis=0)
     kept[:, 0] = True
-    return [np.flatnonzero(one)[:MOST_TURNS] for one in kept]
+    picks = [np.flatnonzero(one)[:MOST_TURNS] for one in kept]
+    beside = np.arange(0, size - 1, max(1, run.prop.steps // even)) if even else None
+    return [np.union1d(one, beside) for one in picks] if even else picks
 
 
 def extremes_of(rows, modes, dt) -> list:

@@ -5,17 +5,18 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..core import PatchfemError
-from ..response.decay_curve import DecayCurve, curve_of
+from ..response.decay_curve import curve_of
 from ..structure import places as structure_places
 from ..structure.places import Shapes
 from .decay import decay
 from .driven_modes import POWER, SAMPLES, Modes, driven_modes
 from .frequency_response import Estimate, even_step, h1
-from .swings import half_swings
+from .swings import half_swings, sparse_after
 
 INPUTS = ("force", "base_acceleration")
 PLACES = ("slide", "output", "base", "normal", "pitch")
 WIDER = 0.05  # share by which the estimate's damping may lie above that of the record before it is said
+WIDE = 2.0  # times a damping ratio, the half-width of an interval that tells nothing of it
 LOOSE, LOOSE_DECAY = 0.1, 0.05  # shares of a record that the modes may leave over before it is said
 
 
@@ -136,17 +137,29 @@ def _freely(values: dict, begin: float | None) -> tuple:
     return time[start:], value[start:], name
 
 
-def decay_curve(values: dict, begin: float | None = None) -> DecayCurve:
-    """Frequency and damping over the amplitude [m] of a free decay of a displacement, velocity or acceleration from
+def decay_curve(values: dict, begin: float | None = None) -> tuple:
+    """(DecayCurve, notes) over the amplitude [m] of a free decay of a displacement, velocity or acceleration from
     `begin` [s] on, unless given from its largest value.
 
-    A velocity is divided by the undamped omega of its own point, an acceleration by its square. PatchfemError where no
+    A velocity is divided by the undamped omega of its own point, an acceleration by its square. An amplitude whose
+    damping ratio has an interval wider than WIDE times its value is left out, as the notes say. PatchfemError where no
     decay stands out of the noise.
     """
     time, value, name = _freely(values, begin)
-    found = curve_of(half_swings(time, value))
+    swings = half_swings(time, value)
+    found, notes = curve_of(swings), []
+    known = found.damping_error <= WIDE * np.abs(found.damping)
+    if found.time.size and not known.all():
+        told = f"{np.count_nonzero(~known)} of {known.size} amplitudes"
+        if not known.any():
+            raise PatchfemError(f"the damping ratio has an interval wider than {WIDE:g} times its value at all "
+                                f"{known.size} amplitudes: the record has too few half cycles or too much noise")
+        found, notes = found.at(known), [f"{told} are left out: the interval of the damping ratio is wider than "
+                                         f"{WIDE:g} times its value there"]
+    if ended := sparse_after(time, swings):
+        notes.append(f"the decay is followed up to {swings.middle[-1]:.4g} s only: {ended}")
     omega = 2 * np.pi * found.frequency / np.sqrt(1 - found.damping**2)
-    return found._replace(amplitude=found.amplitude / omega**POWER[name])
+    return found._replace(amplitude=found.amplitude / omega**POWER[name]), notes
 
 
 def of_decay(values: dict, begin: float | None = None) -> Listed:

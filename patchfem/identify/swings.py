@@ -23,10 +23,6 @@ GRID = np.linspace(0.75, 1.3, 56)  # of the highest line, frequencies of the fir
 STEADY = 0.3  # by which the next half period may differ from the last
 
 
-class FewSamples(PatchfemError):
-    """Too few samples of a cycle."""
-
-
 class _Half(NamedTuple):
     """One half swing: middle [s], size with its sign, half period [s], standard deviations of middle and size per unit
     of noise, sum of squares left over and degrees of freedom."""
@@ -53,6 +49,9 @@ def half_swings(time, value) -> HalfSwings:
         tries = [_again(time, value, one, viscous) for viscous, one in enumerate(tries) if len(one) > 2]
     best = min(tries, key=lambda one: _noise(one).mean() if len(one) > 2 else np.inf, default=[])
     if len(best) < 3:
+        middle, length = _first(time, value)
+        if why := next(filter(None, (_sparse(time, middle + k * length, length) for k in range(3))), ""):
+            raise PatchfemError(f"fewer than three half cycles of a free decay have samples enough: {why}")
         raise PatchfemError("fewer than three half cycles of a free decay rise above the noise; begin the record after "
                             "the drive has ended (--begin), and take at least 10 samples per cycle")
     noise = _noise(best)
@@ -60,6 +59,22 @@ def half_swings(time, value) -> HalfSwings:
     size = np.abs(columns[1])
     return HalfSwings(columns[0], size, np.maximum(noise * columns[3], SINE * columns[2]),
                       np.maximum(noise * columns[4], SINE * size))
+
+
+def sparse_after(time, swings: HalfSwings) -> str:
+    """Why half swings end before the record of times (k,) [s] does, where it has too few samples behind them, else
+    ""."""
+    length = swings.middle[-1] - swings.middle[-2]
+    return _sparse(time, float(swings.middle[-1] + length), float(length))
+
+
+def _sparse(time, middle: float, length: float) -> str:
+    """Words on a half cycle [s] about a middle [s] with fewer than FEWEST samples; "" of another, and at the end."""
+    low, high = middle - length / 2, middle + length / 2
+    count = int(np.diff(np.searchsorted(time, (low, high)))[0])
+    if count >= FEWEST or high > time[-1]:
+        return ""
+    return f"the half cycle from {low:.4g} s to {high:.4g} s has {count} samples, and at least {FEWEST} are needed"
 
 
 def _first(time, value) -> tuple:
@@ -75,7 +90,7 @@ def _first(time, value) -> tuple:
     for f in line * GRID:
         part = time - time[0] <= 1 / f
         if np.count_nonzero(part) < 2 * FEWEST:
-            raise FewSamples(f"the record has {np.count_nonzero(part)} samples per cycle of {f:.4g} Hz; at least "
+            raise PatchfemError(f"the record has {np.count_nonzero(part)} samples per cycle of {f:.4g} Hz; at least "
                                 f"{2 * FEWEST} are needed")
         turn = 2 * np.pi * f * (time[part] - time[0])
         columns = np.stack([np.ones(turn.size), np.cos(turn), np.sin(turn)], axis=1)

@@ -5,6 +5,7 @@ variable, a field of a structure or a column of either is named for each quantit
 """
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -12,45 +13,52 @@ import numpy as np
 from ..core import Missing, PatchfemError
 from . import matlab, universal
 from .cells import NUMBER, text_of
-from .loops import own_name
+from .loops import OWN, own_name
 from .records import LARGEST, UNITS, Channel, Records, Wanted, checked, chosen, factor_of
 
 UNIVERSAL = (".uff", ".unv", ".uf", ".58")
 ENDINGS = (*UNIVERSAL, ".mat", ".csv", ".txt")
+EXPORTED = "absolute_acceleration", "base_acceleration"  # channels of every motion of `patchfem export`
 WIDEST = 1000  # columns of a table
 _HEAD = re.compile(r"(.*?)\s*(?:\[\s*([^\[\]]*?)\s*\]|\(\s*([^()]*?)\s*\))?", re.S)
 _COLUMN = re.compile(r"([\w.]+)\(:,\s*([1-9][0-9]*)\)")
 
 
-def read_records(path, asked: list) -> Records:
+def read_records(path, asked: list, own: Mapping = OWN) -> Records:
     """Records over time of a file, in SI; asked: `Wanted` channels, none to take those that say what they are.
 
-    PatchfemError names the file and what is wanted, Missing where there is no file.
+    own: quantity -> the names of `patchfem export` that stand for it, as of `loops.own_name`. PatchfemError names the
+    file and what is wanted, Missing where there is no file.
     """
     path = Path(path)
     ending = path.suffix.lower()
     if ending == ".mat":
         return _variables(path, asked)
     if ending in UNIVERSAL:
-        return of_sets(path, universal.sets_of(path), asked)
+        return of_sets(path, universal.sets_of(path), asked, own)
     if ending in ENDINGS:
-        return chosen(path, _columns(path), asked, [])
+        return chosen(path, _columns(path, own), asked, [])
     raise PatchfemError(f"{path}: the name of an imported file must end in {', '.join(ENDINGS)}")
 
 
-def of_sets(path, sets: list, asked: list) -> Records:
-    """Records over time among the datasets of a universal file; PatchfemError where there is none."""
+def of_sets(path, sets: list, asked: list, own: Mapping = OWN) -> Records:
+    """Records over time among the datasets of a universal file; PatchfemError where there is none. own: as
+    `read_records` has it."""
     notes = []
     there = universal.channels(path, sets, notes)
+    names = [one.name for one in there]
+    if set(EXPORTED) <= set(names):  # types of data do not tell its displacements apart
+        ours = [own_name(name, names, own) for name in names]
+        there = [one._replace(quantity=known if known in UNITS else "") for one, known in zip(there, ours)]
     if not there:
         raise PatchfemError(f"{path}: contains no record over time (dataset 58, function type 1), only modes or "
                             "frequency responses; write these as the modes of a scene with -o modes.toml")
     return chosen(path, there, asked, notes)
 
 
-def _columns(path: Path) -> list:
+def _columns(path: Path, own: Mapping) -> list:
     """`Channel`s of the columns of numbers; one whose name is a quantity (in any letters), or what `patchfem export`
-    calls it, is taken as it.
+    calls it, is taken as it; own: as `read_records` has it.
 
     Columns with a text in any row are left out. PatchfemError with file and line for a row of another length and for a
     header of numbers, Missing where there is no file.
@@ -69,7 +77,7 @@ def _columns(path: Path) -> list:
             raise PatchfemError(f"{path}:{number}: {len(cells)} cells, but {len(names)} column names")
         rows.append(cells)
     found, plain = [], [name.strip().lower().replace(" ", "_") for name in names]
-    ours = [own_name(name, plain) for name in plain]
+    ours = [own_name(name, plain, own) for name in plain]
     for name, known, head, column in zip(names, ours, heads, zip(*rows)):
         if not all(map(NUMBER.fullmatch, column)):
             _refuse_commas(path, name, column)

@@ -81,10 +81,10 @@ def read_loop(path, units: Mapping = UNITS) -> Loop:
     return Loop(path, time, place - place[0], values[read[0]], read[0], found.labels)
 
 
-def own_name(name: str, names: Container) -> str:
+def own_name(name: str, names: Container, known: Mapping = OWN) -> str:
     """What a column of `patchfem export` is called in a measured loop, where none of `names` is called so or comes
-    first; any other name as it is."""
-    for quantity, own in OWN.items():
+    first; any other name as it is. known: quantity -> the names that stand for it, the first that is there."""
+    for quantity, own in known.items():
         if quantity not in names and name == next((one for one in own if one in names), None):
             return quantity
     return name

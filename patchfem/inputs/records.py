@@ -1,7 +1,7 @@
 """Channels of a measurement, chosen by name and turned into SI, and what they must hold to be used."""
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -51,12 +51,13 @@ class Records:
     """Channels in SI over one time.
 
     values: quantity -> (k,), `time` [s] first where there is one; notes: sentences on what was read otherwise than it
-    stands.
+    stands; there: all channels of the file in words, as of `listed`.
     """
 
     path: Path
     values: dict
     notes: list = field(default_factory=list)
+    there: str = ""
 
 
 def wanted(texts, names=UNITS) -> list:
@@ -121,7 +122,8 @@ def chosen(path: Path, channels: list, asked: list, notes: list) -> Records:
     values = {name: _in_si(path, name, one, unit) for name, one, unit in picked}
     if "time" not in values:
         values = _shared_time(path, [one for _, one, _ in picked], channels, bool(asked)) | values
-    return checked(path, {name: values[name] for name in sorted(values, key=lambda name: name != "time")}, notes)
+    order = sorted(values, key=lambda name: name != "time")
+    return replace(checked(path, {name: values[name] for name in order}, notes), there=listed(channels))
 
 
 def found(path, channels: list, source: str) -> Channel:

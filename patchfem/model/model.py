@@ -106,6 +106,12 @@ class Model:
         return self.rig.interfaces[0].limits(load)
 
 
+def build_unswept(scene: Scene) -> Model:
+    """`build` of a scene without its [sweep]: a swept key has the value that the scene gives it, or, where [sweep]
+    alone has the key, the first one."""
+    return build(replace(scene, sweep=()))
+
+
 def build(scene: Scene) -> Model:
     """The model of a valid scene; files that it names are read. PatchfemError with the place of the key at fault.
 

@@ -23,6 +23,7 @@ ROUND = 1e-12  # of a value, what round-off leaves
 REST = 1e-12  # of the largest speed, one below which a sample is a turn itself
 FAINT = 1e-9  # of the largest half swing, one below which is round-off
 EDGE = 1e-9  # of a step, by which round-off may lay a turn outside it
+WIGGLE = 0.25  # of the range of a motion in a period, a way back below which another mode makes it
 CLOSE = 1e-6  # of an amplitude, by which a curve reaches beyond its ends
 
 
@@ -99,8 +100,34 @@ def turns(time, place, speed) -> tuple:
     times = np.concatenate([time[still], time[k] + share * span])
     found = np.concatenate([place[still], _cubic(places, speeds, share)])
     order = np.lexsort((found, times))
-    order = order[np.diff(times[order], prepend=-np.inf) > 0]
+    apart = ROUND * float(np.ptp(time))  # a force that jumps at a turn has samples on both sides of it
+    order = order[np.diff(times[order], prepend=-np.inf) > apart]
     return times[order], found[order]
+
+
+def last_swing(time, place, speed, period: float) -> float | None:
+    """Half the peak-to-peak [m] of the last whole cycle of a motion, from one turn to the next but one; half its range
+    in the last period where it rests, None where it has fewer than three turns.
+
+    time, place [m], speed [m/s]: (n,) as of `turns`; period [s]. A way back of less than WIGGLE of its range in the
+    last period is no turn but that of a faster mode beside it.
+    """
+    late = float(np.ptp(place[time >= time[-1] - period * (1 + EDGE)]))
+    if late <= FAINT * np.ptp(place):
+        return late / 2
+    found, way, far = [], 0, float(place[-1])  # turns from the end on; the farthest place since the last of them
+    for at in turns(time, place, speed)[1][::-1].tolist():
+        if way == 0:
+            way = int(np.sign(at - far)) if abs(at - far) > WIGGLE * late else 0
+            far = at if way else far
+        elif way * (at - far) > 0:
+            far = at
+        elif way * (far - at) > WIGGLE * late:
+            found.append(far)
+            far, way = at, -way
+        if len(found) == 3:
+            return max(abs(found[0] - found[1]), abs(found[1] - found[2])) / 2
+    return None
 
 
 def turns_from_outside(time, place, speed) -> tuple:

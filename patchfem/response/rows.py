@@ -136,7 +136,9 @@ class Seen:
     @cached_property
     def shaken(self) -> dict:
         """What a stationary random drive shows (`stationary.measures`), by name; {} under any other."""
-        return stationary.measures(self.window, self.drive) if hasattr(self.drive, "band") else {}
+        found = stationary.measures(self.window, self.drive) if hasattr(self.drive, "band") else {}
+        return found if self.load is not None else {
+            name: value for name, value in found.items() if not name.startswith("friction_power")}
 
     @property
     def work_check(self) -> float | None:
@@ -211,12 +213,12 @@ def _moved(values: dict):
     return np.where(slip > 0, slip, np.abs(values.get("relative_displacement_amplitude", 0.0)))
 
 
-def _shaken(name: str, unit: str, floor: float, words: str) -> tuple:
+def _shaken(name: str, unit: str, floor: float, words: str, group: str = "motion") -> tuple:
     """Rows of a measure of a random drive, and of the scatter of records about it."""
     scatter = f"{name}_scatter"
-    return (Row(name, unit, floor, words, lambda s: s.shaken.get(name)),
+    return (Row(name, unit, floor, words, lambda s: s.shaken.get(name), group=group),
             Row(scatter, unit, floor, f"half-width of the 95 % interval of {name}: the scatter between "
-                "random drives of the same length with different seeds", lambda s: s.shaken.get(scatter),
+                "random drives of the same length with different seeds", lambda s: s.shaken.get(scatter), group=group,
                 term=(name, lambda values: np.abs(values.get(name, 0.0)))))
 
 
@@ -331,6 +333,8 @@ ROWS = (
                                                "under a random drive"),
     *_shaken("response_damping", "1", 1e-5, "damping ratio of the largest peak of the frequency response (H1 "
                                             "estimate), structure and friction together"),
+    *_shaken("friction_power", "W", 1e-9, "mean power of friction under a random drive: friction work per second in "
+                                          "all interfaces together", "energy"),
     Row("ring_frequency", "Hz", 1e-3, "frequency of the free vibration (ringing) during stick"),
     Row("ring_damping", "1", 1e-6, "damping ratio of the free vibration (ringing) during stick"),
     Row("onset_level", "m s-2", 0.0,

@@ -158,7 +158,9 @@ def slip_period(time, rate) -> float:
     """
     rate = np.asarray(rate, float)
     way = np.sign(rate) * (np.abs(rate) > MOVES * np.abs(rate).max(initial=0.0))
-    starts = np.asarray(time, float)[1:][(way[1:] != 0) & (way[1:] != way[:-1])]
+    time = np.asarray(time, float)
+    begins = np.flatnonzero((way[1:] != 0) & (way[1:] != way[:-1]))
+    starts = time[begins + (way[begins] != 0)]  # what holds starts at its last sample without a slip
     longest = float(np.diff(starts[-4:]).max(initial=0.0))
     return longest if starts.size and time[-1] - starts[-1] <= 1.5 * longest else 0.0
 

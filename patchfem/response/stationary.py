@@ -61,6 +61,8 @@ def measures(window, drive) -> dict:
     if found is not None:
         for name, value, scatter in zip(("response_frequency", "response_damping"), *found):
             out |= {name: value, f"{name}_scatter": scatter}
+    if "ledger" in window.extra:
+        out["friction_power"], out["friction_power_scatter"] = power(window.time, window.extra["ledger"][0])
     return {name: float(value) for name, value in out.items() if np.isfinite(value)}
 
 
@@ -98,6 +100,14 @@ def rms_scatter(values) -> float:
         return 0.0
     share = stdtrit(GROUPS - 1, 0.975) * parts.std(ddof=1) / np.sqrt(GROUPS) / mean
     return float(np.sqrt(mean) * np.expm1(share / 2))
+
+
+def power(time, work) -> tuple:
+    """(mean power [W], half-width of its interval) of work (k,) [J] done up to times (k,) [s], the latter from the
+    means over GROUPS parts of equal length."""
+    edges = np.linspace(time[0], time[-1], GROUPS + 1)
+    parts = np.diff(np.interp(edges, time, work)) / np.diff(edges)
+    return parts.mean(), stdtrit(GROUPS - 1, 0.975) * parts.std(ddof=1) / np.sqrt(GROUPS)
 
 
 def steady(window, drive) -> bool:

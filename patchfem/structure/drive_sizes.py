@@ -7,6 +7,8 @@ import numpy as np
 
 from ..core import BaseSine, ModalBasis, Start
 
+EVEN, LEAST_EVEN, MOST_EVEN = 200, 20, 20_000  # samples per cycle, per cycle and in all, of a whole release
+
 
 class DriveKeys(NamedTuple):
     """What a scene asks of its drive.
@@ -104,3 +106,15 @@ def sinusoidal(drive) -> bool:
 def whole(span: float, drive) -> bool:
     """Whether a window of `span` [s] holds a whole cycle of the drive, as a friction loop needs."""
     return span > drive.period * (1 - 1e-6)  # round-off of times after many cycles
+
+
+def undriven(drive) -> bool:
+    """Whether nothing drives a motion from its start on: a release."""
+    return len(drive.segments) == 1 and largest(drive) == 0
+
+
+def even_samples(drive, cycles: float) -> int:
+    """Equally spaced samples per cycle that are kept of a whole release of so many cycles: EVEN of them, fewer where
+    they are more than MOST_EVEN in all; 0, where turning points are kept alone, below LEAST_EVEN and under a drive."""
+    count = int(min(EVEN, MOST_EVEN / max(cycles, 1e-300))) if undriven(drive) else 0
+    return count if count >= LEAST_EVEN else 0

@@ -57,7 +57,7 @@ def test_exact_any_trace_tells_the_amplitude_of_the_displacement(name, power):
     zeta, w = 0.02, 500.0
     t = np.arange(2000) / 10000
     pole = w * complex(-zeta, np.sqrt(1 - zeta**2))
-    found = decay_curve({"time": t, name: (pole**power * 1e-3 * np.exp(pole * t)).real})
+    found, _ = decay_curve({"time": t, name: (pole**power * 1e-3 * np.exp(pole * t)).real})
     assert found.damping == pytest.approx(zeta, rel=2e-3)
     exact = 1e-3 * np.exp(-zeta * w * found.time)
     assert found.amplitude == pytest.approx(exact, rel=2e-3)

@@ -8,6 +8,7 @@ import numpy as np
 from ...compiled import load, when_compiling
 from ...core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start, frozen_array
 from ...rates import PYTHON_READ
+from ...structure.drive_sizes import even_samples
 from .cost import python_seconds, sample_seconds
 from .elements import stretches, table_of, virgin
 from .event_list import BORDER, RELEASE, REVERSAL, ROOM, STOP, EventLog
@@ -172,7 +173,7 @@ class _Run:
             self.room, self.spare = room_of(self.plant), room_of(self.plant)
         self.motion, self.cycles, self.period = motion, cycles, drive.period
         self.width = self.kernels.HEAD + 2 * n + self.kernels.EACH * len(self.groups)
-        self.early, self.kept, self.events, self.count = [], 0, [], 0
+        self.early, self.even, self.kept, self.events, self.count = [], [], 0, [], 0
         self.rigid, self.outcome, self.snapshots = bool(self.table.static.any()), None, []
         self.before = self._ways(self.plant.faces @ self.motion[1], np.abs(self.plant.faces) @ np.abs(self.motion[1]))
         self.passed, self.repeats, self.marked = False, False, np.zeros(0, bool)
@@ -237,6 +238,20 @@ class _Run:
         if self.kept < CORNERS:
             self.early.append(rows[self.marked])
             self.kept += int(self.marked.sum())
+
+    def _evenly(self, step: float):
+        """What keeps, of rows as they come, samples at all multiples of a step [s] and those of `sample` besides."""
+        last = np.empty((0, self.width))
+
+        def keep(rows) -> None:
+            nonlocal last
+            self._note(rows)
+            if len(rows):
+                rows, last = np.concatenate([last, rows]), rows[-1:].copy()
+                grid = step * np.arange(ceil(rows[0, 0] / step), ceil((rows[-1, 0] + rows[-1, 1]) / step))
+                self.even.append(self.sample(rows, grid if grid.size else rows[:1, 0]))
+
+        return keep
 
     def _count_on(self, end: int, rows) -> None:
         """Count the cycles up to the last one before the number `end`, or before the next segment of the drive, as the
@@ -316,11 +331,11 @@ class _Run:
 
     def go(self, frames: int, progress) -> PieceRun | None:
         """The whole run; None where its output passed the travel."""
-        end, wide, late = self.cycles, [], []
+        end, wide, late, even = self.cycles, [], [], even_samples(self.drive, self.cycles)
         first, last = max(0.0, end - self.window), max(0.0, end - 1)
         begin = max(0.0, min(first, end - 2))
         if begin > 0:
-            self.until(begin, self._keep, progress)
+            self.until(begin, self._evenly(self.period / even) if even else self._keep, progress)
         if first > begin:
             self.until(first, self._into(wide), progress)
         self.repeats = bool(self.past.about[REPEATS])
@@ -399,7 +414,8 @@ class _Run:
         early, wide = np.concatenate([none, *self.early]), np.concatenate([none, *wide])
         number = max(LEAST, round((stop - begun) / self.period * SAMPLES) + 1)
         window = self.sample(late, np.linspace(begun, stop, number))
-        parts = [self._rows_as(early, np.arange(len(early)), np.zeros(len(early)), early[:, 0])] if len(early) else []
+        parts = [self._rows_as(early, np.arange(len(early)), np.zeros(len(early)), early[:, 0])] if len(early) else \
+            [_part(one, one.time < (wide if len(wide) else rows)[0, 0]) for one in self.even]
         if len(wide):
             span = begun - wide[0, 0]
             more = self.sample(wide, np.linspace(wide[0, 0], begun, round(span / self.period * SAMPLES) + 1))
@@ -477,4 +493,6 @@ def _chain(parts) -> Response:
         return parts[0]
     extra = {name: np.concatenate([r.extra[name] for r in parts], axis=1 if name == "ledger" else 0)
              for name in parts[0].extra}
-    return Response(*(np.concatenate([getattr(r, name) for r in parts]) for name in _COLUMNS), extra)
+    whole = Response(*(np.concatenate([getattr(r, name) for r in parts]) for name in _COLUMNS), extra)
+    later = np.diff(np.maximum.accumulate(whole.time), prepend=-np.inf) > 0
+    return whole if later.all() else _part(whole, later)

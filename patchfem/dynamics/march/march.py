@@ -10,6 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from ...compiled import load
 from ...core import BaseSine, ModalBasis, Outcome, Response, say
+from ...structure.drive_sizes import even_samples
 from ..contacts import arrays
 from ..contacts.arrays import ModalArrays
 from ..cycles import extremes_of, phasors_of, thinned
@@ -134,13 +135,13 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
         samples.again = True
     extremes, phasors = samples.extremes, samples.phasors
     # room: for how many more samples of cycles before the window; picked: first step of a cycle -> those worth keeping
-    room, whole, picked = samples.room, whole or bool(asked), {}
+    room, whole, picked, even = samples.room, whole or bool(asked), {}, even_samples(drive, cycles)
     # a fraction of a cycle comes first, the window is whole
     size = (total - run.done) % steps_per_cycle or steps_per_cycle
     while run.done < total and run.outcome is None:
         stop = min((mark for mark in asked if mark > run.done), default=total)
         for first, rows, works in run.cycles(size, stop, frames if stop == total else 0, snapshots):
-            picks = thinned(rows, run) if whole and room > 0 and rows.shape[1] > 1 else [None] * len(works)
+            picks = thinned(rows, run, even) if whole and room > 0 and rows.shape[1] > 1 else [None] * len(works)
             for k, work in enumerate(works):
                 if whole and len(last) == last.maxlen and room > 0:
                     room -= _shelved(samples, run, last[0], picked.pop(last[0][0], None))

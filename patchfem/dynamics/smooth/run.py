@@ -10,6 +10,7 @@ import numpy as np
 from ... import compiled
 from ...core import ModalBasis, Outcome, Response
 from ...friction.laws.stretch import bonds_of
+from ...structure.drive_sizes import even_samples
 from ..events.plant import segments_of
 from ..integrated import Integrated, histories
 from ..march.march import MarchResult
@@ -356,18 +357,23 @@ def simulate(modes: ModalBasis, drive, element, cycles: float, tolerance: float,
     run.ends_only(window)
     end, kept, shots = cycles * period, [], []
     run.progress = progress
-    whole = min(2.0, cycles) * period
+    whole, even = min(2.0, cycles) * period, even_samples(drive, cycles)
+    if even:
+        begin = end - max(whole, window * period)
+        kept.append(run.until(begin, np.arange(0, begin, period / even)))
     if window * period < whole:
         run.onward(end - whole)
         count = max(2, round((whole - window * period) / period * SAMPLES) + 1)
-        kept = [run.until(end - window * period, np.linspace(end - whole, end - window * period, count))[:-1]]
+        kept.append(run.until(end - window * period, np.linspace(end - whole, end - window * period, count))[:-1])
     at = end - np.linspace(min(1.0, cycles), 0.0, frames + 1)[1:] * period if frames else []
     rows, (fine, unsure) = run.last(end, window * period, [float(min(t, end)) for t in at], shots)
     if run.outcome is not None and run.time > 0:  # its last cycles were not known before: once more to where it ended
         done = simulate(modes, drive, element, run.time / period, tolerance, window, np.inf, frames, start)
         return replace(done, outcome=run.outcome, message=run.message)
     last, turned = run.response(rows), run.response(_merged(rows, run, rows[0, 0]))
-    rows = np.concatenate([*_early(run, kept[0][0, 0] if kept else rows[0, 0]), *kept, rows])
+    rows = np.concatenate([*_early(run, kept[0][0, 0] if kept and not even else rows[0, 0]), *kept, rows])
+    if even:
+        rows = rows[np.unique(rows[:, 0], return_index=True)[1]]
     done = max(1, ceil(run.time / period - 1e-9))
     phasors = np.array([1, 1j]) @ run.kept.cycles[2:, :done]
     book = run.book() | _work_check(turned)

@@ -8,18 +8,14 @@ from ... import scales
 from ...core import PatchfemError
 from ...disk import whole
 from ...identify import measured_modes as measured
-from ...identify.swings import FewSamples
 from ...inputs import laboratory, records
 from ...inputs import universal as universal_files
-from ...inputs.loops import OWN
 from ...scene.keys import quantities
 from ...structure import universal as universal_modes
 from . import modes as mode_lines
 from . import write
 
-COMPUTED = ("; a run keeps only the turning points of its motion before its last cycles, so its export is no full "
-            "record. To get frequency and damping against amplitude, run `patchfem backbone SCENE --method decay -o "
-            "DIR` on the scene of this run; `fit --to DIR/backbone.csv` reads the result")
+OUTPUT = {"displacement": ("output_displacement", "relative_displacement", "slide")}  # of `patchfem export`
 
 
 class Estimate(NamedTuple):
@@ -69,22 +65,14 @@ def _table(file: Path, out: Path, asked, zero: bool) -> dict:
 
 def _decay(file: Path, out: Path, asked, begin: str) -> dict:
     values, notes = _records(file, asked)
-    try:
-        found = measured.decay_curve(values, _quantity(begin, "time", f"--begin {begin}"))
-    except FewSamples as reason:
-        raise PatchfemError(f"{file}: {reason}{COMPUTED * _ours(file)}") from None
+    found, more = measured.decay_curve(values, _quantity(begin, "time", f"--begin {begin}"))
     write.write_table(out, {f"decay_{name}": one for name, one in found._asdict().items()},
                       {f"decay_{name}": unit for name, unit in write.DECAY.items()})
     ends = [f"{scales.told(found.frequency[k], found.frequency_error[k], unit='Hz')} with a damping ratio of "
             f"{scales.told(found.damping[k], found.damping_error[k])} at {scales.short(found.amplitude[k], 'm', 3)}"
             for k in (0, -1)]
     return {"points": found.time.size, **{f"decay_{name}": one.tolist() for name, one in found._asdict().items()},
-            "notes": notes, "told": f"{found.time.size} amplitudes, from {ends[0]} to {ends[1]}"}
-
-
-def _ours(file: Path) -> bool:
-    """Whether `patchfem export` has written a file of records."""
-    return OWN["displacement"][-1].encode() in file.read_bytes()
+            "notes": [*notes, *more], "told": f"{found.time.size} amplitudes, from {ends[0]} to {ends[1]}"}
 
 
 def _modes(file: Path, out: Path, asked, how: Estimate) -> dict:
@@ -114,7 +102,10 @@ def _response(file: Path, out: Path, asked, how: Estimate) -> dict:
 
 
 def _records(file: Path, asked) -> tuple:
-    found = laboratory.read_records(file, records.wanted(asked))
+    found = laboratory.read_records(file, records.wanted(asked), OUTPUT)
+    if found.there and not found.values.keys() & measured.POWER.keys():
+        raise PatchfemError(f"{file}: no channel is known as a response ({', '.join(measured.POWER)}); choose one with "
+                            f"--map {next(iter(measured.POWER))}=CHANNEL among {found.there}")
     return found.values, found.notes
 
 

@@ -61,7 +61,10 @@ def export(model: Model, out: Path) -> str:
             _matlab(file, arrays, found)
     counts = (f"{count} {name}{'s' * (count != 1)}" for count, name in (
         (len(arrays["M"]), "coordinate"), (found.limit.size, "friction element")))
-    return f"{out}: {', '.join(counts)}{_left_out(model)}"
+    name = "output" if out.suffix.lower() == ".npz" else "T_out"
+    rows = f"; in these coordinates x the output is {name}·x, Fex1 is the force on each of them"
+    slides = ", the slide of interface i is row i of slide·x" if "slide" in arrays else ""
+    return f"{out}: {', '.join(counts)}{rows}{slides}{_left_out(model)}"
 
 
 def _left_out(model: Model) -> str:

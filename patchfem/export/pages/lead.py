@@ -182,7 +182,7 @@ def span(measures: dict, trusted: dict, settled: np.ndarray, names: Sequence = F
         counts, ended = there.sum(), (every & settled).sum()
         whose = "" if counts == every.sum() else \
             f" of the {'only settled case' if counts == 1 else 'settled cases'}" if counts == ended else \
-            f" in the {'only case that meets' if counts == 1 else 'cases that meet'} the tolerance"
+            f" in the {'only case that meets' if counts == 1 else 'cases that meet'} the tolerance in this measure"
         return f"{ranked.called(name).capitalize()}{whose} {ran}{band}."
     return ""
 

@@ -8,6 +8,7 @@ from ...scales import short, told
 
 RESTS = 5e-3  # of the place where it ends, which is told to three digits: what moves by less has come to rest
 FEWEST = 5  # amplitudes of a decay whose frequency and damping are told in the sentence
+ROUND = 1e-13  # of the largest output, by which no sample moves
 NOTHING = 1e-9  # of the largest output: an end so near 0 is what is left of a decay to 0
 
 
@@ -17,7 +18,8 @@ def released(result: Result) -> str:
     if rig is None or rig.kind != "free" or r is None or r.time.size < 2:
         return ""
     amplitude = result.measures.get("relative_displacement_amplitude")
-    return swung(r.time, r.output, getattr(amplitude, "error", None) or 0.0) + _told(result.extra.get("decay"))
+    error, last = (getattr(amplitude, name, None) for name in ("error", "value"))
+    return swung(r.time, r.output, error or 0.0, last) + _told(result.extra.get("decay"))
 
 
 def _told(decay) -> str:
@@ -31,27 +33,29 @@ def _told(decay) -> str:
     return f"; it decays at {', and at '.join(parts)}"
 
 
-def swung(time, output, error: float = 0.0) -> str:
+def swung(time, output, error: float = 0.0, amplitude: float | None = None) -> str:
     """The sentence of `released` from the kept samples (k,) of a motion, turns among them: times [s], output [m].
 
     error [m]: of the amplitude; an output that moves by no more than that, or by what the printed digits of its end
-    leave open, is at rest.
+    leave open, is at rest; amplitude [m]: of its last whole cycle, None for that of the last tenth of the samples.
     """
     end, begin = float(output[-1]), float(output[0])
     end = 0.0 if abs(end) < NOTHING * np.abs(output).max() else end
     far = np.abs(output - end)
     if not np.isfinite(far).all() or not far.max() > 0:
         return f"released at {say(begin, 3)}, the output does not move"
-    turns = 1 + np.flatnonzero(np.diff(np.sign(np.diff(output))) != 0)
+    moves = np.flatnonzero(np.abs(np.diff(output)) > ROUND * np.abs(output).max())
+    turns = 1 + moves[:-1][np.diff(np.sign(np.diff(output)[moves])) != 0]
     still = max(error, RESTS * abs(end), NOTHING * np.abs(output).max())
     turns = turns[far[turns] > still]
     way = f"first swings to {say(float(output[turns[0]]), 3)}" if turns.size else f"goes to {say(end, 3)}"
     first = f"released at {say(begin, 3)}, the output {way}"
-    last = np.ptp(output[time >= time[-1] - 0.1 * (time[-1] - time[0])]) / 2
+    tenth = np.ptp(output[time >= time[-1] - 0.1 * (time[-1] - time[0])]) / 2
+    last = tenth if amplitude is None else min(tenth, amplitude)
     if last > still:
         at = short(float(time[-1]), "s", 3)
-        return f"{first} and at the end, after {at}, still moves with an amplitude (half peak-to-peak) of " \
-               f"{say(float(last), 3)}"
+        return f"{first} and at the end, after {at}, still moves with an amplitude (half peak-to-peak of its last " \
+               f"whole cycle) of {say(float(last), 3)}"
     beyond = int(np.flatnonzero(far > still)[-1]) if (far > still).any() else 0
     beyond = min(beyond, time.size - 2)
     rests = f"comes to rest at {say(end, 3)} after {short(float(time[beyond + 1]), 's', 3)}"

@@ -40,6 +40,7 @@ SHAKEN = {"relative_displacement_rms": "the displacement of the output is {} rms
           "absolute_acceleration_rms": "the acceleration of the output is {} rms",
           "response_frequency": "the frequency response H1 peaks at {}",
           "response_damping": "the damping ratio of that peak is {}"}
+POWER = "friction_power"  # of a random drive, which has no cycle
 RELEASED = "The run ended before the motion came to rest; raise drive.cycles to see more of the decay."
 GROWN = ("The motion still grows at the end of the run, after {}: the measures describe its last cycles and have no "
          "error estimate.")
@@ -239,8 +240,10 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str, str], s
         if whole and not released:
             opened = any(one.startswith(OPENED) for one in summary.get("warnings", ()))
             changes = summary["outcome"] in CHANGES and summary["kind"] in ("rig", "linear")
-            of_each("loop_area", "friction work of the last cycle {}" if opened else "{} dissipated per cycle" +
-                    " (mean of the last cycles)" * changes)
+            said(POWER, "friction dissipates {}")
+            each = "friction work of the last cycle {}" if opened else "{} dissipated per cycle" + \
+                " (mean of the last cycles)" * changes
+            of_each("" if POWER in measures else "loop_area", each)
         of_each("contact_fraction", "{} of the length in contact" + placed(
             summary.get("contact"), measures.get("contact_fraction", {}).get("value")))
         if summary["kind"] == "patch":
@@ -366,7 +369,7 @@ def table_of(measures: dict, engine: str = "") -> list[str]:
     out, pressed = [], "contact_fraction" in measures
     over = MARCHED if "worn_volume" in measures else OVER.get(engine, WHOLE_RUN)
     for group in GROUPS:
-        lines = [f"  {name:<{width}}  {_value(name, one, over)}{_records(name, every)}"
+        lines = [f"  {name:<{width}}  {_value(name, one, over, POWER in every)}{_records(name, every)}"
                  for name, one in measures.items() if group_of(name, pressed) == group]
         out += [group, *lines] if lines else []
     return out
@@ -392,11 +395,12 @@ def _records(name: str, measures: dict) -> str:
     return f" ({numerics}{text} for other records)" if text else ""
 
 
-def _value(name: str, one: dict, over: str) -> str:
+def _value(name: str, one: dict, over: str, shaken: bool) -> str:
     if one.get("reason"):
         return f"- ({one['reason']})"
     of_what = OF_WHAT.get(re.sub(r"_\d+$", "", name))
     of_what = over if of_what == WHOLE_RUN else of_what
+    of_what = f"{of_what} of the first mode" if shaken and of_what == "per cycle" else of_what
     unknown = UNKNOWN if one["error"] is None and one["value"] is not None else ""
     return f"{pair(name, one)}{unknown}{f', {of_what}' if of_what else ''}"
 

@@ -15,7 +15,7 @@ from ...response.loops import at_turns
 from ...response.measures import slip_noise, window_amplitudes, window_ends
 from ...response.outcome import steady_of
 from ...response.rows import measures_of, row_of
-from .solution import Solution, last_cycles
+from .solution import Solution, decaying, last_cycles
 
 
 class Reader:
@@ -47,7 +47,11 @@ class Reader:
             given = {"by": at_turns(self.model), "ledger": ledger} | given
         window, book = given.pop("window", run.window), given.pop("book", run.ledger)
         last = run.amplitudes[-min(self.numerics.window, len(run.amplitudes)):]
-        return measures_of(last_cycles(self.model, self.patch, window, last, book, drive=drive, **given))
+        found = measures_of(last_cycles(self.model, self.patch, window, last, book, drive=drive, **given))
+        if self.model.rig.kind == "free":
+            found["relative_displacement_amplitude"] = decaying(window, drive.period, found[
+                "relative_displacement_amplitude"])
+        return found
 
     def sticks(self, run) -> bool:
         """Whether no interface slips in the last cycles of a run by more than `held`, or the last digit."""

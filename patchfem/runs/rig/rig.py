@@ -209,7 +209,7 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
 
     def solve(variant):
         meant = replace(model, rig=model.rig.richer) if variant.numerics.richer else model
-        how = replace(variant.numerics, whole=False)
+        how = replace(variant.numerics, whole=model.rig.kind == "free")  # the curve of a decay is of the whole run
         near = _at_the_top(meant, found, lambda narrow: go(narrow, how, variant.patch))
         return near or go(meant, how, variant.patch)
 

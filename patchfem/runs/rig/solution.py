@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...core import Measure, Outcome, Response
+from ...response.decay_curve import last_swing
 from ...response.measures import half_swing, harmonic
 from ...response.reasons import SHARED
 from ...response.rows import Seen
@@ -68,11 +69,19 @@ def gauged(model, raw: Solution) -> Solution:
         felt = {"felt": one.output, "felt_rate": one.output_rate}
         moved.append(replace(one, output=one.modal @ gauge, output_rate=one.modal_rate @ gauge, extra=one.extra | felt))
     seen = half_swing(raw.window.time, moved[1].output, moved[1].output_rate)
+    seen = decaying(moved[1], model.rig.drive.period, seen) if model.rig.kind == "free" else seen
     share = max(1.0, seen / max(raw.values[name], 1e-300))
     errors = raw.errors and raw.errors | {name: share * raw.errors.get(name, 0.0)}
     values = {key: value for key, value in raw.values.items() if key != f"{name}_steady"}
     return replace(raw, values=values | {name: seen}, response=moved[0], window=moved[1], steady=(None, None),
                    errors=errors)
+
+
+def decaying(window, period: float, whole: float) -> float:
+    """Amplitude [m] of a release in its last whole cycle, by its window; that of the `whole` window where it holds no
+    whole cycle."""
+    found = last_swing(window.time, window.output, window.output_rate, period)
+    return whole if found is None else found
 
 
 def borne(model, patch) -> float | None:

@@ -279,7 +279,8 @@ def test_exact_the_span_of_the_first_measure_of_interest_with_its_largest_relati
     assert span(amplitude, {"relative_displacement_amplitude": both}, both) == \
         f"{start} ranges from 29.39 nm to 8.261 mm, with errors of at most 3 %."
     assert span(amplitude, {"relative_displacement_amplitude": np.array([False, True])}, both) == \
-        f"{start} in the only case that meets the tolerance is 8.261 mm, with errors of at most 0.001 %."
+        (f"{start} in the only case that meets the tolerance in this measure is 8.261 mm, with errors of at most "
+         "0.001 %.")
     amplitude["relative_displacement_amplitude"] = ([0.0, 1.963e-5], [1e-13, 2e-14], "m")
     assert span(amplitude, {"relative_displacement_amplitude": both}, both) == f"{start} ranges from 0 to 19.63 um."
     assert span({"loop_area": ([lost], [lost], "J"), "heat": ([1.0], [0.0], "J")}, {}, both[:1]) == ""
