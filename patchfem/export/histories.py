@@ -23,7 +23,7 @@ def contents(result: Result) -> netcdf.Contents:
     levels = _levels(extra["levels"]) if "levels" in extra else None
     rig = result.plan.model.rig
     names = list(rig.names) if found and rig is not None else []
-    data = netcdf.of_run(found, modal, fields, x, weight, strips, levels, names)
+    data = netcdf.of_run(found, modal, fields, x, weight, strips, levels, names, _coordinate(rig))
     if patch is not None:
         data = netcdf.with_surfaces(data, patch.gap)
     if "faces" in extra:
@@ -87,6 +87,15 @@ def _between(result: Result) -> dict:
             "normal_load": np.repeat(loads[:, None], r.time.size, axis=1),
             **{name: np.ascontiguousarray(r.extra[many].T) if many in r.extra else one[None, :]
                for name, (many, one) in columns.items()}, **second}
+
+
+def _coordinate(rig) -> str:
+    """What stands under modal_coordinate of a rig whose coordinates are no modes; "" where they are."""
+    if rig is None or rig.by_modes or rig.modes.shapes is None:
+        return ""
+    if any(str(name).startswith("mode ") for name in rig.modes.names):
+        return "displacement of a boundary coordinate, which `mode` names, or coordinate of a fixed-interface mode"
+    return "displacement of the mass or coordinate of the structure that `mode` names"
 
 
 def _levels(levels) -> dict:

@@ -92,12 +92,13 @@ def _variable(xr, dimensions, values, attributes=None):
 
 
 def of_run(histories: dict, modal, fields: dict, x, weight, strips: tuple | None = None,
-           levels: dict | None = None, interfaces: tuple = ()) -> Contents:
+           levels: dict | None = None, interfaces: tuple = (), coordinate: str = "") -> Contents:
     """Contents of a run.
 
     histories: name -> (k,), or (i, k) of the interfaces so named, with "time"; modal: (names, (k, n)) or None; fields:
     name -> (f, m), or (f, s, m) of strips, with "time", or {}; x, weight: (m,) or None; strips: (offsets (s,) [m],
-    pressure (s, m) [Pa]) of a patch in strips; levels: name -> (unit, (l,)) of a run in levels.
+    pressure (s, m) [Pa]) of a patch in strips; levels: name -> (unit, (l,)) of a run in levels; coordinate: what a
+    modal coordinate is, where it is none.
     """
     data, coords = {}, {}
     if histories:
@@ -110,7 +111,8 @@ def of_run(histories: dict, modal, fields: dict, x, weight, strips: tuple | None
                                                                             "base"})
     if modal is not None:
         coords["mode"] = ("mode", list(modal[0]), {"long_name": "mode"})
-        data["modal_coordinate"] = (("time", "mode"), modal[1], _attributes("modal_coordinate"))
+        data["modal_coordinate"] = (("time", "mode"), modal[1], _attributes("modal_coordinate") | (
+            {"long_name": coordinate} if coordinate else {}))
     if x is not None:
         coords["x"] = ("x", np.asarray(x), {"units": "m", "long_name": "position along the sliding direction"})
         data["weight"] = ("x", np.asarray(weight), _attributes("weight"))

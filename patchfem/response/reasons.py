@@ -18,6 +18,8 @@ HOLDS = "the whole interface sticks throughout the last cycles"
 UNBOUNDED = "no bounded motion exists at this drive"
 STILL = "the output does not move: the first harmonic of its acceleration is 0 within the accuracy of the computation"
 APERIODIC = "the drive is not a sine at the end of the run, so no period is known over which to take the mean slide"
+BEATS = ("under tones the mean slide over one cycle changes within their beat without any drift; this measure exists "
+         "only for a drive that is a sine at the end of the run")
 STOPS = ("the interface sticks where its slide is largest: during this stick the friction force takes different values "
          "at the same slide")
 UNCLOSED = ("the friction loop does not close: during the last cycles the stored energy changes by more than friction "
@@ -55,7 +57,7 @@ def undrifting(values, drive) -> dict:
     other spans differ without any drift. values: Measure by name; drive."""
     one = values.get("drift_per_cycle")
     return {} if one is None or sinusoidal(drive) else {
-        "drift_per_cycle": replace(one, value=None, error=None, reason=APERIODIC)}
+        "drift_per_cycle": replace(one, value=None, error=None, reason=BEATS if hasattr(drive, "beat") else APERIODIC)}
 
 
 def unbounded(values) -> dict:

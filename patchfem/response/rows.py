@@ -225,7 +225,8 @@ def _shaken(name: str, unit: str, floor: float, words: str, group: str = "motion
 FOURTH = 0.2, 0.0  # of the change by half the samples: what is read off cubics between them is of fourth order
 ROWS = (
     Row("relative_displacement_amplitude", "m", 1e-10, "half the peak-to-peak displacement at the output, relative to "
-                                                       "the base",
+                                                       "the base; of a release, that of the last whole cycle of the "
+                                                       "motion, from one turn to the next but one",
         lambda s: float(s.extremes[:, 1].max() - s.extremes[:, 0].min()) / 2 if s.own.swing is None else s.own.swing),
     Row("absolute_acceleration_peak", "m s-2", 1e-4, "largest acceleration at the output, base motion included",
         lambda s: acceleration_peak(s.window) if s.own.acceleration is None else s.own.acceleration),

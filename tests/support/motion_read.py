@@ -91,7 +91,8 @@ def measures(motion: Motion, stretches, period: float, cycles: float, window: in
     n, out = motion.n, {}
     high = w.top(w.out, lambda t, y: p.output @ y[:n])
     low = w.top(-w.out, lambda t, y: -p.output @ y[:n])
-    out["relative_displacement_amplitude"] = (high + low) / 2
+    last = _last_cycle(w, motion, period) if s["drive"] == "free" else None
+    out["relative_displacement_amplitude"] = (high + low) / 2 if last is None else last
     out["absolute_acceleration_peak"] = w.top(np.abs(w.a), lambda t, y: abs(w.acceleration(t, y)))
     sine = s["drive"] in ("sine", "force", "levels")
     for k, law in enumerate(motion.laws):
@@ -118,6 +119,41 @@ def measures(motion: Motion, stretches, period: float, cycles: float, window: in
     if sine:
         out |= _periodic(w, motion, period, window)
     return out
+
+
+def _last_cycle(w: Window, motion: Motion, period: float) -> float | None:
+    """Half the peak-to-peak output of the last whole cycle, None of less than one, by the definition: seen from the
+    end, a place is a turn once the output has gone back from it by more than a quarter of its range in the last
+    period."""
+    n, row, each, places = motion.n, motion.plant.output, NODES.size + 2, []
+    rate = w.y[:, n:2 * n] @ row
+    way = np.where(np.abs(rate) <= 1e-9 * np.abs(rate).max(), 0.0, np.sign(rate))
+    for a, b in pairwise(np.flatnonzero(way)):
+        if way[a] == way[b]:
+            continue
+        one, t = w.parts[a // each]
+        if b == a + 1 and b % each:
+            w.restore(one)
+            at = brentq(lambda x, one=one: row @ one.solution(x)[n:2 * n], t[a % each], t[b % each], xtol=1e-16)
+            places.append(float(row @ one.solution(at)[:n]))
+        else:  # an event at the turn
+            places.append(float(w.out[a:b + 1][np.argmin(np.abs(rate[a:b + 1]))]))
+    least, back = 0.25 * np.ptp(w.out[w.t >= w.end - period]), [float(w.out[-1]), *places[::-1]]
+    if not least > 0:
+        return least
+    top = next((k for k, one in enumerate(back) if abs(one - back[0]) > least), len(back))
+    turns = []
+    while top < len(back) and len(turns) < 3:
+        side = np.sign(back[top] - (turns[-1] if turns else back[0]))
+        for k in range(top, len(back)):
+            top = k if side * (back[k] - back[top]) > 0 else top
+            if side * (back[top] - back[k]) > least:
+                turns.append(back[top])
+                top = k
+                break
+        else:
+            break
+    return None if len(turns) < 3 else max(abs(turns[0] - turns[1]), abs(turns[1] - turns[2])) / 2
 
 
 def works(motion: Motion, stretches, begin: float, end: float) -> dict:

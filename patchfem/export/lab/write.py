@@ -2,11 +2,16 @@
 
 from pathlib import Path
 
+import numpy as np
+
 from ...core import PatchfemError
 from ...disk.whole import whole
+from ...scales import short
+from ...structure.drive_sizes import LEAST_EVEN, MOST_EVEN
 from . import ENDINGS, matlab, modes, table, universal
 from .series import histories_of
 
+FEW = 5  # rows from turn to turn, below which turning points stand alone
 DECAY = {"time": "s", "amplitude": "m", "frequency": "Hz", "frequency_error": "Hz", "damping": "1",
          "damping_error": "1"}  # columns of a decay, behind "decay_"
 
@@ -24,6 +29,7 @@ def export(folder: Path, out: Path) -> str:
     rows = found.columns[0].values.size
     told = f"{out}: {rows} rows of {', '.join(one.label for one in found.columns[:8])}" + \
         (f" and {len(found.columns) - 8} more" if len(found.columns) > 8 else "")
+    told += _thinned(found)
     with whole(out) as partial:
         if out.suffix.lower() == ".mat":
             matlab.write(partial, found)
@@ -33,6 +39,20 @@ def export(folder: Path, out: Path) -> str:
             universal.write(partial, found)
             told += f"; {len(found.loops())} loops"
     return told
+
+
+def _thinned(found) -> str:
+    """Words on the early rows of histories in which turning points stand alone, "" where there are none."""
+    place = next((one.values for one in found.columns if one.name.endswith("displacement")), None)
+    if place is None or found.time is None:
+        return ""
+    turns = np.flatnonzero(np.diff(np.sign(np.diff(place))) != 0) + 1
+    few = np.flatnonzero(np.diff(turns) < FEW)
+    if few.size < FEW or few.size < (few[-1] + 1) / 2:
+        return ""
+    return f"; before {short(float(found.time[turns[few[-1] + 1]]), 's', 3)} the rows are turning points, stops and " \
+           f"starts of slip alone: a release of up to {MOST_EVEN // LEAST_EVEN} cycles (drive.cycles) has even rows " \
+           "all along, any other run in its last cycles"
 
 
 def write_table(out: Path, values: dict, units: dict) -> None:

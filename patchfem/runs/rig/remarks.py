@@ -6,7 +6,7 @@ from ...core import Outcome
 from ...core import say as length
 from ...effects import has
 from ...response.outcome import changing_note, unsettled
-from ...scales import plain
+from ...scales import plain, short
 from ...structure.drive_sizes import slowest
 from ..patch import faces
 from ..results.notes import climbing_as_one, creeping, of_growth, unbounded_bonds, unripe, warming, work_check_warning
@@ -16,6 +16,7 @@ from .costs import dear_elements
 from .engines import ENGINES, PIECES
 from .solution import borne
 
+DECAYS = 1e-3  # of its amplitude, by which a motion was larger earlier in its window
 AT = 1e-9  # of a frequency, within which two are one
 AS_ONE_POINT = ("the shape of the patch does not affect the motion: with pieces that are rigid in shear, a constant "
                 "load and a pressure that moves with the upper piece, the patch moves exactly as one point under the "
@@ -97,7 +98,17 @@ def notes_of(run) -> list:
     if raw.levels and rig.onset[0] == "slip" and raw.held > 0:
         out.append(f"onset_level: slip counts only if its amplitude is above {length(raw.held)}, a thousandth of the "
                    "elastic range of the interface; a part of the interface may slip earlier")
-    return [*rig.kept, *out, *creeping_note(f), *run.rings.notes, *ended]
+    return [*rig.kept, *out, *creeping_note(f), *run.rings.notes, *_of_release(run), *ended]
+
+
+def _of_release(run) -> list:
+    """The sentence on over what the measures of a release are taken, in which the motion still decays."""
+    rig, window, main = run.model.rig, run.raw.window, run.measures["relative_displacement_amplitude"]
+    if rig.kind != "free" or main.value is None or np.ptp(window.output) / 2 <= main.value * (1 + DECAYS) + main.floor:
+        return []
+    span, begin = (short(float(one), "s", 3) for one in (window.time[-1] - window.time[0], window.time[0]))
+    return [f"relative_displacement_amplitude is that of the last whole cycle of the motion; peaks of acceleration and "
+            f"force, slip and stick are those of the last {span}, from {begin} on, in which the motion still decays"]
 
 
 def _across(run) -> list:

@@ -307,7 +307,9 @@ class Drive(Table):
     acceleration: key(quantity("acceleration", ge=0) | None, "amplitude of the base acceleration, zero to peak",
                       "with kind `base` and waveform `sine`, `step` or `sweep`, unless `displacement` is given") = None
     displacement: key(quantity("length", ge=0) | None, "displacement of the base, zero to peak, in place of "
-                      "`acceleration`; with kind 'free', the displacement at release",
+                      "`acceleration`; with kind 'free', the displacement of the output at release: a static force at "
+                      "the output holds the structure, the interfaces free of force, and lets go; in a rig of masses, "
+                      "and if `mass` is given, that mass or coordinate alone is displaced",
                       "with kind `free`, unless [structure.start] is given") = None
     levels: key(Annotated[tuple[quantity("acceleration", ge=0), ...], Field(min_length=1)] | None,
                 "amplitudes of the base acceleration, or of the force with kind 'force', applied one after the other; "

@@ -38,6 +38,8 @@ SIZES = {  # constant -> what it bounds and how it is written
     "friction.bonds.parameters.LONGEST": "estimated computing time of a run with a list of bonds [s]",
     "runs.rig.costs.LONGEST": "estimated time to compute a whole motion by the event-to-event method [s]",
     "dynamics.comparison.comparison.MOST_NUMBERS": "number of values that method duhamel, newmark or euler stores",
+    "structure.drive_sizes.MOST_EVEN": "number of samples at equal spacing that are stored of a whole release, at "
+                                       "least 20 per cycle; of a longer release turning points and the last cycles",
     "dynamics.resume.MOST_KEPT": "number of samples stored before the last cycles; longer records are thinned out"}
 LEFT_OUT = f"""\
 **Two dimensions.** The pieces are sections in plane strain, or in plane stress with `contact.plane`. A note of every
