@@ -183,17 +183,24 @@ def unsettled(raw, measures: dict, limits: tuple, drive, cycles: float) -> list:
     if raw.outcome is not Outcome.STUCK or not drive_sizes.sinusoidal(drive) or raw.extremes is None or not main.value:
         return []
     window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
-    return rings_on(np.asarray(raw.extremes), window, (main.value, main.floor), (tolerance, slowest * drive.period),
-                    cycles)
+    decay = slowest * drive.period
+    left = float(ringing_left(np.asarray(raw.extremes), window, decay))
+    return rings_on(left, (main.value, main.floor), (tolerance, decay), cycles)
 
 
-def rings_on(extremes, window: int, sizes: tuple, limits: tuple, cycles: float) -> list:
-    """`unsettled` of a motion that sticks, by the extremes (c, 2) [m] of its cycles; sizes: its amplitude and the floor
+def ringing_left(extremes, window: int, decay):
+    """How much of the amplitude of motions that stick [m] is free vibration, (...), by the extremes (..., c, 2) [m] of
+    their cycles: `left_over`, and the change of the last window at least; decay (...): of the slowest mode over a cycle
+    [1]."""
+    ends = windows_of(extremes, window)[0]
+    left = left_over(extremes, window, np.maximum(decay, 0.0) * window)
+    return np.maximum(left, np.abs(ends[..., -1] - ends[..., -2])) if ends.shape[-1] > 1 else left
+
+
+def rings_on(left: float, sizes: tuple, limits: tuple, cycles: float) -> list:
+    """`unsettled` of a motion that sticks, of which so much is `ringing_left` [m]; sizes: its amplitude and the floor
     of that [m]; limits: tolerance, and the decay of its slowest mode over a cycle [1]."""
     (amplitude, floor), (tolerance, decay) = sizes, limits
-    ends = windows_of(extremes, window)[0]
-    left = float(left_over(extremes, window, max(decay, 0.0) * window))
-    left = max(left, float(abs(ends[-1] - ends[-2]))) if ends.size > 1 else left
     if not left > tolerance * amplitude + floor:
         return []
     more = np.log(left / amplitude / tolerance) / decay if decay > 0 else np.inf

@@ -12,7 +12,7 @@ from ....effects import has
 from ....model.alike import Alike, columns_of
 from ....response.errors import total_error
 from ....response.measures import energy_balance
-from ....response.outcome import SMALL, goes_on, moves_on, rings_on, settled, steady_error
+from ....response.outcome import SMALL, goes_on, moves_on, ringing_left, rings_on, settled, steady_error
 from ....response.reasons import CYCLIC, STOPS, without_value
 from ....response.rows import TABLE, floor_of, larger_term
 from ....response.settling import CLASSES, STEADY, steady_amplitudes, windows_of
@@ -172,12 +172,13 @@ def _outcome(sizes: Sizes, runs: Runs, moves) -> tuple:
 
 def _rings(sizes: Sizes, runs: Runs, outcome, amplitude) -> dict:
     """What `rings_on` says of the cases that stick and ring on, by case."""
-    sizes = sizes._replace(**{name: np.broadcast_to(getattr(sizes, name), len(amplitude)) for name in (
-        "tolerance", "decay", "period")})
-    floor = np.broadcast_to(floor_of(MAIN, sizes.moved), len(amplitude))
-    found = {case: rings_on(runs.extremes[case], runs.window, (float(amplitude[case]), float(floor[case])),
-                            (float(sizes.tolerance[case]), float(sizes.decay[case] * sizes.period[case])), runs.cycles)
-             for case, one in enumerate(outcome) if one is Outcome.STUCK and amplitude[case]}
+    n, cases = len(amplitude), np.flatnonzero([one is Outcome.STUCK for one in outcome] & (amplitude != 0))
+    tolerance, decay, floor = (np.broadcast_to(one, n)[cases] for one in (
+        sizes.tolerance, sizes.decay * sizes.period, floor_of(MAIN, sizes.moved)))
+    left = ringing_left(runs.extremes[cases], runs.window, decay)
+    columns = zip(cases.tolist(), left.tolist(), amplitude[cases].tolist(), floor.tolist(), tolerance.tolist(),
+                  decay.tolist())
+    found = {case: rings_on(one, (size, least), limits, runs.cycles) for case, one, size, least, *limits in columns}
     return {case: one for case, one in found.items() if one}
 
 
