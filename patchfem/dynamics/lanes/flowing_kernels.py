@@ -35,6 +35,7 @@ from .names_kernels import (
     W,
     X,
 )
+from .rigid_kernels import PROVEN as PROVEN
 from .rigid_kernels import crossing, highest
 from .rigid_kernels import foretell as foretell
 from .rigid_kernels import settles as settles

@@ -317,8 +317,15 @@ def turn_over(i, room, history, case, k, share):
     history[case, k, 0], history[case, k, 1] = room[LOW * LANES + i], room[HIGH * LANES + i]
     history[case, k, 2] = share * (room[COS * LANES + i] + 0.5 * (begun - x))
     history[case, k, 3] = share * room[SIN * LANES + i]
-    room[HIGH * LANES + i] = room[LOW * LANES + i] = x
     room[COS * LANES + i] = room[SIN * LANES + i] = 0.0
+    open_at(i, room)
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def open_at(i, room):
+    """Note where a cycle of a lane begins."""
+    x = room[X * LANES + i]
+    room[HIGH * LANES + i] = room[LOW * LANES + i] = x
     room[WAS_X * LANES + i], room[WAS_V * LANES + i] = x, room[V * LANES + i]
     room[WAS_PLACE * LANES + i] = room[PLACE * LANES + i]
 
@@ -330,6 +337,16 @@ def repeats(i, room):
     return abs(room[X * LANES + i] - room[WAS_X * LANES + i]) <= size \
         and abs(room[V * LANES + i] - room[WAS_V * LANES + i]) <= size \
         and abs(room[PLACE * LANES + i] - room[WAS_PLACE * LANES + i]) <= size
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def proven(i, room):
+    """Whether the cycle after a leap ends where the map of the leap foretold."""
+    size = law.PROVEN * (room[HIGH * LANES + i] - room[LOW * LANES + i])
+    same = True
+    for m in range(len(STATES) - 1):
+        same = same and abs(room[STATES[m] * LANES + i] - room[(PAST + m) * LANES + i]) <= size
+    return same
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
@@ -369,8 +386,8 @@ def map_of(i, room, history, case, k, size):
 
     Two numbers move on by a linear map near a motion that repeats. So a sequence of any number of theirs follows the
     equation of its eigenvalues, which the slide and the speed give; what place and extremes miss of it tells what is
-    not linear, and falls as the square of what is left, unless an event moves across the end of the cycle. A law whose
-    memory would keep that (`settles`) does not leap.
+    not linear, and falls as the square of what is left, unless an event moves across the end of the cycle. Of a law
+    whose memory would keep that (`PROVEN`) a leap counts where the next cycle repeats.
     """
     (x, x1, x2), (v, v1, v2), (p, p1, p2) = changes(X, 0, room, i), changes(V, 1, room, i), changes(PLACE, 2, room, i)
     way = room[WAY * LANES + i]
@@ -405,7 +422,7 @@ def map_of(i, room, history, case, k, size):
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
 def leap(i, room, history, case, k, until):
     """Cycles done, after k of them, of a lane whose motion goes on by the map of its cycle up to the cycle `until`, or
-    to one that repeats; k where it does not."""
+    to one that repeats, with the end of the next one foretold; k where it does not."""
     size = history[case, k - 1, 1] - history[case, k - 1, 0]
     if k <= ENDS:
         return k
@@ -428,13 +445,16 @@ def leap(i, room, history, case, k, until):
     for m in range(len(SUMS)):
         last, one, two = changes(SUMS[m], len(STATES) + m, room, i)
         room[SUMS[m] * LANES + i] += n * last + e * (last - one) + f * (one - two)
+    p, q = a * p + b * p1, a * q + b * q1  # of the cycle after it, whose end is noted where the last one was
     for m in range(len(STATES) - 1):
         last, one, _ = changes(STATES[m], m, room, i)
         room[STATES[m] * LANES + i] += c * last + d * one
+        room[(PAST + m) * LANES + i] = room[STATES[m] * LANES + i] + p * last + q * one
+    room[(PAST + len(STATES)) * LANES + i] = room[SUMS[0] * LANES + i]
     for m in range(law.KEPT):
         last, one, _ = changes(OWN + m, len(STATES) + len(SUMS) + m, room, i)
         room[(OWN + m) * LANES + i] += c * last + d * one
-    room[HIGH * LANES + i] = room[LOW * LANES + i] = room[X * LANES + i]
+    open_at(i, room)
     law.resume(room, i)
     return k + n
 
@@ -442,14 +462,15 @@ def leap(i, room, history, case, k, until):
 @njit(error_model="numpy", cache=True, nogil=True, fastmath=FAST, **LEAN)
 def march(cases, order, motion, table, until, history, ended, room, marked):
     """March cases up to the end of the cycle `until`, or of one that repeats; a case leaps on once the map of its cycle
-    is known. A lane that is done takes the next case, or that of the last lane.
+    is known, and comes back where a law asks for a proof and the next cycle gives none. A lane that is done takes the
+    next case, or that of the last lane.
 
     cases (n, NUMBERS and those of its table); order (m,): numbers of those that march; motion (n, STATE and more): at
     their begin, and end; table (3, s + 1): sine and cosine at the steps of a cycle, and the step; history (n, c, 4):
     least and largest slide of a cycle [m], and its phasor [m]; ended (n,): cycles done; room (numbers of a lane times
     LANES,), marked (LANES + 1,): of the lanes. Cost: 2 to 5 ns a step of a case.
     """
-    share, given = 2 / (table.shape[1] - 1), min(LANES, len(order))
+    share, given, proof = 2 / (table.shape[1] - 1), min(LANES, len(order)), 1 if law.PROVEN > 0.0 else 0
     for i in range(LANES):
         fetch(order[min(i, given - 1)], i, cases, motion, room)
     busy = given
@@ -458,12 +479,27 @@ def march(cases, order, motion, table, until, history, ended, room, marked):
         i = 0
         while i < busy:
             case, k = int(room[CASE * LANES + i]), int(room[CYCLE * LANES + i])
-            same = repeats(i, room)
+            same = proven(i, room) if ended[case] > 0 else repeats(i, room)
             turn_over(i, room, history, case, k, share)
-            done = leap(i, room, history, case, k + 1, until) if k + 1 < until and not same else k + 1
+            done, on = k + 1, k + 1 < until and not same
+            if ended[case] > 0:  # the cycle that proves a leap
+                on = False
+                if not (same and law.settles(room, i)):
+                    fetch(case, i, cases, motion, room)
+                    room[CYCLE * LANES + i], ended[case] = ended[case], -1
+                    i += 1
+                    continue
+            elif on and ended[case] == 0 and k + 1 + proof < until:
+                if proof:
+                    bring(case, i, room, motion)
+                done = leap(i, room, history, case, k + 1, until - proof)
+                on = done == k + 1
+                if proof and not on:
+                    ended[case], on = k + 1, True
             room[CYCLE * LANES + i] = done
-            if done < until and not same and done == k + 1:
-                remember(i, room)
+            if on:
+                if ended[case] <= 0:
+                    remember(i, room)
                 i += 1
                 continue
             ended[case] = done

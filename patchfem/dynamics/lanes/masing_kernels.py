@@ -38,9 +38,9 @@ from .names_kernels import (
     W,
     X,
 )
-from .rigid_kernels import folds, furthest, sticking
+from .rigid_kernels import PROVEN, folds, furthest, sticking
 
-__all__ = ["KEPT", "RESTS", "TURNS_HELD", "advance", "ahead", "at_turn", "begin", "felt", "folds", "foretell",
+__all__ = ["KEPT", "PROVEN", "RESTS", "TURNS_HELD", "advance", "ahead", "at_turn", "begin", "felt", "folds", "foretell",
            "furthest", "held", "path", "resume", "rise", "settles", "slid", "sticking"]
 
 RESTS = False  # it never holds

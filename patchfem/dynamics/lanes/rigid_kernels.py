@@ -10,6 +10,7 @@ from .names_kernels import A11, A12, A21, A22, CV, CX, GK, GS, LANES, RV, RX, SV
 
 RESTS = True  # nothing moves in a stick
 TURNS_HELD = False  # an event may leave a stick as it is
+PROVEN = 0.0  # of its range: by how much the end of a cycle after a leap may miss what this foretold; 0: no proof
 KEPT = 0  # of the first numbers of its own state, those that move on as a motion settles
 
 

@@ -23,11 +23,14 @@ from .names_kernels import (
     GK,
     LANES,
     LENGTH,
+    PAST,
+    PATH,
     PLACE,
     QV,
     QX,
     RV,
     RX,
+    STATES,
     SV,
     SX,
     TV,
@@ -55,18 +58,21 @@ from .rigid_kernels import (
     sticking,
 )
 
-__all__ = ["KEPT", "RESTS", "TURNS_HELD", "advance", "ahead", "at_turn", "begin", "felt", "folds", "foretell",
+__all__ = ["KEPT", "PROVEN", "RESTS", "TURNS_HELD", "advance", "ahead", "at_turn", "begin", "felt", "folds", "foretell",
            "furthest", "held", "path", "resume", "rise", "settles", "slid", "sticking"]
-
-
-@njit(error_model="numpy", forceinline=True, **LEAN)
-def settles(room, i):
-    """Never: while a motion settles, a yield or a reversal may move across the end of a cycle, where the stretch is no
-    longer what the map of the cycle before gives, and the stretch is kept for good."""
-    return False
 
 RESTS = False  # a stick moves its spring
 TURNS_HELD = False
+PROVEN = 1e-7  # as of `rigid_kernels`
+LEAST = 1e-3  # of the length over which it yields: slip of a cycle that sets the stretch anew
+
+
+@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+def settles(room, i):
+    """Whether the last cycle slips, so that no earlier one tells its stretch: while a motion settles, a yield or a
+    reversal may move across the end of a cycle, where the stretch is no longer what the map of the cycle before gives,
+    and without a slip it is kept for good."""
+    return room[PATH * LANES + i] - room[(PAST + len(STATES)) * LANES + i] > LEAST * room[LENGTH * LANES + i]
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
