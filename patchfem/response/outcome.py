@@ -117,10 +117,14 @@ def settled(amplitudes, extremes, window: int, steady, limits: tuple, bounded=Fa
     amplitudes (n, w) [m] of successive windows of `window` cycles; extremes (n, c, 2) [m] of the output per cycle, None
     where they are not known; steady: (values, errors), (n,) [m], of `steady_amplitudes`, NaN for none; limits:
     (tolerance, floor [m], decay of the slowest mode over a window [1]), numbers or (n,); bounded: as in a Solution.
+    A motion is steady only if what it is known to settle to, and what free motion is left in it, are both within the
+    tolerance: near a crest of its amplitude it hardly changes from window to window, however far it has still to go.
     """
     (tolerance, floor, decay), (value, error) = limits, steady
     found = classes(amplitudes, tolerance, floor)
     found = np.where((found == GROWS) & bounded, 0, found)
+    away = np.abs(np.where(np.isnan(value), amplitudes[:, -1], value) - amplitudes[:, -1])
+    found = np.where((found == STEADY) & (away > tolerance * amplitudes[:, -1] + floor), 0, found)
     if extremes is not None:
         left = left_over(extremes, window, decay)
         found = np.where((found != GROWS) & (left > tolerance * amplitudes[:, -1] + floor), 0, found)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..core import Measure
+from ..core import Measure, Outcome
 from ..scales import plain
 from ..structure.drive_sizes import sinusoidal, whole
 from .measures import lateral
@@ -22,6 +22,8 @@ BEATS = ("under tones the mean slide over one cycle changes within their beat wi
          "only for a drive that is a sine at the end of the run")
 STOPS = ("the interface sticks where its slide is largest: during this stick the friction force takes different values "
          "at the same slide")
+UNSEEN = "the motion changes in such a way that the run does not show what it settles to: a longer run does"
+SETTLES = "relative_displacement_amplitude_steady"
 UNCLOSED = ("the friction loop does not close: during the last cycles the stored energy changes by more than friction "
             "dissipates; the energy dissipated in the whole run is given by energy_dissipated")
 
@@ -50,6 +52,13 @@ def stopping(values) -> dict:
     holds = one is not None and stuck is not None and stuck.value is not None and \
         stuck.value > TABLE["stick_fraction"].floor + (stuck.error or 0.0)
     return {"secant_stiffness": replace(one, value=None, error=None, reason=STOPS)} if holds else {}
+
+
+def unsettled(values, outcome: Outcome, drive) -> dict:
+    """The steady amplitude without a value, by name, of a motion under a sine that has not settled and does not show
+    what to. values: by name, those that the run has; drive."""
+    return {SETTLES: Measure(None, TABLE[SETTLES].unit, None, TABLE[SETTLES].floor, reason=UNSEEN)} \
+        if outcome is Outcome.TRANSIENT and sinusoidal(drive) and SETTLES not in values else {}
 
 
 def undrifting(values, drive) -> dict:

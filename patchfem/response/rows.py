@@ -230,8 +230,8 @@ ROWS = (
         lambda s: float(s.extremes[:, 1].max() - s.extremes[:, 0].min()) / 2 if s.own.swing is None else s.own.swing),
     Row("absolute_acceleration_peak", "m s-2", 1e-4, "largest acceleration at the output, base motion included",
         lambda s: acceleration_peak(s.window) if s.own.acceleration is None else s.own.acceleration),
-    Row("friction_force_peak", "N", 1e-6, "largest friction force on the whole interface; if the interface slides in a "
-                                     "plane, the largest resultant of both directions",
+    Row("friction_force_peak", "N", 1e-6, "largest friction force on the whole interface, of a bench during the whole "
+        "run; if the interface slides in a plane, the largest resultant of both directions",
         lambda s: None if s.load is None else s.own.loops[0].force if s.own.loops else
         resultant_peak(s.window.force, s.lateral("forces")), group="friction"),
     Row("energy_balance", "1", 1e-8,
@@ -311,13 +311,14 @@ ROWS = (
     Row("open_fraction", "1", 1e-3, "fraction of the time of the last cycles in which the surfaces are not in contact",
         lambda s: s.of_load(lambda load: np.mean(load <= 0)), 4.0, group="friction", term=("1", lambda _: 1.0)),
     Row("relative_displacement_amplitude_steady", "m", 1e-10,
-        "steady amplitude; extrapolated if the motion has not settled or may still change by more than 0.02 tolerance "
-        "× amplitude"),
+        "steady amplitude under a sine, extrapolated if the motion has not settled or may still change by more than "
+        "0.02 tolerance × amplitude; absent if it may not, null if the motion has not settled and does not show what "
+        "to"),
     Row("peak_frequency", "Hz", 0.0, "drive frequency, within the swept range, at which the curve of steady amplitudes "
         "is largest; a resonance unless it is an end of that range"),
     Row("friction_ratio_end", "1", 1e-9, "friction force divided by normal load, both at the end of the slide",
         group="friction"),
-    Row("friction_ratio_peak", "1", 1e-9, "largest value of friction force divided by normal load during the run",
+    Row("friction_ratio_peak", "1", 1e-9, "largest value of friction force divided by normal load during the whole run",
         group="friction"),
     Row("flutter_amplitude", "m", 1e-10,
         "amplitude (half peak-to-peak at the output) of the unstable limit cycle without a drive, in which friction "

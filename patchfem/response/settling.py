@@ -9,6 +9,7 @@ CLASSES = Outcome.TRANSIENT, Outcome.STEADY, Outcome.GROWS
 STEADY, GROWS = 1, 2  # their places
 LEAST = 3  # windows by which free motion is told
 MOVES = 1e-3  # of the largest speed in a run, above which an interface slips
+TURNS = 0.02  # sine of the angle between differences of phasors, below which they lie along one line
 TELLS = 0.1  # share that the slowest mode must have lost over a third of the run for a beat that stays to be told
 
 
@@ -68,10 +69,12 @@ def steady_amplitudes(a, p) -> tuple:
     """Steady amplitudes by extrapolation, and their errors, (n,) [m] each; NaN where no bounded tail can be seen.
 
     amplitudes, phasors: (n, w) of the last cycle of successive windows; the phasor is the drive-frequency part of the
-    motion. What is left of a decaying free motion turns and shrinks by one complex factor per window, so the phasors
-    are extrapolated (Aitken). The waveform, amplitude over |phasor|, settles with the size of that factor. The error is
-    six times the spread of the last estimates plus twice what the waveform still changes; where it is as large as what
-    was added there is no estimate.
+    motion. What is left of the free motion of a linear rig turns and shrinks by one complex factor per window, so the
+    phasors are extrapolated (Aitken). Friction resists a change of the amplitude otherwise than one of the phase, so
+    that what is left moves by a map of the plane (`plane_tails`): its end is taken where it is known, and how far the
+    two lie apart is part of the error. The waveform, amplitude over |phasor|, settles with the size of the factor. The
+    error is besides the spread of the last estimates, six times of Aitken's and twice of the plane's, plus twice what
+    the waveform still changes; where it is as large as what was added there is no estimate.
     """
     count, w = a.shape
     if w < 5:
@@ -83,11 +86,32 @@ def steady_amplitudes(a, p) -> tuple:
     before, change = np.abs(p[:, -2] - p[:, -3]), np.abs(p[:, -1] - p[:, -2])
     shrink = np.minimum(np.divide(change, before, out=1.0 * (change > 0), where=before > 0), 0.9995)
     settle = (shape[:, -1] - shape[:, -2]) * shrink / (1 - shrink)
-    value = ends[:, 0] * (shape[:, -1] + settle)
-    error = 6 * (ends.max(axis=1) - ends.min(axis=1)) * shape[:, -1] + 2 * np.abs(settle) * ends[:, 0] + 1e-9 * value
+    plane = np.stack([np.abs(p[:, w - 1 - k] + plane_tails(p[:, w - 4 - k:w - k])) for k in range(2)], axis=1)
+    turns = ~np.isnan(plane).any(axis=1)
+    end = np.where(turns, plane[:, 0], ends[:, 0])
+    spread = np.where(turns, 2 * np.abs(plane[:, 0] - plane[:, 1]) + np.abs(plane[:, 0] - ends[:, 0]),
+                      6 * (ends.max(axis=1) - ends.min(axis=1)))
+    value = end * (shape[:, -1] + settle)
+    error = spread * shape[:, -1] + 2 * np.abs(settle) * end + 1e-9 * value
     added = np.abs(value - a[:, -1])
     known = moves & (error < np.maximum(added, 1e-6 * value)) & (value < 20 * a[:, -1])
     return np.where(known, value, np.nan), np.where(known, error, np.nan)
+
+
+def plane_tails(p) -> np.ndarray:
+    """What points of the complex plane (n, 4) still add to the last if one linear map of the plane takes each of their
+    differences to the next, (n,); NaN where the differences all lie along one line or the map does not shrink them.
+
+    d3 = t d2 - q d1 by Cayley and Hamilton, with the trace t and the determinant q of the map; the sum of all that
+    follow is ((t - q) d3 - q d2)/(1 - t + q).
+    """
+    d1, d2, d3 = np.diff(np.asarray(p, complex), axis=1).T
+    area = (d1.conj() * d2).imag
+    known = np.abs(area) > TURNS * np.abs(d1) * np.abs(d2)
+    area = np.where(known, area, 1.0)
+    t, q = (d1.conj() * d3).imag / area, (d2.conj() * d3).imag / area
+    known &= (np.abs(q) < 1) & (np.abs(t) < 1 + q)  # both its multipliers are within the unit circle
+    return np.where(known, ((t - q) * d3 - q * d2) / np.where(known, 1 - t + q, 1.0), np.nan)
 
 
 def _one(found: tuple) -> tuple:
@@ -113,8 +137,9 @@ def left_over(extremes, window: int, decay=0.0):
     A free motion beside the drive beats. Where the beat is short, cycles of one window differ: what the window's
     amplitude is above the mean of its cycles goes with the beat, unless it stays while even the slowest mode decays
     (a motion that repeats after several cycles). Where the beat is long, windows differ: their distance from the last
-    one in the last third of the run, less what the third before shows that a third takes off. extremes: (..., c, 2) [m]
-    per cycle; decay (...): of the slowest mode over a window [1].
+    one in the last third of the run, less what the third before shows that a third takes off, but no more than the
+    slowest mode surely loses in it: a ring-up ends fast and leaves what goes slowly. extremes: (..., c, 2) [m] per
+    cycle; decay (...): of the slowest mode over a window [1].
     """
     amplitude, mean = windows_of(extremes, window)
     count = amplitude.shape[-1]
@@ -128,6 +153,7 @@ def left_over(extremes, window: int, decay=0.0):
     away = np.abs(amplitude[..., :-1] - amplitude[..., -1:])
     far, near = away[..., -2 * third:-third].max(axis=-1, initial=0.0), away[..., -third:].max(axis=-1)
     share = np.minimum(1.0, np.divide(near, far, out=np.ones_like(near), where=far > 0))
+    share = np.maximum(share, 1 - lost)
     return (near * share + np.where(stays, 0.0, spread[..., -1]))[()]
 
 

@@ -9,6 +9,7 @@ import patchfem as pf
 from patchfem.core import Outcome
 from patchfem.response import settling
 from patchfem.response.outcome import UNSETTLED, settled, steady_error
+from patchfem.response.reasons import UNSEEN
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
@@ -43,6 +44,25 @@ def test_always_no_estimate_without_a_shrinking_change():
     a = 1 + 0.1 * np.arange(8)
     assert settling.steady_amplitude(a, a) == (None, None)
     assert settling.steady_amplitude(a[:3], a[:3]) == (None, None)
+
+
+@pytest.mark.parametrize("map_", [[[0.7, 0.3], [-0.4, 0.6]], [[0.9, 0.2], [0.0, 0.5]]])
+def test_exact_a_map_of_the_plane_is_summed(map_):
+    """Against the sum of its Neumann series, (1 - M)^-1 M d; one turns, one shrinks along two lines."""
+    map_, end, away = np.array(map_), np.array([2.0, 1.0]), [np.array([0.3, -0.5])]
+    for _ in range(6):
+        away.append(map_ @ away[-1])
+    p = (np.array(away) + end) @ [1, 1j]
+    difference = away[-1] - away[-2]
+    rest = np.linalg.solve(np.eye(2) - map_, map_ @ difference) @ [1, 1j]
+    assert settling.plane_tails(p[None, -4:])[0] == pytest.approx(rest, rel=1e-9)
+    value, error = settling.steady_amplitude(np.abs(p), p)
+    assert abs(value - np.hypot(*end)) < error + 1e-12
+
+
+def test_refuses_a_map_of_the_plane_that_does_not_shrink_or_lies_along_a_line():
+    turning, line = (1.02 * np.exp(0.4j))**np.arange(4), (1 + 0.3j) * 0.7**np.arange(4)
+    assert np.isnan(settling.plane_tails(np.array([turning, line]))).all()
 
 
 @pytest.mark.parametrize("growth", [1 + 0.1 * np.arange(6), 1e-6 * (7 + np.arange(9)), 1.05**np.arange(6)])
@@ -131,6 +151,24 @@ def test_exact_a_long_beat_is_seen_in_all_windows(beat):
     assert settling.left_over(extremes, 10) > 0.04
 
 
+def test_exact_a_crest_at_the_end_of_a_ring_up_is_not_taken_for_its_end():
+    """1 - exp(-0.15 c) (cos 0.12 c + sin 0.12 c) after 25 cycles: from its last window to that before 0.2 %, to the
+    end of the motion 2 %; the thirds before show the fast start alone."""
+    cycles = np.arange(1, 26)
+    high = 1 - np.exp(-0.15 * cycles) * (np.cos(0.12 * cycles) + np.sin(0.12 * cycles))
+    extremes = np.column_stack([-high, high])
+    amplitude, left = settling.windows_of(extremes, 2)[0], settling.left_over(extremes, 2, 0.3)
+    assert settling.classify(amplitude, 1e-2) is Outcome.STEADY and left > abs(amplitude[-1] - 1) / 2 > 9e-3
+    nothing = (np.full(1, np.nan),) * 2
+    assert settled(amplitude[None], extremes[None], 2, nothing, (1e-2, 0.0, 0.3))[0].tolist() == [0]
+
+
+def test_exact_what_is_known_to_lie_elsewhere_is_not_steady():
+    for apart, number in ((0.9e-3, 1), (1.1e-3, 0)):
+        known = np.full(1, 1 + apart), np.full(1, 1e-9)
+        assert settled(np.ones((1, 6)), None, 1, known, (1e-3, 0.0, 0.0))[0].tolist() == [number]
+
+
 def test_exact_a_motion_of_three_cycles_is_steady_where_its_modes_have_died_out():
     high = 1 + 0.2 * np.resize([1.0, -0.5, -0.5], 120)
     extremes = np.column_stack([-high, high])
@@ -208,6 +246,34 @@ def test_exact_the_size_of_a_linear_drive_does_not_settle_it(size, cycles, outco
         "damping = 0.0", "damping = 0.003")
     text += f'[drive]\nkind = "base"\nfrequency = "50.8 Hz"\nacceleration = "{size}"\ncycles = {cycles}\n'
     assert run(plan(loads(text)), estimate=False).outcome == outcome
+
+
+CREST = {"normal": {"load": 490.8385468627066},
+         "friction": {"law": "lugre", "static": 0.20225473066502245, "kinetic": 0.16180378453201796,
+                      "stiffness": 6058917.979262763, "stribeck_speed": 0.011162824693624403,
+                      "micro_damping": 91.01153908108391},
+         "structure": {"moving_mass": 3.417730803691922, "mode": [
+             {"name": "a", "frequency": 163.46704777528493, "damping": 0.024868620207150423, "slide": 1.0}]},
+         "drive": {"kind": "base", "frequency": 168.28036136786184, "acceleration": 57.32633753154075}}
+
+
+@pytest.mark.parametrize("cycles", [24, 25, 26, 27])
+def test_exact_a_rig_at_the_crest_of_its_ring_up_is_not_steady(cycles):
+    """Called steady at 445.05 +- 0.24 um after 25 cycles, tolerance 1e-3; the harmonic balance gives 443.852 um."""
+    name, scene = "relative_displacement_amplitude", CREST | {"drive": CREST["drive"] | {"cycles": float(cycles)}}
+    truth = pf.run(scene, **{"accuracy.method": "harmonic"}).measures[name]
+    done = pf.run(scene)
+    steady = done.measures[f"{name}_steady"]
+    assert truth.value == pytest.approx(443.852e-6, rel=2e-6) and done.outcome == "transient"
+    assert abs(steady.value - truth.value) <= steady.error + truth.error and steady.error < 0.01 * truth.value
+
+
+def test_exact_a_transient_that_shows_no_end_has_the_reason_in_place_of_its_steady_amplitude():
+    done = pf.run(CREST | {"drive": CREST["drive"] | {"cycles": 8.0}})
+    steady = done.measures["relative_displacement_amplitude_steady"]
+    assert done.outcome == "transient" and steady.value is None and steady.reason == UNSEEN
+    later = pf.run(CREST | {"drive": CREST["drive"] | {"cycles": 200.0}})
+    assert later.outcome == "steady" and "relative_displacement_amplitude_steady" not in later.measures
 
 
 BELT = """\

@@ -121,8 +121,8 @@ def _reasoned(run: Coupled) -> Coupled:
     rigid = run.rubs and has(run.model.friction.law, "set-valued") and not (run.model.soft or rig.soft)
     stops = reasons.stopping(found) if rigid else {}
     return replace(run, measures=found | stops | reasons.unclosed(found, window, run.drive) | reasons.undrifting(
-        found, run.drive) | reasons.without_value(found, window, run.drive, run.rubs,
-                                                  rig.beside_first(window.modal)))
+        found, run.drive) | reasons.unsettled(found, run.outcome, run.drive) | reasons.without_value(
+            found, window, run.drive, run.rubs, rig.beside_first(window.modal)))
 
 
 def _decayed(run: Coupled, coarse) -> tuple:

@@ -13,7 +13,7 @@ from ....model.alike import Alike, columns_of
 from ....response.errors import total_error
 from ....response.measures import energy_balance
 from ....response.outcome import SMALL, goes_on, moves_on, ringing_left, rings_on, settled, steady_error
-from ....response.reasons import CYCLIC, STOPS, without_value
+from ....response.reasons import CYCLIC, SETTLES, STOPS, UNSEEN, without_value
 from ....response.rows import TABLE, floor_of, larger_term
 from ....response.settling import CLASSES, STEADY, steady_amplitudes, windows_of
 from ....structure.drive_sizes import largest, slowest
@@ -108,8 +108,8 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
     with np.errstate(invalid="ignore"):
         on = goes_on(steady, error, values[MAIN], tolerance) & np.array([one is Outcome.STEADY for one in outcome])
     still = (on | np.array([one is Outcome.TRANSIENT for one in outcome])) & ~np.isnan(steady) & ~runs.stuck
-    values["relative_displacement_amplitude_steady"] = np.where(still, steady, np.nan)
-    errors["relative_displacement_amplitude_steady"] = steady_error(steady, error, values[MAIN], errors[MAIN])
+    values[SETTLES] = np.where(still, steady, np.nan)
+    errors[SETTLES] = steady_error(steady, error, values[MAIN], errors[MAIN])
     resolved, wide_of = np.ones(n, bool), np.zeros(n, bool)
     for name, value in values.items():
         there = ~np.isnan(value)
@@ -127,6 +127,11 @@ def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = N
         found.errors[name] = np.where(there & ~grows, errors[name], np.nan)
         found.floors[name] = np.where(there, floor, np.nan)
     _reasons(models, sizes, runs, found)
+    unseen = np.isnan(values[SETTLES]) & np.array([one is Outcome.TRANSIENT for one in outcome])
+    if unseen.any():
+        found.measure(SETTLES, TABLE[SETTLES].unit)
+        found.floors[SETTLES][unseen] = TABLE[SETTLES].floor
+        found.reasons.setdefault(SETTLES, {}).update(dict.fromkeys(np.flatnonzero(unseen).tolist(), UNSEEN))
     if has(models[0].friction.law, "set-valued") and not (models[0].soft or models[0].rig.soft):
         _stops(found)
     found.numerics.update({case: numerics | runs.chosen[case] for case in range(n)} if runs.chosen
