@@ -22,7 +22,7 @@ Read the package in this order. A module imports its own entry of the list and t
 18. `structure`   the modes of the rig and what drives it
 19. `dynamics`    the engines: exact events, march in time, harmonic balance, comparison methods
 20. `model`       what a scene means: pieces, gap, law, slide, modes, drive, numerics
-21. `response`    measures of a run, outcome, events, levels, ringing
+21. `response`    measures of a run: outcome, events, levels and ringing
 22. `wear`        worn depth over many cycles
 23. `runs`        patch, bench and rig: where the pillars meet
 24. `identify`    values from measurements with intervals

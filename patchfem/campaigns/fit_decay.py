@@ -222,7 +222,7 @@ def _widened(found: Fit, box, richer, moved, own, names) -> tuple:
     ends = found.intervals + by[:, None] * [-1, 1]
     shares = ", ".join(f"{name} by {_share_of(part, value)}" for name, part, value in zip(names, by, found.values))
     return replace(found, intervals=frozen_array(np.clip(ends, box.low[:, None], box.high[:, None]))), (
-        "the intervals contain the error of the modes left out of the structure, found with more modes: it changes "
+        "the intervals contain the error of the modes left out of the structure; a computation with more modes changes "
         f"frequencies by up to {100 * np.nanmax(np.abs(change[0] / own[0])):.2g} % and damping ratios by up to "
         f"{100 * np.nanmax(np.abs(change[1] / own[1])):.2g} %, and moves {shares}",)
 

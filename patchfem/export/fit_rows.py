@@ -168,7 +168,7 @@ def lines_of(answer: dict) -> list:
     good = [one["training"] for one in answer["starts"] if one["training"] is not None]
     alike = sum(rms <= min(good) * 1.01 for rms in good)
     out = [f"{answer['outcome']}: {answer['readings']} readings of {answer['measured']} fitted, {answer['held']} held "
-           f"out; {alike} of {len(answer['starts'])} starts end within 1 % of the best training score"]
+           f"out; {alike} of {len(answer['starts'])} starts led to within 1 % of the best training score"]
     for key, one in answer["values"].items():
         out.append(line_of(f"{key:<28}", one))
     out.append(f"  {'rms of ln(computed/measured)':<36} {'acceleration':>12} {'displacement':>12} {'all':>8}")

@@ -343,8 +343,8 @@ ROWS = (
         "drive level at the onset of slip, found by bisection between two levels; the key `drive.onset` defines what "
         "counts as the onset; for a force drive the level is in N", group="friction"),
     Row("jump_level", "m s-2", 0.0,
-        "drive level just after the largest jump of the amplitude; a jump is a step between two levels at which the "
-        "ratio of the amplitudes is at least 1.5 times the ratio of the levels; for a force drive the level is in N"),
+        "drive level just after the largest jump of the amplitude; a step from one level to the next counts as a jump "
+        "if the amplitude changes by at least 1.5 times the factor of the level; for a force drive the level is in N"),
     Row("level_hysteresis", "m", 0.0,
         "hysteresis: largest difference between the amplitudes reached at the same level with rising and with falling "
         "levels"),

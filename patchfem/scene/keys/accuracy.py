@@ -19,7 +19,7 @@ Summing = Annotated[Literal["auto", "direct", "truncated", "merged", "recursion"
 
 
 class Accuracy(Table):
-    """The tolerance, which determines the numerical settings, and keys that fix single settings in place of the
+    """The tolerance determines the numerical settings; a key that is given fixes its own setting in place of the
     tolerance."""
 
     tolerance: key(number(gt=0, lt=1), "largest relative error that is allowed in any measure; the numerical settings "

@@ -138,7 +138,8 @@ class Mode(Table):
     damping: key(number(gt=-1), "damping ratio; a mode with a damping ratio below 0 gains energy, which friction must "
                  "dissipate (flutter)")
     slide: key(Number, "motion of the patch along x per unit of the modal coordinate")
-    normal: key(Number, "motion of the patch away from the contact per unit of the modal coordinate") = 0.0
+    normal: key(Number, "motion of the patch normal to the interface, positive where it opens, per unit of the modal "
+                "coordinate") = 0.0
     pitch: key(PerMetre, "rotation of the patch in the plane of the model per unit of the modal coordinate") = 0.0
     lateral: key(Number, "motion of the patch across x per unit of the modal coordinate") = 0.0
     yaw: key(PerMetre, "rotation of the patch about its normal per unit of the modal coordinate; needs "

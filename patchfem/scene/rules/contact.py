@@ -68,9 +68,9 @@ def _contact(draft: Draft) -> None:
         name = "contact.length =" if flat == contact.length else "the interface length of"
         draft.say("contact.element_size", f"{contact.element_size} m is longer than {name} {flat} m")
     if contact.element_size and contact.length and contact.length > MOST_ELEMENTS * contact.element_size:
-        draft.say("contact.element_size", f"{contact.element_size:g} m gives more than {MOST_ELEMENTS} elements over "
-                                          f"{contact.length:g} m; use at least {contact.length / MOST_ELEMENTS:.3g} m, "
-                                          "or leave this key out")
+        draft.say("contact.element_size", f"elements of {contact.element_size:g} m on a length of {contact.length:g} m "
+                                          f"are more than {MOST_ELEMENTS}; use at least "
+                                          f"{contact.length / MOST_ELEMENTS:.3g} m, or leave this key out")
     if contact.element_size and contact.mesh:
         draft.remark("contact.element_size is not used, because the file of contact.mesh gives the elements")
     pieces = [("contact.coating", contact.coating, contact.height)]

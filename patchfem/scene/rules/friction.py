@@ -24,7 +24,7 @@ def remark_temperature(draft: Draft, at: str, law: Friction) -> None:
     if temperature_unused(law):
         lacking = "activation temperatures; add rest_activation, slip_activation or both"
         if law.rest_growth is None:
-            lacking = "growth of the bonds; add rest_growth and slip_growth"
+            lacking = "keys for the growth of the bonds; add rest_growth and slip_growth"
         draft.remark(f"{at}.temperature has no effect without {lacking}")
 
 

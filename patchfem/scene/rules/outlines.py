@@ -55,8 +55,8 @@ def _ends(draft: Draft, contact: Contact, name: str, piece) -> None:
     for key in given:
         size, at = getattr(piece, key), f"contact.{name}.{key}"
         if size and length and 2 * size >= length:
-            draft.say(at, f"{size} m at both ends leaves no flat face on a piece {length} m long: {key} < length/2 is "
-                          "needed")
+            draft.say(at, f"{size} m at each end leaves no flat face on a piece that is {length} m long; {key} must be "
+                          "less than length/2")
         elif size and length and size < LEAST * length:
             draft.say(at, f"{size} m is less than 1e-5 of the length {length} m: leave this key out")
         elif size and height and size + thickness >= height:

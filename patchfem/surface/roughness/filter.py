@@ -25,7 +25,7 @@ def filtered(profile: Profile, cutoff: float, ends: str = "trimmed", stages: int
     fewer than four steps or, trimmed, as long as the trace.
     """
     if ends not in ("trimmed", "whole"):
-        raise PatchfemError(f"unknown ends '{ends}' of a filtered trace; use trimmed or whole")
+        raise PatchfemError(f"a filtered trace has no treatment of its ends called '{ends}'; use trimmed or whole")
     flat = level(even(profile))
     step = flat.length / (flat.x.size - 1)
     _refuse_short(profile.source, cutoff, step)

@@ -26,14 +26,14 @@ its last digit. A value whose magnitude is below the floor is printed as 0.
 
 Measures of a motion are evaluated over a window at the end of the run: the last ten cycles or the last tenth of the
 run, whichever is shorter, but at least one cycle; under tones the window holds whole beats, under a random drive all of
-the record but what the start leaves. The cycle of a drive without a frequency, such as a release, is the period of the
-first mode that is not rigid, without friction. In a release only `relative_displacement_amplitude` is that of the last
-whole cycle of the motion; peaks of acceleration and force, slip and stick are those of the window, in which the motion
-may still decay. The window of a bench is its last cycle; its energies, its friction work and its peaks,
-`friction_force_peak` and `friction_ratio_peak`, are those of the whole run. A measure "per cycle" is the mean
-over the cycles of the window. A number at the end of a name is the number of an interface, or of a strip if the strips
-slide separately: `slip_amplitude_2` is the slip amplitude of the second interface or strip. The floor of a displacement
-is at most 1e-5 of a/omega^2, the displacement amplitude of a drive with the acceleration amplitude a.
+the record but what the start leaves. If the drive has no frequency, as in a release, a cycle is the period that the
+first mode that is not rigid has without friction. In a release only `relative_displacement_amplitude` is that of the
+last whole cycle of the motion; peaks of acceleration and force, slip and stick are those of the window, in which the
+motion may still decay. The window of a bench is its last cycle; its energies, its friction work and its peaks,
+`friction_force_peak` and `friction_ratio_peak`, are those of the whole run. A measure "per cycle" is the mean over the
+cycles of the window. A number at the end of a name is the number of an interface, or of a strip if the strips slide
+separately: `slip_amplitude_2` is the slip amplitude of the second interface or strip. The floor of a displacement is at
+most 1e-5 of a/omega^2, the displacement amplitude of a drive with the acceleration amplitude a.
 """
 
     @classmethod

@@ -112,7 +112,7 @@ def test_refuses_a_cutoff_that_does_not_fit(cutoff, says):
 
 
 def test_refuses_ends_that_are_not_known():
-    with pytest.raises(PatchfemError, match="unknown ends 'padded' of a filtered trace; use trimmed or whole"):
+    with pytest.raises(PatchfemError, match="no treatment of its ends called 'padded'; use trimmed or whole"):
         filtered(sine(np.arange(1000) * UM, UM, 80 * UM), 80 * UM, "padded")
 
 
