@@ -29,9 +29,12 @@ SMOOTH_STEP, SMOOTH = 2e-6, 0.02  # of a step of high order, and of such a run b
 KEPT_SAMPLE = 8e-6, 2.5e-6  # of a sample of the last cycles, kept, read and written: of steps, from event to event
 
 # of a point of steady motions: in closed form, by the map of events or yields; of a piece while all holds, the same per
-# squared number of modes, of an event; by a balance, and per cubed number of its unknowns
-CLOSED_POINT, MAPPED_POINT, RINGING_PIECE, RINGING_MODES, EVENT = 3e-4, 3e-3, 4e-5, 4e-7, 3e-4
-BALANCED_POINT, BALANCE = 0.1, 8e-10
+# squared number of modes, of an event per mode; by a balance, of a law with a state that flows besides, and per cubed
+# number of its unknowns; of the multipliers, per cubed size of the state, where the slope of a law changes all along,
+# of the speed alone or of such a state: within a factor 3 of fourteen curves of the templates and of ten modes
+CLOSED_POINT, MAPPED_POINT, RINGING_PIECE, RINGING_MODES, EVENT = 3e-4, 3e-3, 4e-5, 4e-7, 1.5e-5
+BALANCED_POINT, FLOWING_POINT, BALANCE = 0.012, 0.1, 8e-10
+MULTIPLIERS = 2.5e-6, 4e-6
 
 # of the pieces of a patch: of a call, a shape of its fronts, a front, an entry of the factors, an operation; fitted to
 # 15 grids of 21 x 20 to 301 x 201 nodes, each both ways: 0.85 to 1.07 of what they took

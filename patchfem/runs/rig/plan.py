@@ -7,7 +7,7 @@ import numpy as np
 
 from ... import rates
 from ...core import PatchfemError
-from ...effects import has
+from ...effects import LAWS, has
 from ...friction.bonds import parameters
 from ...model.model import Model
 from ...response.rows import of_first, of_number
@@ -265,11 +265,21 @@ def _steady_point(model: Model, by: str) -> float:
     rig = model.rig
     if by == "balance":
         size = 2.0 * (model.accuracy.harmonics or 0) * max(1, len(rig.interfaces))
-        return rates.BALANCED_POINT + rates.BALANCE * size**3
+        return rates.BALANCED_POINT + rates.BALANCE * size**3 + _smooth_laws(rig)
     if by == "march":
         return MARCHED * steps_per_cycle(model) * rates.CLIMB
     if not rig.interfaces:
         return rates.CLOSED_POINT
     ringing, events = ringing_and_events(model)
-    return rates.MAPPED_POINT + rates.EVENT * events + ringing * (
+    return rates.MAPPED_POINT + rates.EVENT * len(rig.frequencies) * events + ringing * (
         rates.RINGING_PIECE + rates.RINGING_MODES * len(rig.frequencies)**2)
+
+
+def _smooth_laws(rig) -> float:
+    """Seconds that a balanced point takes besides where a law changes its slope all the cycle long: elements that stick
+    and slip have the same one for most of it."""
+    laws = {one.numbers.law for one in rig.interfaces}
+    flowing = any("pieces" not in LAWS[law].carries.split() and not has(law, "memoryless") for law in laws)
+    smooth = flowing or rig.bends or any(has(law, "creeps") for law in laws)
+    size = 2 * len(rig.frequencies) + len(rig.interfaces)
+    return flowing * rates.FLOWING_POINT + smooth * rates.MULTIPLIERS[flowing] * size**3
