@@ -20,6 +20,7 @@ TURNS = 4  # passes over a half swing until its middle stays
 AWAY = 0.35  # of half a period, by which a middle may lie elsewhere than foreseen
 BESIDE = 8  # half swings on both sides whose remainders make the noise of one
 GRID = np.linspace(0.75, 1.3, 56)  # of the highest line, frequencies of the first cycle that are tried
+UNEVEN = 10.0  # times the step of a record at its dense places, beyond which its gaps are named
 STEADY = 0.3  # by which the next half period may differ from the last
 
 
@@ -50,7 +51,8 @@ def half_swings(time, value) -> HalfSwings:
     best = min(tries, key=lambda one: _noise(one).mean() if len(one) > 2 else np.inf, default=[])
     if len(best) < 3:
         middle, length = _first(time, value)
-        if why := next(filter(None, (_sparse(time, middle + k * length, length) for k in range(3))), ""):
+        if why := next(filter(None, (_sparse(time, middle + k * length, length) for k in range(3))), "") or \
+                _uneven(time):
             raise PatchfemError(f"fewer than three half cycles of a free decay have samples enough: {why}")
         raise PatchfemError("fewer than three half cycles of a free decay rise above the noise; begin the record after "
                             "the drive has ended (--begin), and take at least 10 samples per cycle")
@@ -75,6 +77,12 @@ def _sparse(time, middle: float, length: float) -> str:
     if count >= FEWEST or high > time[-1]:
         return ""
     return f"the half cycle from {low:.4g} s to {high:.4g} s has {count} samples, and at least {FEWEST} are needed"
+
+
+def _uneven(time) -> str:
+    """Words on a record whose samples lie UNEVEN times as far apart at some places as at others; "" of any other."""
+    near, far = np.quantile(np.diff(time), (0.1, 1.0))
+    return f"the samples lie up to {far:.3g} s apart, elsewhere {near:.3g} s" if far > UNEVEN * near else ""
 
 
 def _first(time, value) -> tuple:

@@ -54,6 +54,18 @@ class Draft:
         """Whether the key or table was written, right or wrong."""
         return self.value(key) is not None
 
+    def given_as_set(self, key: str) -> bool:
+        """`given` of a key as --set and [sweep] write it, with items by name or number."""
+        value: Any = self.raw
+        for piece in pieces_of(key):
+            if isinstance(value, list):
+                at = next((k for k, one in enumerate(value) if isinstance(one, dict) and one.get("name") == piece),
+                          int(piece) if piece.isdecimal() else len(value))
+                value = value[at] if at < len(value) else None
+            else:
+                value = value.get(piece) if isinstance(value, dict) else None
+        return value is not None
+
     def value(self, key: str) -> Any:
         """Value that was written at a dotted key; None where nothing was."""
         value: Any = self.raw

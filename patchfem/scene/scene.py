@@ -200,8 +200,8 @@ def loads(text: str, path: str | Path = "scene.toml", sets: Iterable[str] = (), 
     if "sweep" in raw:
         fixed = {one.partition("=")[0].strip() for one in sets}
         axes = [axis for axis in _axes(draft, raw.pop("sweep")) if axis.key not in fixed]
-    given = [axis for axis in axes if not draft.given(axis.key)]  # a key that only [sweep] holds has its first value
-    for one in (*(f"{axis.key}={axis.texts[0]}" for axis in given), *sets):
+    first = [axis for axis in axes if not draft.given_as_set(axis.key)]  # of a key that only [sweep] holds
+    for one in (*(f"{axis.key}={axis.texts[0]}" for axis in first), *sets):
         apply_set(draft, one)
     found = scene_of(draft, path, text, sets, more)
     return replace(found, sweep=tuple(axes)) if axes else found

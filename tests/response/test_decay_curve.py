@@ -16,6 +16,7 @@ from patchfem.response.decay_curve import (
     _slope,
     _slopes,
     curve_of,
+    last_swing,
     of_turns,
     turns,
     turns_from_outside,
@@ -53,6 +54,37 @@ def viscous(zeta: float, omega: float, samples: int):
     lam = complex(-zeta * omega, omega * np.sqrt(1 - zeta**2))
     y = np.exp(lam * t)
     return t, y.real, (lam * y).real
+
+
+def test_exact_the_last_swing_is_the_last_whole_cycle_from_turn_to_turn():
+    """Of a viscous decay the turns are known: places e^(-zeta omega t) (1 - zeta^2)^(1/2) at times k pi/own. A small
+    fast mode beside it makes no turns; a rest has its range in the last period, fewer turns than three have none."""
+    zeta, omega = 0.01, 300.0
+    own, period = omega * np.sqrt(1 - zeta**2), 2 * np.pi / omega
+    t, y, v = viscous(zeta, omega, 4000)
+    at = (np.arctan2(-zeta, np.sqrt(1 - zeta**2)) + np.pi * np.arange(1, 90)) / own
+    last = at[at < t[-1]][-3:]
+    places = np.exp(-zeta * omega * last) * np.cos(own * last)
+    assert last_swing(t, y, v, period) == pytest.approx((places[0] - places[1]) / 2 * np.sign(places[0]), rel=1e-6)
+    assert last_swing(t, y, v, period) < 0.6 * np.ptp(y[t > t[-1] - 10 * period]) / 2  # ten begin larger
+    fast = 0.02 * y[-1] * np.cos(4000 * t), -80 * y[-1] * np.sin(4000 * t)
+    found = last_swing(t, y + fast[0], v + fast[1], period)
+    assert found == pytest.approx(last_swing(t, y, v, period), rel=0.05)
+    assert last_swing(t, np.where(t < 0.5, y, 0.2), np.where(t < 0.5, v, 0.0), period) == 0
+    assert last_swing(t, np.exp(-t), -np.exp(-t), period) is None
+
+
+def test_exact_a_release_has_the_amplitude_of_its_last_whole_cycle():
+    """An oscillator released at 2 mm, whose last six cycles begin larger than the last one."""
+    text = (POINT + friction_of("elastic-plastic")).replace("static = 0.3", "static = 0") + KILOGRAM + RELEASED
+    found = pf.run(text.replace("cycles = 30", "cycles = 60"))
+    main, mode = found.measures["relative_displacement_amplitude"], found.plan.model.rig.modes
+    omega, zeta = float(mode.omega[0]), float(mode.zeta[0])
+    own, end = omega * np.sqrt(1 - zeta**2), found.response.time[-1]
+    at = np.pi * np.arange(1, 200) / own  # released at rest: it turns every half period
+    at = at[at < end * (1 - 1e-9)][-3:-1]
+    assert main.value == pytest.approx(2e-3 * np.exp(-zeta * omega * at).mean(), rel=1e-6)
+    assert np.ptp(found.window.output) / 2 > 1.05 * main.value
 
 
 def test_order_turns_lie_between_samples_to_the_fourth():

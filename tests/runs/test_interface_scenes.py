@@ -190,6 +190,7 @@ def test_exact_two_interfaces_in_a_chain_marched(written):
         reversals = 0.03 * name.startswith("stick")  # a march counts what is slow as stuck
         assert abs(mine["value"] - theirs["value"]) <= theirs["error"] + theirs["floor"] + reversals, name
     slides = data.relative_displacement.values
+    assert data.modal_coordinate.attrs["long_name"].startswith("displacement of the mass or coordinate")
     assert slides[0] == pytest.approx(data.modal_coordinate.values[:, 0], abs=1e-12)
     assert slides[1] == pytest.approx(np.diff(data.modal_coordinate.values, axis=1)[:, 0], abs=1e-12)
 

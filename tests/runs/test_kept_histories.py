@@ -87,6 +87,23 @@ def test_always_kept_are_the_ends_and_a_hundred_a_cycle_of_the_last_two(done, en
     assert late[0] - begin < 1e-6 * sine.period and np.diff(late).max() <= sine.period / 100 * (1 + 1e-6)
 
 
+@pytest.mark.parametrize("engine", [*ENGINES, "smooth"])
+def test_always_a_release_is_kept_evenly_all_along(done, engine):
+    """At least 20 samples a cycle from its start on; before, turning points stood alone up to the last cycles."""
+    if engine == "smooth":
+        result = run(plan(loads(TANH + MODE + RELEASE)), estimate=False)
+        assert result.extra["engine"] == "smooth"
+    else:
+        _, result = done(engine, "release")
+    r, period = result.response, result.plan.model.rig.drive.period
+    assert r.time[0] == 0 and r.time[-1] == result.window.time[-1] and (np.diff(r.time) > 0).all()
+    assert np.diff(r.time).max() <= period / 20 * (1 + 1e-6)
+    # between samples the motion is the cubic of both ends: there is nothing else beside it
+    middle = (r.output[1:] + r.output[:-1]) / 2 + np.diff(r.time) * (r.output_rate[:-1] - r.output_rate[1:]) / 8
+    straight = np.interp((r.time[1:] + r.time[:-1]) / 2, r.time, r.output)
+    assert np.abs(middle - straight).max() < 2e-2 * np.abs(r.output).max()
+
+
 @pytest.mark.parametrize(("engine", "drive"), CASES)
 def test_always_every_reversal_is_kept(done, engine, drive):
     """Seen by the extremes: between two kept samples before the window the output goes one way, so that the rate there

@@ -53,6 +53,22 @@ def test_exact_energies_balance_under_elastic_plastic_friction():
         "the frequency response (H1) has no peak")
 
 
+def test_exact_friction_power_is_work_over_time_with_the_scatter_of_its_parts():
+    """Of a record, not per cycle, which a random drive has none of: other seeds lie within twice the interval."""
+    powers = []
+    for seed in range(1, 6):
+        result = pf.run(RIG | PLASTIC, **{"drive.seed": seed})
+        one, scatter = (result.measures[name] for name in ("friction_power", "friction_power_scatter"))
+        w = result.window
+        work = w.extra["ledger"][0]
+        assert one.value == pytest.approx((work[-1] - work[0]) / (w.time[-1] - w.time[0]), rel=1e-9)
+        assert 0 < scatter.value < one.value and one.unit == "W"
+        powers.append((one.value, scatter.value))
+    values, scatters = np.array(powers).T
+    assert (np.abs(values - values.mean()) < 2 * scatters).all()
+    assert "friction_power" not in pf.run(RIG).measures  # nothing rubs
+
+
 def test_each_seed_is_another_record_and_the_same_one_again():
     first, again, other = (pf.run(RIG, **{"drive.seed": seed, "drive.duration": "1 s"}).measures for seed in (1, 1, 2))
     assert first["relative_displacement_rms"].value == again["relative_displacement_rms"].value

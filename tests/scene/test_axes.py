@@ -4,7 +4,7 @@ import re
 
 import numpy as np
 import pytest
-from scene_texts import BENCH, line_of, mistakes
+from scene_texts import BENCH, DRIVE, KILOGRAM, line_of, mistakes
 
 import patchfem as pf
 from patchfem.core import PatchfemError
@@ -14,6 +14,7 @@ from patchfem.scene.keys.quantities import parse
 from patchfem.scene.scene import loads
 from patchfem.scene.sets import texts
 
+RIG = KILOGRAM + DRIVE
 SWEPT = BENCH + '[sweep]\n"friction.static" = "0.1..0.6:6"\nnormal.load = "26 lbf, 100 N"\n'
 
 
@@ -137,6 +138,17 @@ def test_exact_a_table_of_a_scene_says_the_same():
 def test_exact_a_key_that_only_the_table_holds_has_its_first_value():
     scene = loads(SWEPT.replace("static = 0.3\n", ""), "a.toml")
     assert scene.friction.static == 0.1
+
+
+def test_exact_a_key_of_an_item_that_the_scene_gives_keeps_its_value():
+    """By number or name; before, only keys without items were found, and others took the first value of the table."""
+    swept = RIG + '[sweep]\n"structure.mode.axial.frequency" = "100 Hz, 120 Hz"\n' \
+        '"structure.mode[1].damping" = "0.1,0.2"\n'
+    (mode,) = loads(swept, "a.toml").structure.mode
+    (own,) = loads(RIG, "a.toml").structure.mode
+    assert (mode.frequency, mode.damping) == (own.frequency, own.damping)
+    (first,) = loads(re.sub(r"\ndamping = .*", "", swept, count=1), "a.toml").structure.mode
+    assert first.frequency == own.frequency and first.damping == 0.1
 
 
 def test_refuses_mistakes_of_the_table_with_their_lines():
