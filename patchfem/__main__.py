@@ -92,8 +92,8 @@ SCREEN = {
               "cite": (start, "BibTeX of a scene's sources", "joint.toml")}}
 VERBS = {verb: row[0] for verbs in SCREEN.values() for verb, row in verbs.items()}
 
-OUT_OF_MEMORY = ("out of memory; `patchfem plan` names the part of the computation that needs most "
-                 "memory and the key that sets the size of this part")
+OUT_OF_MEMORY = ("out of memory; if a key of the scene sets the size of the largest part of the "
+                 "memory, `patchfem plan` names this part and the key")
 
 app = App(name="patchfem", version=__version__, help_format="plaintext", suppress_keyboard_interrupt=False,
           help="friction, vibration and wear of two rubbing surfaces.")

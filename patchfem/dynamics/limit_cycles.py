@@ -25,6 +25,9 @@ from .harmonic.point import balance_of
 SAMPLES = 4096  # of a cycle, that its largest motion is read from
 PLACES = 48  # amplitudes at which the damping of a free motion is looked at
 LOW, HIGH = 1e-6, 4.0  # the first and the last of them, over 4 F/(pi |c| omega)
+SLIDING, FEWER = 0.02, 16  # the first amplitude where smaller motions cannot be followed, and how many are looked at
+LOST = ("limit cycles are looked for among free motions of rising amplitude, and these could not be followed up to the "
+        "amplitude at which friction dissipates what the mode gains")
 ROUND = 1e-9  # of an amplitude, what round-off and the tolerances of the solves leave
 SHUT = 1e-8  # share of the swing in a half period, by which a slide at rest moves on
 SECANTS = 12  # steps to the rate that balances an amplitude
@@ -169,31 +172,44 @@ def _highest(samples) -> float:
     return float(b - (c - a)**2 / (8 * bend)) if bend < 0 else float(samples.max())
 
 
-def of_balance(modes: ModalBasis, group: Group, row, limit: float) -> list:
-    """Limit cycles of the laws of a Group on the interface `row` (n,), whose friction is at most `limit` [N].
+def of_balance(modes: ModalBasis, group: Group, row, limit: float) -> tuple:
+    """(limit cycles of the laws of a Group on the interface `row` (n,), whose friction is at most `limit` [N]; the
+    smallest amplitude at the output [m] that was looked at, 0 where all were).
 
-    Each is known by harmonics and samples twice as many. NotConverged where no free motion is found on the way.
+    Each is known by harmonics and samples twice as many. A law that weakens may have no free motion in micro-slip; the
+    path then begins where the interface slides, at the mode without friction, SLIDING times the amplitude of den
+    Hartog's balance. NotConverged where no free motion is found on this way either.
     """
-    out = []
+    out, least = [], 0.0
     for mode in unstable_modes(modes):
         if limit * abs(row[mode]) > 0:
-            out += _of_mode(modes, group, int(mode), balanced_amplitude(modes, row, limit, mode))
-    return sorted(out)
+            found, low = _of_mode(modes, group, int(mode), balanced_amplitude(modes, row, limit, mode))
+            out, least = out + found, max(least, low * abs(modes.output[mode]))
+    return sorted(out), least
 
 
-def _of_mode(modes: ModalBasis, group: Group, mode: int, size: float) -> list:
-    amplitudes = size * np.geomspace(LOW, HIGH, PLACES)
-    few, many = (_crossings(modes, group, mode, amplitudes, harmonics) for harmonics in (FEW, 2 * FEW + 1))
-    if len(few) != len(many):
-        raise NotConverged(f"flutter_amplitude: {len(few)} limit cycles were found with {FEW} harmonics but "
-                           f"{len(many)} limit cycles with {2 * FEW + 1} harmonics")
-    return [better._replace(error=2 * abs(one.amplitude - better.amplitude) + ROUND * better.amplitude)
-            for one, better in zip(few, many)]
+def _of_mode(modes: ModalBasis, group: Group, mode: int, size: float) -> tuple:
+    shape = np.eye(modes.omega.size)[mode]
+    paths = ((size * np.geomspace(LOW, HIGH, PLACES), modes.held(group.rows, group.stiffness(), mode), 0.0),
+             (size * np.geomspace(SLIDING, HIGH, FEWER), (modes.omega[mode], shape), SLIDING * size))
+    for amplitudes, start, least in paths:
+        try:
+            few, many = (_crossings(modes, group, mode, (amplitudes, start), harmonics)
+                         for harmonics in (FEW, 2 * FEW + 1))
+        except NotConverged:
+            continue
+        if len(few) != len(many):
+            raise NotConverged(f"{len(few)} limit cycles were found with {FEW} harmonics but {len(many)} limit cycles "
+                               f"with {2 * FEW + 1} harmonics")
+        return [better._replace(error=2 * abs(one.amplitude - better.amplitude) + ROUND * better.amplitude)
+                for one, better in zip(few, many)], least
+    raise NotConverged(LOST)
 
 
-def _crossings(modes: ModalBasis, group: Group, mode: int, amplitudes, harmonics: int) -> list:
-    """Cycles along the free motions of a mode over its amplitudes (k,) [m], where their damping changes its sign."""
-    omega, shape = modes.held(group.rows, group.stiffness(), mode)
+def _crossings(modes: ModalBasis, group: Group, mode: int, path: tuple, harmonics: int) -> list:
+    """Cycles along the free motions of a mode, where their damping changes its sign; path: amplitudes (k,) [m], and
+    the frequency [rad/s] and the shape (n,) of the first of them."""
+    amplitudes, (omega, shape) = path
     slides = np.abs(group.rows @ shape) * amplitudes[-1]
     balance = balance_of(modes, group, group.samples_for(harmonics, slides))
     equations = FreeBalance(balance, mode, harmonics, omega)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 from .. import compiled
 from ..core import Missing
+from ..dynamics import resume
 from ..dynamics.events import cost as events_cost
 from ..dynamics.march import capacity
 from ..model.model import Model
@@ -18,11 +19,18 @@ WAVE = 94.0  # per pair of sines and cosines of harmonic balance: its Jacobian a
 # per number of a kept sample, by the engine (those of events if it is not named): the window, the response, what is
 # read off it; of random records of 4e5 to 2e6 samples, 0.8 to 1.2 of what they took
 KEPT, KEPT_BY = 32.0, {"smooth": 80.0, "march": 45.0}
+# per cycle of a run, by the engine: extremes, phasors and places of all cycles, of the run and of its coarser runs; of
+# single modes over 1e6 to 1e7 cycles, 0.8 to 1.3 of what they took
+CYCLE, CYCLE_BY = 85.0, {"smooth": 140.0, "march": 50.0}
+# per number of a turn kept from before the last cycles, four turns a cycle as long as they are fewer than all that are
+# kept; of 1e5 to 1e6 cycles, 0.8 to 1.5 of what they took
+TURN, TURN_BY, TURNS, ALL_KEPT = 6.0, {"smooth": 16.0, "march": 18.0}, 4.0, float(resume.MOST_KEPT)
 GRID = 24.0  # per number of a step of the comparison methods, which keep all of them
 SLIDE = 250.0  # per sample of a bench
 ROW = 400.0  # per row of a recorded drive
 MAPPED, CODE = 60e6, 150e6  # of address space beside what is used: packages, and the compiler's library
 CODE_PART = "compiled code"
+NAMED = 0.3  # of the memory, from which a plan names the part that takes most
 CURES = {"contact.element_size": "make contact.element_size larger", "contact.mesh": "give contact.mesh fewer nodes on "
          "the interface", "accuracy.tail": "raise accuracy.tail or accuracy.merge", "structure": "give fewer modes",
          "slide.file": "give fewer rows in slide.file", "drive.file": "give fewer rows in drive.file"}
@@ -132,6 +140,14 @@ def needs(model: Model, engine: str, steps: int, unknowns: dict, numerics=None, 
     return tuple(sorted((part for part in parts if part.bytes > 0), reverse=True))
 
 
+def largest(parts: tuple) -> str:
+    """What takes most of the memory that a key of the scene sets, with this key, in words; "" where that is little."""
+    most = next((part for part in parts if part.key), None)
+    if most is None or most.bytes < NAMED * sum(part.bytes for part in parts):
+        return ""
+    return f"{most.bytes / 1e6:.0f} MB of the memory are for {most.what}; {most.key} sets their size"
+
+
 def _samples_key(model: Model) -> str:
     if model.slide.kind == "file":
         return "slide.file"
@@ -152,6 +168,10 @@ def _of_rig(model: Model, engine: str, steps: int, numerics) -> list:
         window, key = of_rig.kept_samples(numerics), "drive.duration" if rig.waveform == "random" else "drive.cycles"
         key = "accuracy.steps_per_cycle" if model.accuracy.steps_per_cycle else key
         parts.append(Need(KEPT_BY.get(engine, KEPT) * width * window, f"{window:.0f} samples of the last cycles", key))
+        turns = min(TURNS * rig.cycles, ALL_KEPT)
+        size = CYCLE_BY.get(engine, CYCLE) * rig.cycles + TURN_BY.get(engine, TURN) * width * turns
+        parts.append(Need(size, f"the histories of {rig.cycles:.3g} cycles",
+                          "drive.duration" if rig.waveform == "random" else "drive.cycles"))
     rows = len(getattr(rig.drive, "breaks", ())) if not rig.drive.segments else 0
     parts.append(Need(ROW * rows, f"{rows} rows of the drive",
                       "drive.duration" if rig.waveform != "file" else "drive.file"))

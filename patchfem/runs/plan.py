@@ -12,6 +12,7 @@ from ..inputs import measured
 from ..model.model import Model, build
 from ..model.source import placed
 from ..response import rows
+from ..structure.drive_sizes import sinusoidal
 from . import memory
 from .bench import engine as of_bench
 from .patch import grids as patch_grids
@@ -23,6 +24,9 @@ from .rig import plan as of_rig
 from .wear import plan as of_wear
 
 LONGEST = 1e6  # seconds of a run, twelve days, beyond which none is begun
+SKIPS, MANY = ("march", "exact", "piecewise"), 100  # engines that compute no cycle of a motion that repeats, and cycles
+UP_TO = ("the computing time is an upper limit: as soon as the motion repeats itself, the remaining cycles are not "
+         "computed one by one")
 GROUPS = {  # group -> (what it is, SI unit of its value)
     "D": ("D: friction limit (static, if there are two) divided by the largest force of the drive", "1"),
     "D_kinetic": ("D with the kinetic friction limit", "1"),
@@ -152,6 +156,8 @@ def _planned(model: Model, per_point: bool) -> Plan:
         said[2] = [*said[2], *_groove_words(model)]
     if model.rig is not None:
         said[0] = [*said[0], *of_rig.first_words(model.rig, groups, chain)]
+    if engine in SKIPS and sinusoidal(model.rig.drive) and model.rig.cycles >= MANY:
+        said[2] = [*said[2], UP_TO]
     return Plan(model, model.kind, model.source.effects, model.absent, engine, unknowns, steps, round(seconds, 2),
                 int(sum(part.bytes for part in parts)), chain, groups, tuple(_verdict(model, groups, parts, said)),
                 parts, memory.compile_seconds(model, engine, unknowns))
@@ -162,6 +168,8 @@ def _verdict(model: Model, groups: dict, parts: tuple, said: list) -> list:
     out = list(said[0])
     if text := memory.refusal(parts):
         out.append(f"`run` will refuse this scene: {text}")
+    elif text := memory.largest(parts):
+        out.append(text)
     out += [*said[1], *said[2]]
     if "slip_length" in groups:
         about = f"by {say(groups['slip_length'], 3)} or more before the whole patch slips"

@@ -73,7 +73,8 @@ def test_elastic_plastic_elements_have_a_cycle_that_lasts_and_one_that_does_not(
     """A cycle of DOP853 from both amplitudes repeats; around them the swing is drawn to one and away from the other."""
     stiffness, yields = np.array([2e4, 1e4, 3e4]), np.array([1e-4, 2e-4, 4e-4])
     modes, limit = modes_of([750.0], [-0.01], [1.0], [1.0]), float(stiffness @ yields)
-    low, high = limit_cycles.of_balance(modes, Group(modes, Jenkins(stiffness, yields)), modes.slide, limit)
+    (low, high), least = limit_cycles.of_balance(modes, Group(modes, Jenkins(stiffness, yields)), modes.slide, limit)
+    assert least == 0.0
     assert low.lasts and not high.lasts and low.amplitude < high.amplitude
     assert high.error < 1e-3 * high.amplitude and low.error < 1e-3 * low.amplitude
 

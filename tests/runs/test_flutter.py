@@ -48,6 +48,26 @@ def test_a_release_below_the_flutter_amplitude_comes_to_rest_and_one_above_it_gr
     assert "10.08" not in "".join(found.notes) and "decays to rest" in found.notes[-1]
 
 
+WEAKENS = {"normal": {"load": 100.0}, "friction": {"law": "lugre", "static": 0.3, "kinetic": 0.2, "stiffness": 1e6,
+                                                   "stribeck_speed": 0.05},
+           "structure": {"moving_mass": 1.0, "mode": [
+               {"name": "a", "frequency": 50.0, "damping": -0.01, "slide": 1.0}]},
+           "drive": {"kind": "free", "cycles": 40.0}}
+
+
+def test_exact_the_edge_under_a_law_that_weakens_parts_releases_that_decay_from_those_that_grow():
+    """No free motion can be followed from micro-slip on, so that there was no value. Releases from half a percent below
+    and above part as the edge says; den Hartog's balance gives 12.90 mm with 0.2 alone."""
+    ends = []
+    for share in (0.995, 1.005):
+        done = pf.run(WEAKENS, **{"drive.displacement": share * 12.88e-3})
+        ends.append(done.measures["relative_displacement_amplitude"].value)
+        edge = done.measures["flutter_amplitude"]
+        assert edge.value == pytest.approx(12.88e-3, rel=1e-3) and edge.error < 1e-3 * edge.value
+        assert any("smaller motions could not be followed" in one for one in done.notes)
+    assert ends[0] < 0.97 * edge.value and ends[1] > 1.03 * edge.value
+
+
 @pytest.mark.slow
 def test_a_spring_before_the_slip_keeps_a_small_swing_up():
     """Nothing is lost before the elements yield: a small release rises to the limit cycle that lasts."""

@@ -159,8 +159,12 @@ def test_always_the_plan_says_what_both_engines_cost():
 
 def test_refuses_an_exact_run_without_end():
     stiff = RIG.replace("1 um", "1e-13 um") + '[accuracy]\nmethod = "exact"\n'
-    with pytest.raises(pf.Missing, match=r"more than the limit of \d+ s; lower drive.cycles or the stiffness of"):
+    said = r"more than the limit of \d+ s; lower drive.cycles or the stiffness of"
+    with pytest.raises(pf.Missing, match=said) as found:
         pf.run(stiff)
+    march = pf.plan(stiff, **{"accuracy.method": "march"}).seconds
+    seconds = float(str(found.value).partition("computing time of about ")[2].split(" s")[0])
+    assert ("accuracy.method" in str(found.value)) == (march < seconds)
 
 
 def test_refuses_exact_where_a_spring_bends_or_the_load_changes():

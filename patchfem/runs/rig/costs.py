@@ -159,10 +159,11 @@ def refuse_endless(model: Model, numerics=None) -> None:
     """Raise Missing when a run from event to event would take longer than LONGEST seconds."""
     seconds = seconds_of_pieces(model)
     if seconds > LONGEST:
+        march = ', or use accuracy.method = "march"' * (seconds_of_steps(model) < seconds)
         raise Missing(f'the exact solution (about {pieces_per_cycle(model):.2g} time intervals per cycle, set by '
                       'events, rows of the drive and the fastest free vibration) would need a computing time of about '
                       f'{seconds:.0f} s, more than the limit of {LONGEST:.0f} s; lower drive.cycles or the stiffness '
-                      'of modes and elements, or use accuracy.method = "march"', "")
+                      f'of modes and elements{march}', "")
 
 
 def exact_cost(model: Model, numerics, unknowns: dict) -> tuple:

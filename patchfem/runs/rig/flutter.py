@@ -13,6 +13,8 @@ NAME = "flutter_amplitude"
 ALONE = "no mode with negative damping moves an interface, so friction cannot dissipate the energy of such a mode"
 NONE = (f"no unstable limit cycle was found at amplitudes between {limit_cycles.LOW:g} and {limit_cycles.HIGH:g} times "
         "4 F/(pi |c| omega), where F is the friction force and c is the damping coefficient")
+FEWER = (f"no unstable limit cycle was found at amplitudes between {limit_cycles.SLIDING:g} and {limit_cycles.HIGH:g} "
+         "times 4 F/(pi |c| omega), and smaller free motions could not be followed")
 UNBALANCED = ('with bonds limit cycles can be computed only for friction.reading = "stretch", order = 1, a constant '
               'bond length, breakaway = 0 and pieces that are rigid in shear')
 SLIDES = ("no motion was found in which the interface always slides and friction dissipates the energy that the mode "
@@ -23,7 +25,7 @@ def flutter_of(run) -> tuple:
     """(measures by name, notes) of a `rig.Coupled` with a mode of damping < 0: the amplitude of the largest limit cycle
     that does not last, with its error, or the reason why it is not known."""
     model, unit, floor = run.model, TABLE[NAME].unit, TABLE[NAME].floor
-    found, reason = _cycles(model, run.numerics, run.patch)
+    found, reason, looked = _cycles(model, run.numerics, run.patch)
     far = [f"the run ended after {run.raw.response.time[-1]:.4g} s, when the motion exceeded {BEYOND:g} m"] \
         if run.raw.outcome is Outcome.EXCEEDS_TRAVEL and model.rig.travel == BEYOND else []
     edges = [one for one in found if not one.lasts]
@@ -35,7 +37,8 @@ def flutter_of(run) -> tuple:
     alone = has(model.friction.law, "set-valued") and model.rig.modes.omega.size == 1  # nothing rings in a stick
     falls = f"amplitude between {say(least[0].amplitude, 3)} and this" if least else "smaller amplitude"
     falls += f" ends in the limit cycle of {say(below[0].amplitude, 3)}, which is stable" if below else \
-        " decays to rest" if alone else " decays"
+        " decays to rest" if alone else \
+        f" decays, at least to {say(looked, 2)} (smaller motions could not be followed)" if looked else " decays"
     return {NAME: Measure(edge.amplitude, unit, edge.error, floor)}, [
         "a mode of negative damping gains energy: without a drive this mode has an unstable steady oscillation of "
         f"{say(edge.amplitude, 4)} at the output, at {edge.omega / 6.283185307179586:.4g} Hz; a free oscillation of "
@@ -43,28 +46,30 @@ def flutter_of(run) -> tuple:
 
 
 def _cycles(model, numerics, patch) -> tuple:
-    """(list of `limit_cycles.Cycle`, the sentence where it holds none that does not last)."""
+    """(list of `limit_cycles.Cycle`, the sentence where it holds none that does not last, the smallest amplitude [m] at
+    the output that was looked at, 0 where all were)."""
     rig, f = model.rig, model.friction
     if len(rig.interfaces) != 1 or f is None:
-        return [], "limit cycles can be computed for one interface only"
+        return [], "limit cycles can be computed for one interface only", 0.0
     modes, row = rig.modes, rig.modes.interfaces[0]
     if not row[limit_cycles.unstable_modes(modes)].any():
-        return [], ALONE
+        return [], ALONE, 0.0
     load = patch.pressure.load if patch is not None else model.point.load
     if reason := ENGINES["harmonic"].lacks(model, steady=True):
-        return [], f"limit cycles cannot be computed {reason}"
+        return [], f"limit cycles cannot be computed {reason}", 0.0
     contact = contact_model(model, numerics, patch)
     try:
         if contact.set_valued:
             if rig.bends:
-                return [], "with rigid friction limit cycles cannot be computed if the rig has a nonlinear spring"
+                return [], "with rigid friction limit cycles cannot be computed if the rig has a nonlinear spring", 0.0
             if not modes.omega.all():
-                return [], "with rigid friction limit cycles cannot be computed if the rig has a mode of 0 Hz"
+                return [], "with rigid friction limit cycles cannot be computed if the rig has a mode of 0 Hz", 0.0
             static, kinetic = contact.element.numbers[1:3]
-            return limit_cycles.of_relay(modes, row, kinetic, static), SLIDES
+            return limit_cycles.of_relay(modes, row, kinetic, static), SLIDES, 0.0
         finder = BalanceFinder(model, numerics, patch)
-        return limit_cycles.of_balance(modes, finder.group, row, f.static * load), NONE
+        cycles, looked = limit_cycles.of_balance(modes, finder.group, row, f.static * load)
+        return cycles, NONE if not looked else FEWER, looked
     except NotConverged as missing:
-        return [], str(missing)
+        return [], str(missing), 0.0
     except PatchfemError:
-        return [], UNBALANCED
+        return [], UNBALANCED, 0.0

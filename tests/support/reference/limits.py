@@ -61,7 +61,8 @@ inertia.
 
 **Pressure fixed to a piece.** The pressure distribution moves with the piece that has the tilt, crown, step or profile
 (key `on`). If the other piece slides beyond the pressed length, the overhanging part of this piece is not modelled. If
-the slide leaves the patch, the run ends with the outcome `leaves_contact`.
+the slide leaves the patch, the outcome is `leaves_contact`. The motion is still computed to its end as if the pressed
+length went on, so the measures of such a run are not those of a joint.
 
 **Grooves.** The surfaces are assumed to stay in contact on the flanks. If the inertia force of the lifted mass cancels
 the whole load, the run ends with the outcome `leaves_grooves`. The upper piece is assumed to ride up all ridges at the
