@@ -8,10 +8,12 @@
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import fields
 from difflib import get_close_matches
+from functools import wraps
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import SimpleNamespace
@@ -66,9 +68,25 @@ if TYPE_CHECKING:
 __all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
            "SceneError", "backbone", "build", "compare", "cost", "demo", "export", "fit", "import_", "load", "mesh",
            "new", "plan", "plot", "profile", "report", "run", "run_many", "sweep", "view"]
-TEXT = "<text>"  # the name of a scene that came without a file
+TEXT, TABLES = "<text>", "<dict>"  # the names of a scene that came as a text, and as a dict
+PLACES = re.compile(rf"^(--set: |{TABLES}(:\d+)?: )", re.MULTILINE)  # that a Python program does not have
 
 
+def _by_key(function: Callable) -> Callable:
+    """The function, whose errors name the key alone where a dict, and no file, was given for it."""
+    @wraps(function)
+    def called(*args: Any, **more: Any) -> Any:
+        try:
+            return function(*args, **more)
+        except PatchfemError as error:
+            error.args = tuple(PLACES.sub("", one) if isinstance(one, str) else one for one in error.args)
+            if isinstance(error, SceneError):
+                error.mistakes = [PLACES.sub("", one) for one in error.mistakes]
+            raise
+    return called
+
+
+@_by_key
 def load(scene: str | Path | Scene | Mapping[str, Any], /, **sets: Any) -> Scene:
     """Read a scene from a file, a text or a dict of its tables.
 
@@ -80,7 +98,7 @@ def load(scene: str | Path | Scene | Mapping[str, Any], /, **sets: Any) -> Scene
     """
     added = assignments(sets)
     if isinstance(scene, Mapping):
-        return sized(with_files(loads(tables_text(dict(scene)), TEXT, added)), {**scene, **sets})
+        return sized(with_files(loads(tables_text(dict(scene)), TABLES, added)), {**scene, **sets})
     if isinstance(scene, Scene):
         return scene if not added else sized(base_of(scene).changed(added), sets)
     if isinstance(scene, str) and ("\n" in scene or "[" in scene):
@@ -98,6 +116,7 @@ def base_of(scene: Scene) -> Base:
 _bases: list[Base] = []
 
 
+@_by_key
 def build(scene: str | Path | Scene | Model, /, **sets: Any) -> Model:
     """Build the model of a scene without solving anything. `scene` and sets are those of `load`.
 
@@ -109,6 +128,7 @@ def build(scene: str | Path | Scene | Model, /, **sets: Any) -> Model:
     return build_model(load(scene, **sets))
 
 
+@_by_key
 def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
     """Plan a scene: what a run would compute, its size, its cost, its stiffnesses and dimensionless groups. No result
     is computed.
@@ -116,6 +136,7 @@ def plan(scene: str | Path | Scene | Model, /, **sets: Any) -> Plan:
     return plan_model(build(scene, **sets))
 
 
+@_by_key
 def run(scene: str | Path | Scene | Model | Plan, /, *, say: Callable[[str], None] | None = None,
         progress: Callable[[float], None] | None = None, **sets: Any) -> Result:
     """Run a scene and estimate the errors of its measures. `scene` and sets are those of `load`.
@@ -193,6 +214,7 @@ def backbone(scene: str | Path | Scene | Model, /, *, mode: str = "",
     return backbone_files.contents(found, model.source.title).to_xarray()
 
 
+@_by_key
 def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *, out: str | Path | None = None,
           draw: int = 0, seed: int = 0, sobol: bool = False, of: str = "", jobs: int = 1, executor: str = "",
           resume: bool = False) -> Dataset:
@@ -212,6 +234,8 @@ def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *
         raise PatchfemError(f"sweep: `over` must be a dict of keys and their values, not {over!r:.60}")
     if wrong := oversized(over or {}):
         raise SceneError(wrong)
+    if empty := [key for key, one in (over or {}).items() if hasattr(one, "__len__") and not len(one)]:
+        raise SceneError([f"{key}: the sweep has no value for this key" for key in empty])
     asked = case_models.Asked(*_text_of(scene), of=of)
     lines = [one if isinstance(one, str) else ",".join(texts(key, one)) for key, one in (over or {}).items()]
     request = ask.Request([f"{key}={line}" for key, line in zip(over or {}, lines)], None, draw, sobol, seed, of)
@@ -460,7 +484,7 @@ def compare(*files: str | Path, direction: str = "", units: tuple[str, str] | No
 def _text_of(scene: str | Path | Scene) -> tuple[Path, str, tuple]:
     """(path, text, --set strings) of a scene as `load` takes it, whether it is valid or not."""
     if isinstance(scene, Mapping):
-        return Path(TEXT), tables_text(dict(scene)), ()
+        return Path(TABLES), tables_text(dict(scene)), ()
     if isinstance(scene, Scene):
         return scene.path, scene.text, scene.sets
     if isinstance(scene, str) and ("\n" in scene or "[" in scene):
@@ -471,7 +495,8 @@ def _text_of(scene: str | Path | Scene) -> tuple[Path, str, tuple]:
 def _path(given: Any, what: str) -> Path:
     """The path of a file or folder; PatchfemError for anything else."""
     if not isinstance(given, str | Path):
-        raise PatchfemError(f"{what}: a path is needed, not {given!r:.60}")
+        needed = "a path, a text, a dict of tables or a Scene" if what == "a scene" else "a path"
+        raise PatchfemError(f"{what}: {needed} is needed, not {given!r:.60}")
     return Path(given)
 
 

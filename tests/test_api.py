@@ -172,8 +172,26 @@ def test_exact_lists_and_modes_by_name():
 def test_refuses_what_no_scene_can_hold(key, value, said):
     with pytest.raises(pf.SceneError) as caught:
         pf.run(SMALL_PATCH, **{key: value})
-    assert caught.value.mistakes[0].startswith(f"--set: {key.rpartition('.')[0] or key}")
+    assert caught.value.mistakes[0].startswith(key.rpartition('.')[0] or key)
     assert said in str(caught.value) and len(caught.value.mistakes) == 1
+
+
+BARE = {"normal": {"load": 115.0}, "friction": {"law": "coulomb", "static": 0.3},
+        "slide": {"kind": "sine", "amplitude": 1e-6, "frequency": 1.0}}
+
+
+@pytest.mark.parametrize("ask, said", [
+    (lambda: pf.run(BARE | {"normal": {"load": -1.0}}), "normal.load: "),
+    (lambda: pf.run(BARE | {"slide": {"kind": "sine", "amplitude": 5, "frequency": 1.0}}), "slide.amplitude: "),
+    (lambda: pf.run(BARE, **{"friction.foo": 1}), "friction.foo: "),
+    (lambda: pf.sweep(BARE, {"friction.static": []}), "friction.static: the sweep has no value for this key"),
+    (lambda: pf.run([BARE]), "a scene: a path, a text, a dict of tables or a Scene is needed, not ")])
+def test_refuses_in_the_words_of_python(ask, said):
+    """No option of the command line, and no line of a text that nobody wrote."""
+    with pytest.raises(pf.PatchfemError) as caught:
+        ask()
+    assert str(caught.value).startswith(said)
+    assert "--set" not in str(caught.value) and "<text>" not in str(caught.value)
 
 
 def test_refuses_sets_of_what_is_made():
@@ -223,7 +241,7 @@ def test_always_every_measure_says_what_it_is(name, runs):
 def test_exact_a_number_behind_a_name_counts_interfaces_or_strips(runs):
     assert runs["two interfaces"].measures["slip_amplitude_2"].text.endswith("; of interface 2")
     assert meaning("loop_area_13", "strip") == TABLE["loop_area"].text + "; of strip 13"
-    assert meaning("relative_displacement_amplitude_steady").startswith("steady amplitude; extrapolated")
+    assert meaning("relative_displacement_amplitude_steady").startswith("steady amplitude under a sine, extrapolated")
 
 
 def test_exact_a_table_is_aligned_and_rounded_by_the_error(runs):

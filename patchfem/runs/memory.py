@@ -24,7 +24,7 @@ KEPT, KEPT_BY = 32.0, {"smooth": 80.0, "march": 45.0}
 CYCLE, CYCLE_BY = 85.0, {"smooth": 140.0, "march": 50.0}
 # per number of a turn kept from before the last cycles, four turns a cycle as long as they are fewer than all that are
 # kept; of 1e5 to 1e6 cycles, 0.8 to 1.5 of what they took
-TURN, TURN_BY, TURNS, ALL_KEPT = 6.0, {"smooth": 16.0, "march": 18.0}, 4.0, float(resume.MOST_KEPT)
+TURN, TURN_BY, TURNS = 6.0, {"smooth": 16.0, "march": 18.0}, 4.0
 GRID = 24.0  # per number of a step of the comparison methods, which keep all of them
 SLIDE = 250.0  # per sample of a bench
 ROW = 400.0  # per row of a recorded drive
@@ -168,7 +168,7 @@ def _of_rig(model: Model, engine: str, steps: int, numerics) -> list:
         window, key = of_rig.kept_samples(numerics), "drive.duration" if rig.waveform == "random" else "drive.cycles"
         key = "accuracy.steps_per_cycle" if model.accuracy.steps_per_cycle else key
         parts.append(Need(KEPT_BY.get(engine, KEPT) * width * window, f"{window:.0f} samples of the last cycles", key))
-        turns = min(TURNS * rig.cycles, ALL_KEPT)
+        turns = min(TURNS * rig.cycles, resume.MOST_KEPT)
         size = CYCLE_BY.get(engine, CYCLE) * rig.cycles + TURN_BY.get(engine, TURN) * width * turns
         parts.append(Need(size, f"the histories of {rig.cycles:.3g} cycles",
                           "drive.duration" if rig.waveform == "random" else "drive.cycles"))

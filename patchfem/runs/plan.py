@@ -12,7 +12,7 @@ from ..inputs import measured
 from ..model.model import Model, build
 from ..model.source import placed
 from ..response import rows
-from ..structure.drive_sizes import sinusoidal
+from ..structure import drive_sizes
 from . import memory
 from .bench import engine as of_bench
 from .patch import grids as patch_grids
@@ -156,7 +156,7 @@ def _planned(model: Model, per_point: bool) -> Plan:
         said[2] = [*said[2], *_groove_words(model)]
     if model.rig is not None:
         said[0] = [*said[0], *of_rig.first_words(model.rig, groups, chain)]
-    if engine in SKIPS and sinusoidal(model.rig.drive) and model.rig.cycles >= MANY:
+    if engine in SKIPS and drive_sizes.sinusoidal(model.rig.drive) and model.rig.cycles >= MANY:
         said[2] = [*said[2], UP_TO]
     return Plan(model, model.kind, model.source.effects, model.absent, engine, unknowns, steps, round(seconds, 2),
                 int(sum(part.bytes for part in parts)), chain, groups, tuple(_verdict(model, groups, parts, said)),
