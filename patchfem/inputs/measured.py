@@ -6,14 +6,13 @@ from pathlib import Path
 
 from ..faults import PatchfemError
 from .cells import cells_of, header_of, number_of, text_of
-from .laboratory import UNIVERSAL
-from .loops import OWN
 
 UNITS = {"frequency": {"Hz": 1.0, "kHz": 1e3},
          "input": {"g": 9.80665, "m/s^2": 1.0, "m s-2": 1.0},
          "acceleration": {"g": 9.80665, "m/s^2": 1.0, "m s-2": 1.0},
          "displacement": {"mil": 25.4e-6, "in": 0.0254, "m": 1.0, "mm": 1e-3, "um": 1e-6}}
-MOTIONS = ("displacement", "velocity", "acceleration", *OWN["displacement"], "relative_velocity",
+BINARY = (".mat", ".uff", ".unv", ".uf", ".58")  # endings of files of records; their reader is heavy to import
+MOTIONS = ("displacement", "velocity", "acceleration", "slide", "relative_displacement", "relative_velocity",
            "absolute_acceleration")  # columns that make a table with `time` a record
 FLAGS = {"U": "unstable", "*": "the gauge gave no reading", "R": "repeat run"}
 
@@ -55,7 +54,7 @@ def _refuse_record(path: Path) -> None:
     ending = path.suffix.lower()
     if not path.is_file():
         return
-    if ending not in (".mat", *UNIVERSAL):
+    if ending not in BINARY:
         names = [cell.partition("[")[0].strip().lower() for cell in
                  text_of(path, "a measured table").split("\n", 1)[0].split(",")]
         if "time" not in names or not set(MOTIONS) & set(names) or "frequency" in names:
