@@ -5,7 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from ...core import PatchfemError
+from ...rates import START
+from ...runs import memory
 from ...runs.many.many import batch_compile_seconds, batch_of
+from ...runs.patch.meshes import geometry_of
+from ...runs.patch.plan import spared
 from ...runs.plan import plan
 from ...scene.axes import Axis
 from .asked import Asked
@@ -13,6 +17,9 @@ from .cases import Cases
 
 LOOKED = 9  # cases that are planned, spread over the sweep
 ONCE = 0.75  # seconds of a plan that a sweep spends once: its start, its files and its page
+ALONE = 8e-3  # seconds of a case that runs by itself, besides what its plan counts
+RANKED = 0.8  # seconds of the ranking of the keys of drawn cases
+FIXED = 3  # groups among the planned cases, up to which more cases are taken to make no more of them
 TOGETHER = 1.2e-3  # seconds of a case of a batch from its values to its columns (0.8 to 1.5 ms of 2000 lumped cases)
 FEW = 1000  # cases of a sweep that has the summary of each unless it is asked otherwise
 TABLED = 200_000  # cases of a sweep that has its tables unless they are asked for
@@ -36,19 +43,39 @@ def estimate(asked: Asked, cases: Cases) -> dict:
             wrong = wrong or error
     if not plans:
         raise wrong
-    alone = [max(one.seconds - ONCE, TOGETHER) for one in plans]
     batches = [batch_of(one.model, len(cases)) for one in plans]
-    each = sum(one if batch is None else max(TOGETHER, batch.share * one) for one, batch in zip(alone, batches))
-    each /= len(plans)
-    once = ONCE + max(one * (batch is not None) for one, batch in zip(alone, batches))  # the first as a single run
+    once, alone = _alone(plans)
+    once += RANKED * (cases.drawn and len(cases.axes) > 1)
+    keys = [None if batch is None else batch.group(one.model) for one, batch in zip(plans, batches)]
+    each = [one if key is None else max(TOGETHER, batch.share * one) for one, key, batch in zip(alone, keys, batches)]
+    groups = {(batch.name, key if batch.share else ()) for batch, key in zip(batches, keys) if key is not None}
+    if groups:  # the first of each is as a single run
+        begun = np.mean([one - other for one, other, key in zip(alone, each, keys) if key is not None])
+        once += len(groups) * (len(cases) / len(plans) if len(groups) > FIXED else 1.0) * max(float(begun), 0.0)
+    seconds = once + sum(each) / len(plans) * len(cases)
     first = batches[0]
     compiles = plans[0].compile_seconds if first is None else batch_compile_seconds(first, plans[0].model)
     return plans[0].as_json() | {
-        "compile_seconds": compiles, "seconds": round(once + each * len(cases), 2), "seconds_per_case": round(each, 4),
+        "compile_seconds": compiles, "seconds": round(ONCE + seconds, 2),
+        "seconds_per_case": round(seconds / len(cases), 4),
         "bytes": max(one.bytes for one in plans), "cases": len(cases),
         "case": {axis.key: text for axis, text in zip(cases.axes, cases.texts(numbers[0]))},
         "disk_bytes": (DISK if len(cases) <= FEW else COLUMNS if len(cases) <= TABLED else BARE) * len(cases),
         "values": {axis.key: _values(axis) for axis in cases.axes}}
+
+
+def _alone(plans: list) -> tuple:
+    """(seconds that all cases share, seconds of each of the planned cases by itself): without the start of a run and
+    the frames of its motion, and without condensing pieces that all cases have."""
+    own = [one.seconds - START - memory.code(one.model, one.engine).seconds for one in plans]
+    patches, shared = [one.model.patch for one in plans], 0.0
+    if None not in patches:
+        parts = [spared(one.model.patch, one.model.patch.mesh_tolerance or one.model.accuracy.tolerance)
+                 for one in plans]
+        same = len({geometry_of(one) for one in patches}) == 1
+        own = [one - frames - same * condensed for one, (condensed, frames) in zip(own, parts)]
+        shared = same * max(condensed for condensed, _ in parts)
+    return shared, [max(one, 0.0) + ALONE for one in own]
 
 
 def _values(axis: Axis) -> int:

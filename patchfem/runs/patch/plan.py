@@ -7,7 +7,7 @@ from ...core import say
 from ...model.model import Model
 from ...model.patch import bars, block_shear
 from . import skin
-from .grids import Sizes
+from .grids import Sizes, expected_grids
 from .high_order import takes_cells
 
 # bytes of packages; per predicted byte of condensing; per node: of pieces beyond the interface, of frames
@@ -34,8 +34,20 @@ def effort(asked, found: Sizes, tolerance: float) -> tuple:
         decades = log10(1e-3 / tolerance) * (1 if found.ends == 0 and not asked.lower.thickness else sqrt(rates.EDGED))
         seconds, size = seconds + rates.SHARPER * decades**2, size + SHARPER_BYTES * decades**2
     if not asked.still:
-        seconds, size = seconds + rates.MOVING + rates.MOVING_NODE * found.nodes, size + FRAMES_NODE * found.nodes
+        seconds, size = seconds + _frames(found), size + FRAMES_NODE * found.nodes
     return seconds, size
+
+
+def spared(asked, tolerance: float) -> tuple:
+    """(seconds of condensing the pieces of a `PatchModel`, seconds of its fields and of the frames of its motion): what
+    of `effort` the cases of a sweep with the same pieces share, and what a case of a sweep does not make."""
+    found = expected_grids(asked, tolerance)
+    condensed = (rates.OUTLINED if found.outlined else rates.CONDENSED) * found.seconds
+    return condensed, rates.FIELDS + (0.0 if asked.still else _frames(found))
+
+
+def _frames(found: Sizes) -> float:
+    return rates.MOVING + rates.MOVING_NODE * found.nodes
 
 
 def chain(asked) -> dict:
