@@ -10,6 +10,7 @@ from lane_bars import held as within
 
 from patchfem.api import base_of, build, load, run, run_many
 from patchfem.runs.many import many, one_by_one
+from patchfem.runs.many.answers import Answers
 from patchfem.runs.many.lumped import lanes, lumped
 from patchfem.scene.sets import assignments
 
@@ -331,3 +332,10 @@ def test_exact_the_secant_of_a_slide_that_turns_beside_the_end_of_a_cycle_is_tha
     assert np.nansum(np.abs(ones.values["secant_stiffness"][slides])) == 0
     held = ones.values["stick_fraction"] > 0.02
     assert held.any() and np.isnan(ones.values["secant_stiffness"][held]).all()
+
+
+def test_always_cases_that_all_run_away_are_not_judged_by_a_loop():
+    """Motions that grow have no friction loop; the damping ratio was held against it, and the whole batch was lost."""
+    cases, found = models("lugre", 5, 3), Answers.blank(3)
+    found.measure("equivalent_damping", "1")
+    assert "loop_area" not in found.values and not lanes.too_wide(cases, found).any()

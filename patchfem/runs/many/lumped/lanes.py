@@ -380,7 +380,7 @@ def too_wide(models, found: Answers, meshed: dict | None = None) -> np.ndarray:
             continue  # an extrapolation errs alike at finer steps, and in the exact engine
         of_mesh = (meshed or {}).get(name.removesuffix("_steady"), 0.0)
         floors = np.fmax(found.floors[name], tolerance * larger_term(name, found.values))
-        if name == "equivalent_damping":  # it is the loop over an energy, and no better known
+        if name == "equivalent_damping" and "loop_area" in found.values:  # the loop over an energy, known no better
             floors = np.fmax(floors, found.floors["loop_area"] * _of_loop(found.values))
         out |= found.errors[name] - of_mesh > tolerance * np.abs(values) + floors
     return out
