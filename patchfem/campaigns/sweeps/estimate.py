@@ -8,8 +8,6 @@ from ...core import PatchfemError
 from ...rates import START
 from ...runs import memory
 from ...runs.many.many import batch_compile_seconds, batch_of
-from ...runs.patch.meshes import geometry_of
-from ...runs.patch.plan import spared
 from ...runs.plan import plan
 from ...scene.axes import Axis
 from .asked import Asked
@@ -70,6 +68,9 @@ def _alone(plans: list) -> tuple:
     own = [one.seconds - START - memory.code(one.model, one.engine).seconds for one in plans]
     patches, shared = [one.model.patch for one in plans], 0.0
     if None not in patches:
+        from ...runs.patch.meshes import geometry_of  # not for sweeps of a point, which need no mesh
+        from ...runs.patch.plan import spared
+
         parts = [spared(one.model.patch, one.model.patch.mesh_tolerance or one.model.accuracy.tolerance)
                  for one in plans]
         same = len({geometry_of(one) for one in patches}) == 1
