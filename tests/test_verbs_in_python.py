@@ -147,7 +147,7 @@ def test_refuses_free_keys_without_two_ends(tmp_path, free, said):
     (pf.new("wear"), {"hold": "frequency=1 Hz"}, "hold applies only to fits to a loop"),
     (BLOCK, {"starts": 0}, "at least one"),
     (BLOCK, {"seed": -1}, ">= 0"), (BLOCK, {"unstable": "maybe"}, "bound, out, read"),
-    (BLOCK, {"hold": "frequency=135 Hz"}, "--hold frequency=135 Hz: no row")])
+    (BLOCK, {"hold": "frequency=135 Hz"}, "--hold frequency=135 Hz: none of the rows")])
 def test_refuses_options_that_a_fit_does_not_have_before_anything_is_read(tmp_path, scene, given, said):
     with pytest.raises(pf.PatchfemError, match=said):
         pf.fit(scene, to=rows_in(tmp_path), free={"friction.static": "0.1..0.5"}, **given)

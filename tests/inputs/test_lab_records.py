@@ -42,7 +42,7 @@ def test_exact_units_of_dataset_164_and_of_labels(tmp_path):
     assert found.values["velocity"] == pytest.approx(SLIDE * 0.0254, rel=1e-14)
     assert len(found.notes) == 1 and "'?' is not known; the unit of dataset 164 is used" in found.notes[0]
     bare = read_records(written(tmp_path / "b.uff", [record(TIME, FORCE, 13)]), [])
-    assert np.array_equal(bare.values["force"], FORCE) and "taken as SI" in bare.notes[0]
+    assert np.array_equal(bare.values["force"], FORCE) and "read as SI" in bare.notes[0]
 
 
 def test_exact_channels_by_name_place_and_number(tmp_path):

