@@ -449,13 +449,14 @@ def mesh(scene: str | Path | Scene | Model, out: str | Path, /, **sets: Any) -> 
 
 
 def compare(*files: str | Path, direction: str = "", units: tuple[str, str] | None = None, shift: float | None = None,
-            keep_spikes: bool = False, pairs: str | Path | None = None) -> dict[str, Any]:
+            keep_spikes: bool = False, pairs: str | Path | None = None, datum: str = "") -> dict[str, Any]:
     """Compare a measured surface before and after wear: the dict of compare.json, in SI.
 
     files: the surface before and the surface after wear, as two traces or two areal scans; optionally a second pair of
     traces in the other direction. direction: "x" or "y", along which the first two traces run. units: units of x and z
     for files that give none, such as ("mm", "um"). shift: known shift of the second trace [m], 0.0 if both start at the
-    same mark. keep_spikes: do not remove spikes, dropouts and dust. pairs: a table of pairs instead of files, with the
+    same mark. keep_spikes: do not remove spikes, dropouts and dust. datum: "straight" if the datum of the instrument is
+    known to be straight, so that no bow is subtracted from traces. pairs: a table of pairs instead of files, with the
     columns before and after.
 
     In the dict, `verdict` and `sentences` are texts. `shift`, `worn_depth_mean`, `amplitude_ratio` and others have
@@ -465,11 +466,13 @@ def compare(*files: str | Path, direction: str = "", units: tuple[str, str] | No
     results folders of two runs, the second with [wear], the dict has the wear between the two runs over the whole
     patch, and the measures of both runs under `runs`. Raises PatchfemError for files that do not fit together.
     """
-    how = {"units": units, "shift": _metres(shift, "compare: shift"), "keep_spikes": keep_spikes}
+    how = {"units": units, "shift": _metres(shift, "compare: shift"), "keep_spikes": keep_spikes,
+           "datum": datum}
     files = [_path(one, "compare") for one in files]
     _word(direction, "compare: direction")
+    _word(datum, "compare: datum")
     if pairs is None and len(files) > 1 and any(Path(one).is_dir() for one in files):
-        if len(files) > 2 or direction or units is not None or shift is not None or keep_spikes:
+        if len(files) > 2 or direction or units is not None or shift is not None or keep_spikes or datum:
             raise PatchfemError("compare: give two results folders alone, without other files or settings of traces")
         lost = worn.lost(*map(Path, files))
         return worn.data_of(lost, worn.verdict(lost))

@@ -48,6 +48,8 @@ def compare(before: Path | None = None, after: Path | None = None, /, *other: Pa
                         'start at the same mark') = "",
             keep_spikes: flag("keep spikes, dropouts and dust; without this option they are removed from "
                               "traces") = False,
+            datum: word('write "straight" if the datum of the instrument is known to be straight; then no bow is '
+                        'subtracted from traces') = "",
             scene: Annotated[Path | None, Parameter(name="--scene", help="scene with a patch, such as rig.toml; the "
                                                                          "patch is pressed with each of the two "
                                                                          "surfaces in turn")] = None,
@@ -63,7 +65,10 @@ def compare(before: Path | None = None, after: Path | None = None, /, *other: Pa
     """
     if direction not in ("", "x", "y"):
         raise Refused(f"compare --direction {direction}: the direction must be x or y")
-    how = {"units": pair(units), "shift": quantity(shift, "length", "compare --shift"), "keep_spikes": keep_spikes}
+    if datum not in ("", "straight"):
+        raise Refused(f"compare --datum {datum}: the datum must be straight")
+    how = {"units": pair(units), "shift": quantity(shift, "length", "compare --shift"), "keep_spikes": keep_spikes,
+           "datum": datum}
     files = [one for one in (before, after, *other) if one is not None]
     if pairs is not None:
         if files or scene is not None:
@@ -78,7 +83,7 @@ def compare(before: Path | None = None, after: Path | None = None, /, *other: Pa
         worn.lost(before, after)  # which refuses a file beside a folder
     if any(folders):
         _no_traces({"a third file": other, "--direction": direction, "--units": units, "--shift": shift,
-                    "--keep-spikes": keep_spikes, "--scene": scene, "--set": set_})
+                    "--keep-spikes": keep_spikes, "--datum": datum, "--scene": scene, "--set": set_})
         return _runs(before, after, out, json_)
     parts, found, directions = verdict.judged(tuple(files), direction, **how)
     target = placed(out, f"{before.stem}-{after.stem}")

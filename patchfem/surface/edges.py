@@ -55,6 +55,33 @@ def edge_near(rest, worn: int, noise: float, together: float) -> tuple:
     return best, max(low + int(near[0]) - 1, 0), min(low + int(near[-1]) + 1, rest.size - 1)
 
 
+def foot(rest, worn: int, noise: float):
+    """(edge, lowest, highest) index of the foot of a shallow flank in depths (n,) that end in the middle of a track;
+    None where the track begins with a step.
+
+    The depth is zero up to the foot and b t + c t^2 from there to the middle, or a step and then the same depth. The
+    foot is that of the least sum of squares; every foot within 5.8 noise^2 of it is in the interval. worn: first index
+    that the means show as worn; noise [m] of a depth, times the root of how many neighbours err alike.
+    """
+    apart = max(rest.size // 500, 1)
+    places = np.arange(max(2 * worn - rest.size, 0), worn + (rest.size - worn) // 2, apart)
+    square, step = np.cumsum(np.concatenate([[0.0], rest**2])), np.inf
+    sums = np.full(places.size, np.inf)
+    for at, k in enumerate(places):
+        flank = rest[k:]
+        t = np.arange(1, flank.size + 1) / flank.size
+        base = np.column_stack([t, t * t])
+        shape = np.linalg.solve(base.T @ base, base.T @ flank)
+        if shape[0] < 0:  # rises out of the surface
+            shape = np.array([0.0, max(float(base[:, 1] @ flank) / float(base[:, 1] @ base[:, 1]), 0.0)])
+        sums[at] = square[k] + float(((flank - base @ shape) ** 2).sum())
+        step = min(step, square[k] + float(((flank - flank.mean()) ** 2).sum()))
+    if step < sums.min():
+        return None
+    near = places[sums <= sums.min() + 1.5 * SIDE**2 * noise**2]
+    return int(places[int(np.argmin(sums))]), max(int(near[0]) - apart, 0), min(int(near[-1]) + apart, rest.size - 1)
+
+
 def _left(flank, noise: float, before: bool) -> tuple:
     """Sums of squares that flanks from zero and from a step leave of depths (n,) [m]; noise [m] of their mean times
     sqrt(n); before: no step up begins there.

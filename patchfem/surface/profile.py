@@ -185,8 +185,10 @@ def despiked(profile: Profile) -> Profile:
         return profile
     heights = np.array(profile.z)
     heights[there[out]] = np.nan
-    note = (f"{profile.source}: {out.sum()} of {z.size} heights are spikes, dropouts or dust (the first at x = "
-            f"{say(profile.x[there[np.argmax(out)]])}) and are left out; use --keep-spikes to keep them")
+    count = len(runs_of(out))
+    note = (f"{profile.source}: spikes, dropouts or dust at {count} place{'s' * (count > 1)} (the first at x = "
+            f"{say(profile.x[there[np.argmax(out)]])}) are left out, {out.sum()} of {z.size} heights with their "
+            "neighbours; use --keep-spikes to keep them")
     return replace(profile, z=frozen_array(heights), notes=(*profile.notes, note))
 
 

@@ -64,8 +64,10 @@ def test_exact_the_answer_in_one_command(files, compared):
     found = json.loads((out / "compare.json").read_text())
     assert found["reference"] == "place" and found["direction"] == "y"
     for name in NAMES:
-        assert set(found[name]) == {"value", "low", "high", "unit"}
+        assert set(found[name]) == {"value", "low", "high", "unit"} | ({"over"} if name == "worn_depth_mean" else set())
         assert found[name]["low"] <= found[name]["value"] <= found[name]["high"]
+    assert found["worn_depth_mean"]["over"] == "common length"
+    assert "worn depth, mean over the common length" in answer.out
     assert [found[name]["unit"] for name in NAMES] == ["m", "m", "m", "m2", "1", "1"]
     assert found["shift"]["value"] == pytest.approx(p.shift, abs=0.02 * UM)
     assert found["worn_depth_max"]["value"] == pytest.approx(p.worn.max(), abs=0.1 * UM)
@@ -162,6 +164,7 @@ def test_refuses_a_scene_without_a_patch(files, tmp_path):
 
 @pytest.mark.parametrize("words, says", [
     (("--direction", "z"), "compare --direction z: the direction must be x or y"),
+    (("--datum", "bent"), "compare --datum bent: the datum must be straight"),
     (("third.csv",), "compare: 3 files; two files are needed, or four"),
 ])
 def test_refuses_with_exit_code_2(files, words, says):

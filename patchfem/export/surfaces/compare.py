@@ -43,6 +43,7 @@ WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_ma
          "worn_share": "fraction of the common region that is worn",
          "shift_x": "shift along x", "shift_y": "shift along y", "rotation": "rotation",
          "worn_depth_mean_from_abbott": "worn depth, mean, from Abbott curves"}
+COMMON, TRACK = "common length", "track"
 DRAWN = 1_000_000  # heights that a histogram and an Abbott curve are drawn from, spread over a larger scan
 NOTE = ("All intervals are 95 % intervals. The intervals of shift, depth and area hold for the measured place and "
         "come from the noise of the unworn heights. A track or worn part begins where the flank that is fitted to its "
@@ -52,6 +53,19 @@ NOTE = ("All intervals are 95 % intervals. The intervals of shift, depth and are
         "than its interval says. The intervals of ratios hold for the whole surface and assume Gaussian heights with "
         "the same statistics everywhere. If both traces are of the same place, their heights vary together, and the "
         "intervals are narrower.")
+
+
+def words_of(one: Comparison, name: str) -> str:
+    """A number of a comparison as words; a mean depth tells over what."""
+    over = _over(one) if name == "worn_depth_mean" else None
+    return WORDS[name] if over is None else f"{WORDS[name]} over the {over}"
+
+
+def _over(one: Comparison) -> str | None:
+    """What the mean worn depth of traces is the mean over, None of scans and where there is none."""
+    if not isinstance(one.before, Profile) or one.worn.mean.value is None:
+        return None
+    return TRACK if one.reference == "flanks" else COMMON
 
 
 def shown(one: Quantity) -> tuple:
@@ -92,7 +106,7 @@ def lines_of(parts: list, found: tuple, pressing: Pressed | None = None) -> list
         out.append(f"  {'':<38} {'value':>10}  {'95 %':<22} unit")
         for key, quantity in one.values.items():
             value, interval, unit = shown(quantity)
-            out.append(f"  {WORDS[key]:<38} {value:>10}  {interval:<22} {unit:<5}".rstrip())
+            out.append(f"  {words_of(one, key):<38} {value:>10}  {interval:<22} {unit:<5}".rstrip())
     if pressing is not None:
         out += ["", f"{pressing.title}, pressed with each surface"]
         out.append(f"  {'':<38} {'before':>24} {'after':>24}")
@@ -112,8 +126,7 @@ def data_of(parts: list, found: tuple, directions: list, pressing: Pressed | Non
     """The answer as plain data in SI; the first direction stands at the top."""
     def part(one: Comparison) -> dict:
         return {"before": one.before.source, "after": one.after.source, "direction": one.direction or None,
-                "reference": one.reference or None, **{name: plain_of(each) for name, each in one.values.items()},
-                **_of_traces(one)}
+                "reference": one.reference or None, **_numbers(one), **_of_traces(one)}
 
     out = {"patchfem": __version__, "verdict": found[0], "sentences": found[1], "confidence": LEVEL,
            "band": list(BAND), **part(parts[0]), "notes": [text for one in parts for text in one.notes]}
@@ -123,6 +136,14 @@ def data_of(parts: list, found: tuple, directions: list, pressing: Pressed | Non
                              for when, amplitude, slope in directions}
     if pressing is not None:
         out["pressed"] = pressed_data(pressing)
+    return out
+
+
+def _numbers(one: Comparison) -> dict:
+    """Every number as plain data; the mean worn depth has what it is the mean over in `over`."""
+    out = {name: plain_of(each) for name, each in one.values.items()}
+    if _over(one) is not None:
+        out["worn_depth_mean"]["over"] = _over(one)
     return out
 
 
@@ -324,7 +345,7 @@ def _table(one: Comparison) -> str:
         value, interval, unit = shown(quantity)
         cells = [escape(value), escape(interval), escape(unit)] if quantity.value is not None else ["&ndash;", "", ""]
         text = quantity.text if quantity.value is not None else f"{quantity.text}: not available"
-        rows.append([escape(WORDS[key]), *cells, f"<td class=soft>{prose(text)}</td>"])
+        rows.append([escape(words_of(one, key)), *cells, f"<td class=soft>{prose(text)}</td>"])
     return table(("quantity", ">value", ">95 %", "unit", "meaning"), rows)
 
 

@@ -21,7 +21,7 @@ ABOUT = ("The mean is taken over the pairs that have a value, each with equal we
 
 def answers(asked: list, direction: str = "", done=None, **how) -> list[dict]:
     """The answer of each pair, of files or of results folders, as `compare` gives it (`pairs.each_pair`); how: units,
-    shift, keep_spikes of all files, direction: of the traces that tell none."""
+    shift, keep_spikes, datum of all files, direction: of the traces that tell none."""
     def answer(paths: tuple, own: str) -> dict:
         if not any(one.is_dir() for one in paths):
             return compare.data_of(*verdict.judged(paths, own or direction, **how))

@@ -8,9 +8,10 @@ from ...core import say
 from ...scales import plain
 from ..profile import runs_of
 from ..quantity import SIDE, Quantity, refused
-from .registration import REACH, Registration
+from .registration import ENDS, REACH, Registration
 
 PART, SAMPLES, FILLED = 0.05, 40, 0.7  # of the length, samples, and share of unworn heights of a part that carries
+SHORT = ENDS[1]  # of the length, where the datum is straight
 WORN, BROAD, LEAST = 2 * REACH, 16, 0.005  # deviations of a rubbed place, its samples at half of them, share of x
 CURVED, BOWED = 30.0, 0.75  # chi-squared of a bow in an unworn part, and its size in noises, from which it is none
 TURNS, HIGHER, VALLEYS = 8, 0.65, 0.1  # worn tops, share of unworn heights that lie lower than they, share of valleys
@@ -31,10 +32,10 @@ class Carried(NamedTuple):
 def carried(found: Registration) -> Carried:
     """What tells the worn heights of a registration from unworn ones.
 
-    Unworn parts are runs of a twentieth of the length or more whose heights are unworn and straight, beside rubbed
-    places (`_rubbed`); a part that is bowed is the foot of wear that runs out slowly. Valleys carry where more than
-    eight worn tops stand between them. Without either, wear that is the same everywhere, a wedge, or a bow may be
-    anything: specks where interpolation errs are no rubbed place.
+    Unworn parts are runs of a twentieth of the length or more (a fiftieth, where the datum is straight) whose heights
+    are unworn and straight, beside rubbed places (`_broad`); a part that is bowed is the foot of wear that runs out
+    slowly. Valleys carry where more than eight worn tops stand between them. Without either, wear that is the same
+    everywhere, a wedge, or a bow may be anything: specks where interpolation errs are no rubbed place.
     """
     off, x = median_of_five(found.rest / found.scatter), found.x
     share = float(found.used.mean())
@@ -69,9 +70,10 @@ def _higher(found: Registration, off) -> float:
 
 def _carries(found: Registration, first: int, last: int) -> bool:
     """Whether a run of heights is long, unworn and straight."""
+    least = SHORT if found.declared else PART
     x, trim = found.x, (last - first) // 10
     part = slice(first + (trim if first else 0), last + 1 - (trim if last < x.size - 1 else 0))
-    if x[last] - x[first] < PART * (x[-1] - x[0]) or last - first < SAMPLES or found.used[part].mean() < FILLED:
+    if x[last] - x[first] < least * (x[-1] - x[0]) or last - first < SAMPLES or found.used[part].mean() < FILLED:
         return False
     used = found.used[part]
     along, rest = np.linspace(-1, 1, used.size)[used], found.rest[part][used]

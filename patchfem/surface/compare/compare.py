@@ -15,10 +15,10 @@ from . import depth as worn_depth
 from .carried import Carried, carried, hidden_wear, outside, raised
 from .depth import Worn
 from .flanks import Flanks, flanks_of
-from .place import Match
+from .place import CLEAR, Match
 from .ratios import BEYOND, Size, at_step, bridged, likeness, loose, of_noise, ratio, scattered, size_along, size_of
 from .registration import Registration, gain_of, register
-from .rivals import bow_or_scar, undecided
+from .rivals import BENT, flanks_differ, readings
 from .same import Place, found_place
 from .shallow import on_flanks, shallow_of
 from .specks import without_specks
@@ -45,7 +45,8 @@ class Comparison:
     other order alone; tracks; carried: what carries the registration, None without one; hidden: what a wedge may hide;
     removed: heights missing or left out in each; mirrored, turned: whether one trace was, for the registration; gain:
     heights after over before where they differ by one factor, None where not. change: of two scans, place by place.
-    visible [m]: depth from which a track would have been found where none is shown, None where that is not known.
+    visible [m]: depth from which a track would have been found where none is shown, None where that is not known;
+    open: the readings that explain two traces alike, in a few words, "" where there is one.
     """
 
     before: Profile | Areal
@@ -74,6 +75,7 @@ class Comparison:
     gain: float | None = None
     change: Change | None = None
     visible: float | None = None
+    open: str = ""
 
     @property
     def values(self) -> dict:
@@ -98,7 +100,7 @@ class Comparison:
 
 
 def compared(before: Profile, after: Profile, direction: str = "", band: tuple = BAND, shift: float | None = None,
-             keep_spikes: bool = False) -> Comparison:
+             keep_spikes: bool = False, straight: bool = False) -> Comparison:
     """Compare two traces of a surface.
 
     Spikes, dropouts and dust are left out unless keep_spikes. Where valleys or parts of both traces agree
@@ -106,15 +108,16 @@ def compared(before: Profile, after: Profile, direction: str = "", band: tuple =
     the worn depth is what is missing, where unworn parts or valleys carry that (`carried`). Else the worn depth counts
     from unworn flanks of the trace after (`flanks`), or is refused and the guess from the Abbott curves stands beside
     it. band [m]: waves of the amplitude ratio. shift [m]: where it is known, a place at x of the one is taken to stand
-    at x + shift of the other, give or take half a wave. PatchfemError for traces that cannot show the band.
+    at x + shift of the other, give or take half a wave. straight: the datum is known to be straight, so no bow is taken
+    out. PatchfemError for traces that cannot show the band.
     """
     sides = (before, after) if keep_spikes else (despiked(before), despiked(after))
-    place = found_place(*sides, shift)
+    place = found_place(*sides, shift, not straight)
     if place.found is not None and not keep_spikes:
-        place = _without_specks(place)
+        place = _without_specks(place, not straight)
     removed = tuple(int(one.missing.sum()) for one in (place.before, place.after))
     return _placed(place, direction, band, removed) if place.found is not None else \
-        _apart(place, direction, band, removed)
+        _flanked(_apart(place, direction, band, removed))
 
 
 def _named(track) -> dict:
@@ -129,14 +132,14 @@ def identical(before, after) -> bool:
         if hasattr(before, name))
 
 
-def _without_specks(place: Place) -> Place:
+def _without_specks(place: Place, bow: bool) -> Place:
     """The place again without what stands out of the difference as no surface does."""
     for _ in range(2):
         before, after = without_specks(place.found, place.before, place.after)
         if before is place.before and after is place.after:
             break
         try:
-            found = register(before, after, place.found.shift)
+            found = register(before, after, place.found.shift, bow=bow)
         except PatchfemError:
             break
         place = place._replace(before=before, after=after, found=found)
@@ -149,12 +152,15 @@ def _placed(place: Place, direction: str, band: tuple, removed: tuple) -> Compar
     if identical(before, after):  # but for round-off the fit finds no shift and no tilt
         found = replace(found, shift=0.0, slope=0.0)
     by, visible = carried(found), None
-    if undecided(found):
+    opened, why = readings(found, by, before, after)
+    if opened:
         by = by._replace(by="")
     elif not by.by and not raised(found):
         visible = shallow_of(found)
         if visible is not None and visible.span is not None:
             found, by = on_flanks(found, visible.span)
+            opened, why = readings(found, by, before, after)
+            by = by._replace(by="") if opened else by
     hidden = hidden_wear(found, by)
     notes, step = _steps(before, after)
     gain = gain_of(found) if not (by.by or raised(found)) else None
@@ -165,7 +171,7 @@ def _placed(place: Place, direction: str, band: tuple, removed: tuple) -> Compar
         worn = replace(worn, largest=_deepest(found, worn.largest, tracks.sizes.get("depth_floor")))
     else:
         worn = worn_depth.nowhere(
-            bow_or_scar(found) if undecided(found) else "no part of the traces is known to be unworn, so uniform, "
+            why if opened else "no part of the traces is known to be unworn, so uniform, "
             "wedge-shaped or bow-shaped wear cannot be told from no wear", worn.deposited if raised(found) else 0.0)
     pieces = pieces_of(found, tracks, band[1])
     flat = pieces_of(found, tracks, band[1], True)
@@ -181,11 +187,11 @@ def _placed(place: Place, direction: str, band: tuple, removed: tuple) -> Compar
                        "both traces alike"))
     stretch = around(1 + found.stretch[0], found.stretch[1], "1", STRETCH) if np.isfinite(found.stretch[0]) \
         else refused("1", STRETCH, "too few heights are unworn")
-    grew = worn.deposited > (worn.area.high or 0.0) and not (worn.mean.low or 0.0) > 0
+    grew = not opened and worn.deposited > (worn.area.high or 0.0) and not (worn.mean.low or 0.0) > 0
     return Comparison(before, after, direction, "place", place.match, around(found.shift, found.errors[2], "m", SHIFT),
                       stretch, around(found.slope, found.errors[1], "rad", TILT), worn, *ratios, None, sizes[0], found,
                       None, tuple(notes), grew, tracks, by, hidden, removed, place.mirrored, place.turned, gain,
-                      visible=None if visible is None or by.by else visible.least)
+                      visible=None if visible is None or by.by or opened else visible.least, open=opened)
 
 
 def _deepest(found: Registration, largest: Quantity, floor: Quantity | None) -> Quantity:
@@ -220,6 +226,16 @@ def _apart(place: Place, direction: str, band: tuple, removed: tuple) -> Compari
     return Comparison(before, after, direction, "" if flanks is None else "flanks", place.match, *blank, worn, *ratios,
                       abbott, sizes, None, flanks, tuple(notes), place.order,
                       of_flanks(flanks) if flanks is not None else Tracks(()), removed=removed)
+
+
+def _flanked(one: Comparison) -> Comparison:
+    """The comparison without the depth below flanks which the first trace shows to be worn."""
+    match = one.match
+    if one.flanks is None or match is None or match.repeats or not match.clear > CLEAR:
+        return one
+    why = flanks_differ(one.before, one.after, match.shift, one.flanks)
+    return one if not why else replace(one, reference="", worn=worn_depth.nowhere(why), tracks=Tracks(()),
+                                       flanks=None, open=BENT)
 
 
 def _steps(before: Profile, after: Profile) -> tuple:
@@ -302,15 +318,18 @@ def directions_of(parts: list) -> list:
 
 
 def compared_files(paths: tuple, direction: str = "", units: tuple | None = None,
-                   shift: float | None = None, keep_spikes: bool = False) -> list[Comparison]:
+                   shift: float | None = None, keep_spikes: bool = False, datum: str = "") -> list[Comparison]:
     """One `Comparison` for each direction that the files show.
 
     paths: of the surface before and after, along one direction; two more for the other direction, of traces only. An
     areal scan shows both. direction: "x", "y" or "" for two traces of no told direction; with four files or a scan it
     is that of the first pair, x unless told. units: of x and of z as `read_surface` takes them. shift [m]: where it
-    is known, as `compared` takes it, of two traces alone; keep_spikes as there. PatchfemError for another number of
-    files, another direction, a trace beside a scan, four scans, and a shift of other than two traces.
+    is known, as `compared` takes it, of two traces alone; keep_spikes as there. datum: "straight" where that of the
+    traces is known to be, so that no bow is taken out. PatchfemError for another number of files, another direction, a
+    trace beside a scan, four scans, a shift of other than two traces, another datum, and one of scans.
     """
+    if datum not in ("", "straight"):
+        raise PatchfemError(f"compare: datum {datum!r}: straight is needed, or nothing")
     if direction not in ("", "x", "y"):
         raise PatchfemError(f"compare: direction {direction!r}: x or y is needed")
     if len(paths) not in (2, 4):
@@ -324,10 +343,13 @@ def compared_files(paths: tuple, direction: str = "", units: tuple | None = None
         raise PatchfemError("compare: two or four traces are needed, or two areal scans")
     if shift is not None and True in scans:
         raise PatchfemError("compare: a shift can be given only for traces; areal scans are registered automatically")
+    if datum and True in scans:
+        raise PatchfemError("compare: a datum can be given only for traces; the plane of areal scans is fitted")
+    how = {"keep_spikes": keep_spikes, "straight": bool(datum)}
     if True in scans:
         return compared_scans(*files, direction or "x", keep_spikes)
     if len(files) == 2:
-        return [compared(*files, direction, shift=shift, keep_spikes=keep_spikes)]
+        return [compared(*files, direction, shift=shift, **how)]
     first = direction or "x"
-    return [compared(*pair, along, keep_spikes=keep_spikes) for pair, along in
+    return [compared(*pair, along, **how) for pair, along in
             ((files[:2], first), (files[2:], "y" if first == "x" else "x"))]

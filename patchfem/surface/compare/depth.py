@@ -69,9 +69,15 @@ def of_registration(found: Registration) -> Worn:
     area, error, length, deposited = summed(found, np.ones(found.rest.size, bool))
     ends = area / found.rest.size / SIDE  # the common length is known to a sample
     extent = extent_of(found, neighbours(found))
-    return Worn(_largest(found), around(area / length, float(np.hypot(error, ends)) / length, "m", MEAN, 0.0),
-                around(area, error, "m2", AREA, 0.0), deposited, extent,
+    mean = around(area / length, float(np.hypot(error, ends)) / length, "m", MEAN, 0.0)
+    return Worn(_at_least(_largest(found), mean), mean, around(area, error, "m2", AREA, 0.0), deposited, extent,
                 None if extent is None else within(found, *extent.after))
+
+
+def _at_least(largest: Quantity, mean: Quantity) -> Quantity:
+    """A largest depth, which is never below the mean."""
+    return largest if largest.value >= mean.value else largest._replace(
+        value=mean.value, low=max(largest.low, mean.low), high=max(largest.high, mean.high))
 
 
 def within(found: Registration, start: Quantity, end: Quantity) -> Quantity | None:

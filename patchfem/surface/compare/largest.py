@@ -11,6 +11,7 @@ PARTS = 8  # of a window, whose means the parabola must meet
 ALIKE = 2.5  # deviations that a misfit of noise may have: 97 of 100 windows of noise alone fit
 CAPPED, TAIL = 3.0, 8.0  # deviations that a height of a window counts with at most, and that none may have
 FEW_TAILS = 2.0  # variance of a few heights, over that of normal noise
+LONG = 64  # samples of a window that shows the slopes beside it by fewer
 BLUNT = 8.0  # noises below the top within which a depth may be the largest
 DOUBT = 3.0  # deviations that a depth loses in the choice of the largest: a sharper window must show it clearly
 SHORT = 4.5  # the same for a few heights
@@ -26,8 +27,8 @@ def largest(found: Registration, together: float) -> tuple:
     square, in which a single height counts three deviations at most, nor in the means of its eight parts; where no
     window fits, it is the height itself. What is left of the excess is the mean one of `DRAWS` draws of the noise
     through the same windows, and is taken off. The deviation has that of the draws, that excess, which the draws see by
-    half for a flat floor, and what the registration leaves open. together: how many neighbouring heights err alike
-    (`registration.together`).
+    half for a flat floor, what a corner hides (`_corner`), and what the registration leaves open. together: how many
+    neighbouring heights err alike (`registration.together`).
     """
     rest, noise = np.asarray(found.rest), found.scatter
     start, size = _windows(rest, noise, together)
@@ -54,7 +55,30 @@ def largest(found: Registration, together: float) -> tuple:
     part = slice(int(start[top]), int(start[top] + size[top]))
     base = _base(int(size[top]))
     pull = base[top - part.start] @ (base.T @ found.gradient[part])
-    return float(smooth[top] - excess), float(np.sqrt(peaks.var() + excess**2 / 4 + found.error(pull) ** 2))
+    hidden = _corner(rest, part, found.noise * np.sqrt(together))
+    return float(smooth[top] - excess), float(np.sqrt(peaks.var() + excess**2 / 4 + hidden**2 + found.error(pull) ** 2))
+
+
+def _corner(rest, part: slice, noise: float) -> float:
+    """Depth [m] that a corner may reach above the parabola of a window, 0 where the depth is round.
+
+    Least squares leave a corner between slopes of s on either side by 3/16 s h above a parabola of half width h. The
+    slopes are those of lines through the samples beside the window, as many or, of a long window, which may reach over
+    most of a scar, a quarter of them; those of a parabola are as steep as it goes on, those of a corner 1/4 to 2/5 of
+    that. A long window must show the difference beyond noise [m], three deviations of it.
+    """
+    length = part.stop - part.start
+    many = length if length < LONG else length // 4
+    if length < 5 or part.start < many or part.stop + many > rest.size:
+        return 0.0
+    at, away = np.arange(many) - (many - 1) / 2, (length + many) / 2
+    rise = [float(at @ rest[begin:begin + many]) / float(at @ at) for begin in (part.start - many, part.stop)]
+    slope = (rise[0] - rise[1]) / 2
+    own = -2 * float(np.polyfit(np.arange(length), rest[part], 2)[0]) * away
+    doubt = 3 * 27 * noise / length**1.5 if length >= LONG else 0.0  # 27: of both slopes together, for white noise
+    if slope <= 0 or own - slope <= doubt:
+        return 0.0
+    return 3 / 16 * slope * length / 2 * float(np.clip(1.5 * (1 - slope / own), 0, 1))
 
 
 def _shared(start, size, heights):

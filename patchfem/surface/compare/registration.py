@@ -28,6 +28,8 @@ BENT, GROWN = 0.8, 0.5  # of the noise that a bend, or heights that grew, must l
 ALL = 0.8  # of the differences, at most, that one factor of the heights leaves
 SIDES = 20  # parts of the trace whose low depths show a bend
 ROUNDS, EIGHTHS = 100, 8
+PARTS = 60  # of the trace, whose means show its slow differences
+OUTERMOST = 0.005  # share of the length at an end that is looked at for wear or growth
 ENDS = 0.05, 0.02  # share of the length of a flank that tells two readings apart, and of one that is too short for that
 LEAST, BOTH = 40, 16  # samples of a flank, and of a mean that shows the foot of a scar
 NOISIER, COLLINEAR = 1.3, 30.0  # noise of one reading over that of the other, and chi-squared of an end off its line
@@ -58,7 +60,8 @@ class Registration:
     as slight wear of the higher half would bring it about; bend [m]: sag of the second against the first in the middle
     of the trace that was taken out, 0 where none was; track: first and last sample of a track that is shallower than
     the noise, each with the lowest and highest likely (`shallow`), None without one; rival: another registration that
-    explains the traces too (`flanked`), None without one.
+    explains the traces too (`_with_flanks`), None without one; declared: whether the datum was declared straight, so
+    that shorter flanks carry the registration.
     """
 
     shift: float
@@ -76,6 +79,7 @@ class Registration:
     bend: float = 0.0
     track: tuple | None = None
     rival: "Rival | None" = None
+    declared: bool = False
 
     @property
     def errors(self) -> tuple:
@@ -120,7 +124,7 @@ class Registration:
         return out * _deviations(rest / out, np.abs(self.gradient[:, 2]), QUIETEST)
 
 
-def register(before: Profile, after: Profile, shift: float, lowest: float = LOWEST) -> Registration:
+def register(before: Profile, after: Profile, shift: float, lowest: float = LOWEST, bow: bool = True) -> Registration:
     """Register `after` on `before` from a first guess of the shift [m], right within a quarter of a wave (`place`).
 
     Between its samples the first trace is a cubic spline. The fit starts from the one-sided line over the lowest
@@ -130,9 +134,9 @@ def register(before: Profile, after: Profile, shift: float, lowest: float = LOWE
     shift, halved from round to round. Slopes come from parabolas as long as the noise wants. A second fit lets the
     second trace be longer or shorter by a factor; where that halves the noise, the heights are compared with the factor
     taken out. A third one lets it be bent, from the parabola that most low depths lie on; where that takes a fifth of
-    the noise away, the bend is taken out. All of it is tried with heights that grew, too, and taken where that halves
-    the noise, or where else both ends were worn and the middle not. What lies in a gap of the first trace does not
-    count.
+    the noise away, the bend is taken out, unless bow is False. All of it is tried with heights that grew, too,
+    and taken where that halves the noise, or where else both ends were worn and the middle not. What lies in a gap of
+    the first trace does not count.
     PatchfemError where fewer than 12 heights are unworn.
     """
     fit = _Fit(before, after, shift)
@@ -142,6 +146,8 @@ def register(before: Profile, after: Profile, shift: float, lowest: float = LOWE
         fit.smooth_slope(fit.noise(first))
     best = _straight(fit, *fit.start(shift, lowest))
     for side, bent, better in ((-1, False, GROWN), (1, True, BENT), (-1, True, GROWN)):
+        if bent and not bow:
+            continue
         fit.side = side
         start = fit.start(shift, lowest, bent)
         other = _bent(fit, *start) if bent else _straight(fit, *start)
@@ -151,7 +157,25 @@ def register(before: Profile, after: Profile, shift: float, lowest: float = LOWE
     if best is None:
         raise PatchfemError(f"{after.source}: fewer than {FEWEST} heights of this trace lie on the valleys of "
                             f"{before.source}, so there is no common reference")
+    if not bow:
+        fit.side = 1
+        starts = (_bent(fit, *fit.start(shift, share, True)) for share in (lowest, 1.0))
+        near = min((one for one in (best, *starts) if one is not None), key=lambda one: one.noise)
+        return replace(_declared(fit, best, near), declared=True)
     return _with_flanks(fit, best)
+
+
+def _declared(fit, best: Registration, near: Registration) -> Registration:
+    """The registration where the datum is straight: short flanks on one line are unworn then, where most of the trace
+    is no unworn floor beside flanks that grew. near: a bent fit where it is quieter, as a scar spoils neither its noise
+    nor its shift."""
+    if all(unworn_ends(best)) and not _ends_off(best) and best.noise < NOISIER * near.noise:
+        return best
+    line = _line_of_ends(fit, near, ENDS[1])
+    if line is None or not _is_straight(line, ENDS[1]):
+        return replace(best, rival=Rival(_chord(fit, best), False)) if _ends_off(best) else best
+    clear = best.noise > NOISIER * line.noise
+    return replace(line, rival=Rival(best, True)) if clear else replace(best, rival=Rival(line, False))
 
 
 def _with_flanks(fit, best: Registration) -> Registration:
@@ -160,9 +184,10 @@ def _with_flanks(fit, best: Registration) -> Registration:
     A bow and a scar over most of the trace look alike but for the flanks of the scar: these lie on one straight line,
     and a bow would have to wear them off to just that line. A floor of most heights and its flanks look like flanks
     that grew. Flanks of a twentieth of the length each, straight and on one line within the noise, tell both apart.
-    Shorter ones do not: the registration stays, with the line as its rival.
+    Shorter ones do not: the registration stays, with the line as its rival; with the line through both ends where a bow
+    leaves wear at both of them, or an end grew: a wedge and the flank behind its deep end look like a tilt and growth.
     """
-    if best.bend < 0 or all(unworn_ends(best)):
+    if best.bend < 0 or (all(unworn_ends(best)) and not _ends_off(best)):
         return best
     line = _line_of_ends(fit, best, ENDS[0])
     if line is not None and _is_straight(line, ENDS[0]):
@@ -172,9 +197,29 @@ def _with_flanks(fit, best: Registration) -> Registration:
         line = _line_of_ends(fit, best, ENDS[1])
         if line is not None and _is_straight(line, ENDS[1]):
             return replace(best, rival=Rival(line, False))
-    if kinks == 2:
+    if kinks == 2 or _ends_off(best):
         return replace(best, rival=Rival(_chord(fit, best), False))
     return best
+
+
+
+def slow_of(rest, used=None) -> np.ndarray:
+    """Means (k,) [m] of depths (n,), or of the used ones of them, in `PARTS` parts, about the line through the means;
+    parts without three such depths are left out."""
+    edges = np.linspace(0, rest.size, PARTS + 1).astype(int)[:-1]
+    used = np.ones(rest.size, bool) if used is None else used
+    count = np.add.reduceat(used.astype(float), edges)
+    means = (np.add.reduceat(np.where(used, rest, 0.0), edges) / np.maximum(count, 1))[count > 2]
+    at = np.flatnonzero(count > 2)
+    return means - np.polyval(np.polyfit(at, means, 1), at) if at.size > 2 else np.zeros(at.size)
+
+
+def _ends_off(best: Registration) -> bool:
+    """Whether a bow leaves both outermost ends worn, or either end stands above the first trace."""
+    rest = np.asarray(best.rest)
+    count = max(int(OUTERMOST * rest.size), min(FEWEST, rest.size))
+    ends = [float(np.median(part)) / best.noise for part in (rest[:count], rest[-count:])]
+    return (best.bend > 0 and min(ends) > 1) or min(ends) < -REACH
 
 
 def _chord(fit, bent: Registration) -> Registration:

@@ -9,7 +9,7 @@ from ...core import PatchfemError, frozen_array, say
 from ..profile import Profile
 from . import depth as worn_depth
 from .place import CLEAR, Match, alone, matched, matched_in_parts, prepared
-from .registration import LOWEST, Registration, register, together, unworn_ends
+from .registration import ENDS, LOWEST, Registration, register, together, unworn_ends
 
 # Noise of the registration over the root mean square height, and likeness that goes with it: where valleys agree to
 # 2 %, less likeness will do. A noise above 10 % may be wear of the valleys too, unless it is white: wear moves
@@ -18,6 +18,7 @@ ENOUGH = ((0.1, CLEAR), (0.02, 2.5))
 WHITE, NEIGHBOURS = 0.3, 1.5  # noise up to which white noise passes for that of the instrument; how many err alike
 TOLD = 0.5  # white noise up to which a shift that was told is believed
 NOTHING_GREW = 0.9  # balance of what is missing and what grew, beyond which wear alone stands in a registration
+MOST = 0.6  # share of the heights that agree at a shift that was told, beyond what chance brings at WHITE: 0.41
 SHARE = 0.15  # of the heights, at least, unworn
 MARK = "if both traces were measured from the same mark, use --shift '0 mm'"
 
@@ -37,19 +38,19 @@ class Place(NamedTuple):
     turned: bool = False
 
 
-def found_place(before: Profile, after: Profile, shift: float | None = None) -> Place:
+def found_place(before: Profile, after: Profile, shift: float | None = None, bow: bool = True) -> Place:
     """The place that both traces share, as they are, else with one of them mirrored, its heights turned over, or both.
 
     Of two traces whose heights count the opposite ways that one is turned over that leaves more missing than grown. A
-    surface that repeats itself, and a told shift, are taken as they are.
+    surface that repeats itself, and a told shift, are taken as they are. bow: whether a bow may be taken out.
     """
-    place = placed(before, after, shift)._replace(before=before, after=after)
+    place = placed(before, after, shift, bow)._replace(before=before, after=after)
     if place.found is not None or shift is not None or (place.match.repeats and place.match.clear > CLEAR):
         return place
     for mirrored, turned_over in ((True, False), (False, True), (True, True)):
         other = _mirrored(after) if mirrored else after
         tried = [(before, _turned_over(other)), (_turned_over(before), other)] if turned_over else [(before, other)]
-        found = [(*_searched(*pair)[:2], *pair) for pair in tried]
+        found = [(*_searched(*pair, bow)[:2], *pair) for pair in tried]
         known = [one for one in found if one[1] is not None]
         if known:
             match, best, *pair = max(known, key=lambda one: worn_depth.balance(one[1]))
@@ -65,16 +66,16 @@ def _turned_over(one: Profile) -> Profile:
     return replace(one, z=frozen_array(-one.z))
 
 
-def placed(before: Profile, after: Profile, shift: float | None = None) -> Place:
+def placed(before: Profile, after: Profile, shift: float | None = None, bow: bool = True) -> Place:
     """Find the place that both traces share, by their valleys (`place`), else part by part (`matched_in_parts`).
 
     A place counts where it stands out from chance, only once, and the unworn heights agree there, within 10 % of the
     root mean square height or within 30 % where their differences are white noise. shift [m]: known from a mark; the
-    search is left out then, and the fit starts there.
+    search is left out then, and the fit starts there. bow: whether a bow may be taken out.
     """
     if shift is not None:
-        return _told(before, after, shift)
-    match, found, valleys = _searched(before, after)
+        return _told(before, after, shift, bow)
+    match, found, valleys = _searched(before, after, bow)
     if found is not None:
         return Place(match, found)
     other = turned(before, after, match.shift) if match.clear > CLEAR and not match.repeats else None
@@ -83,14 +84,14 @@ def placed(before: Profile, after: Profile, shift: float | None = None) -> Place
     return Place(match, None, _why(before, after, match, valleys), order)
 
 
-def _searched(before: Profile, after: Profile) -> tuple:
+def _searched(before: Profile, after: Profile, bow: bool = True) -> tuple:
     """(match, registration or None, match of the valleys of the whole traces)."""
     match = valleys = matched(before, after)
-    found = None if match.repeats else _registered(before, after, match)
+    found = None if match.repeats else _registered(before, after, match, bow)
     if found is None:
         parts = matched_in_parts(before, after)
         if parts is not None and parts.clear > CLEAR and not parts.repeats:
-            match, found = parts, _registered(before, after, parts)
+            match, found = parts, _registered(before, after, parts, bow)
     return match, found, valleys
 
 
@@ -102,7 +103,7 @@ def turned(before: Profile, after: Profile, shift: float) -> Registration | None
         return None
 
 
-def _registered(before: Profile, after: Profile, match: Match) -> Registration | None:
+def _registered(before: Profile, after: Profile, match: Match, bow: bool) -> Registration | None:
     """The traces registered at a match; None where their unworn heights do not agree there.
 
     Where a track is deeper than the valleys, most of the lowest heights may lie in it; the fit starts from all then.
@@ -111,7 +112,7 @@ def _registered(before: Profile, after: Profile, match: Match) -> Registration |
         return None
     for lowest in (LOWEST, 1.0):
         try:
-            found = register(before, after, match.shift, lowest)
+            found = register(before, after, match.shift, lowest, bow)
         except PatchfemError:
             continue
         if _same(found, match):
@@ -119,19 +120,25 @@ def _registered(before: Profile, after: Profile, match: Match) -> Registration |
     return None
 
 
-def _told(before: Profile, after: Profile, shift: float) -> Place:
+def _told(before: Profile, after: Profile, shift: float, bow: bool) -> Place:
     """The traces registered from a shift [m] that is known; refused where they do not agree near it."""
     first, _, step, _ = prepared(before, after)
     why = f"at the given shift of {say(shift)}, "
     try:
-        found = register(before, after, shift)
+        found = register(before, after, shift, bow=bow)
     except PatchfemError:
         return Place(None, None, why + "hardly any heights of the traces agree; is the shift right?")
     if abs(found.shift - shift) > alone(first) * step:
         return Place(None, None, why + f"the traces do not match: the best fit has a shift of {say(found.shift)}")
-    if not (_quiet(found, TOLD) and found.agreed > SHARE):
+    alike = found.agreed > MOST and found.noise < WHITE * _height(found)
+    if not (alike or (_quiet(found, TOLD) and found.agreed > _share(found))):
         return Place(None, None, why + _apart(found) + ", which is no better than chance; is the shift right?")
     return Place(None, found)
+
+
+def _share(found: Registration) -> float:
+    """Share of the heights, at least, that must be unworn: both flanks where the datum was declared straight."""
+    return 2 * ENDS[1] if found.declared else SHARE
 
 
 def _height(found: Registration) -> float:
@@ -146,7 +153,7 @@ def _about_line(x, z) -> float:
 def _same(found: Registration, match: Match) -> bool:
     """Whether the unworn heights of a registration are so many and so alike that the place is the same."""
     quiet = match.clear > CLEAR and _quiet(found, WHITE)
-    return _alike(found, match) or (quiet and found.agreed > SHARE)
+    return _alike(found, match) or (quiet and found.agreed > _share(found))
 
 
 def _alike(found: Registration, match: Match, most: float = np.inf) -> bool:
@@ -156,7 +163,7 @@ def _alike(found: Registration, match: Match, most: float = np.inf) -> bool:
     """
     height = min(_height(found), most)
     same = any(found.noise < noise * height and match.clear > clear for noise, clear in ENOUGH)
-    return same and found.agreed > SHARE
+    return same and found.agreed > _share(found)
 
 
 def _quiet(found: Registration, most: float) -> bool:

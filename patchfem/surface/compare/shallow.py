@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import frozen_array, say
+from ..edges import foot
 from ..quantity import SIDE
 from .carried import Carried
 from .registration import KEPT, REACH, TRIMMED, Registration, together
@@ -78,8 +79,9 @@ def _boxes() -> tuple:
     return box / sizes[:, None], sizes, places, base
 
 
-def on_flanks(found: Registration, span: tuple) -> tuple:
-    """(the registration fitted again to the heights beside a track, what carries it)."""
+def on_flanks(found: Registration, span: tuple, again: bool = True) -> tuple:
+    """(the registration fitted again to the heights beside a track, what carries it); again: once more where the track
+    shows to be wider."""
     x, margin = np.asarray(found.x), found.x.size // PARTS
     beside = np.ones(x.size, bool)
     beside[span[0] - margin:span[1] + margin + 1] = False
@@ -93,6 +95,8 @@ def on_flanks(found: Registration, span: tuple) -> tuple:
     used = beside & (np.abs(rest) <= REACH * noise)
     part, alike = gradient[used], together(rest, used)
     track = _edges(rest, span, noise * float(np.sqrt(alike)))
+    if again and (track[0][0] < span[0] - margin or track[1][0] > span[1] + margin):
+        return on_flanks(found, (track[0][0], track[1][0]), False)
     inverse = np.linalg.pinv(part.T @ part, rcond=1e-14, hermitian=True)
     covariance = inverse * float(np.mean(rest[used] ** 2)) / KEPT * TRIMMED * alike
     stretch = (found.stretch[0] + step[3], *found.stretch[1:]) if step.size > 3 else found.stretch
@@ -108,7 +112,17 @@ def on_flanks(found: Registration, span: tuple) -> tuple:
 def _edges(rest, span: tuple, noise: float) -> tuple:
     """((first, lowest, highest), (last, lowest, highest)) sample of a track: where a step of its mean depth fits best,
     up to a part away, and every place at which the sum of squares is within 5.8 noise^2 of the least, as for deeper
-    tracks (`depth.extent_of`)."""
+    tracks (`depth.extent_of`). Where a flank that begins at zero, as that of a parabola, fits as well or better, its
+    foot sinks in the noise: then the edge is that of the flank (`edges.foot`)."""
+    steps, (first, last) = _steps(rest, span, noise), span
+    middle = (first + last) // 2
+    feet = foot(rest[:middle], first, noise), foot(rest[middle:][::-1], rest.size - 1 - last, noise)
+    feet = feet[0], None if feet[1] is None else tuple(rest.size - 1 - k for k in (feet[1][0], *feet[1][:0:-1]))
+    return tuple(step if one is None else one for step, one in zip(steps, feet))
+
+
+def _steps(rest, span: tuple, noise: float) -> tuple:
+    """The same of steps alone."""
     part, (first, last) = rest.size // PARTS, span
     depth = float(rest[first + part:last - part + 1].mean())
     total, out = np.cumsum(rest - depth / 2), []

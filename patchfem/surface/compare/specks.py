@@ -68,7 +68,9 @@ def _left_out(profile: Profile, marked) -> Profile:
     if not marked.any():
         return profile
     z = np.where(marked, np.nan, profile.z)
-    note = (f"{profile.source}: {marked.sum()} of {z.size} heights stand out with walls much steeper than the rest of "
-            f"the trace (the first at x = {say(profile.x[np.argmax(marked)])}); these heights are taken as dust or "
-            "dropouts and left out; use --keep-spikes to keep them")
+    count = len(runs_of(marked))
+    note = (f"{profile.source}: {count} place{'s' * (count > 1)} with walls much steeper than the rest of the trace "
+            f"(the first at x = {say(profile.x[np.argmax(marked)])}) {'are' if count > 1 else 'is'} taken as dust or "
+            f"dropouts and left out, {marked.sum()} of {z.size} heights with their neighbours; use --keep-spikes to "
+            "keep them")
     return replace(profile, z=frozen_array(z), notes=(*profile.notes, note))

@@ -56,14 +56,17 @@ def tracks_of(found: Registration, together: float, longest: float) -> Tracks:
     """Tracks of a registration: runs of worn heights longer than three of the longest waves [m], hardly any unworn.
 
     A height of a run counts as worn where the median of five is deeper than 2.5 deviations. Edges are those of
-    `extent.edge`. Tops that wore off stand between unworn valleys and are no track. A shallow track
-    that the registration has (`shallow`) is the one. together: how many neighbouring heights err alike.
+    `edges.edge`; runs without an unworn place between them are one track. Tops that wore off stand between unworn
+    valleys and are no track. A shallow track that the registration has (`shallow`) is the one. together: how many
+    neighbouring heights err alike.
     """
     rest, noise = np.asarray(found.rest), found.noise
     runs = runs_of(median_of_five(rest / found.scatter) > REACH)
     spans = tuple((a, b) for a, b in runs if found.x[b] - found.x[a] > LONG * longest
                   and (rest[a:b + 1] <= REACH * noise).mean() < UNWORN) if found.track is None else \
         (tuple(end[0] for end in found.track),)
+    if len(spans) > 1:
+        spans = _joined(spans, [_with_flanks(rest, span, found.loudest, together) for span in spans])
     valley = _valley(found, spans, longest)
     if not spans:
         return Tracks((), valley=valley)
@@ -72,6 +75,19 @@ def tracks_of(found: Registration, together: float, longest: float) -> Tracks:
     others = tuple({name: each._replace(text=each.text.replace(" the longest track", " this track"))
                     for name, each in one.items()} for at, one in enumerate(sizes) if at != widest)
     return Tracks(spans, sizes[widest], valley, others)
+
+
+def _joined(spans: tuple, wide: list) -> tuple:
+    """Runs (first, last) in one where their flanks (first, last) `wide` overlap: no mean height between them is unworn,
+    as where a floor of another roughness reaches the unworn height here and there."""
+    out, reach = [spans[0]], wide[0][1]
+    for span, (first, last) in zip(spans[1:], wide[1:]):
+        if first <= max(reach, out[-1][1]) or span[0] <= reach:
+            out[-1] = out[-1][0], span[1]
+        else:
+            out.append(span)
+        reach = max(reach, last)
+    return tuple(out)
 
 
 def _sizes_at(found: Registration, spans: tuple, at: int, together: float) -> dict:
@@ -86,6 +102,7 @@ def _ends(found: Registration, span: tuple, around_it: tuple, together: float) -
     it may be longer; around_it: samples without another track."""
     rest, x, (low, high) = np.asarray(found.rest), found.x, around_it
     first, last = span if found.track is not None else _with_flanks(rest, span, found.loudest, together)
+    first, last = max(first, low), min(last, high - 1)
     centre, out, cut = (first + last) // 2, [], []
     for side, outside, text in ((slice(low, centre), first - low, FROM),
                                 (slice(centre, high), high - 1 - last, TO)):

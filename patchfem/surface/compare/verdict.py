@@ -10,19 +10,18 @@ from ..quantity import SIDE, Quantity
 from ..scans import change as scans
 from .carried import bow_as_wear, may_hide, told
 from .compare import Comparison, compared_files, directions_of, identical
-from .rivals import other_reading, undecided
+from .rivals import other_reading
 from .shallow import would_show
 
 EXCHANGED, ELSEWHERE = scans.GREW, scans.ELSEWHERE
-OPEN = "a scar or a bent datum, both are possible"
 DEPOSITED = 0.05  # of the worn area, what may stand above without a word
 NEAR = 1e-6  # a ratio that close to one is one but for round-off
 
 
 def judged(paths: tuple, direction: str = "", units: tuple | None = None, shift: float | None = None,
-           keep_spikes: bool = False) -> tuple:
+           keep_spikes: bool = False, datum: str = "") -> tuple:
     """(parts, verdict, directions) of the files before and after: `compared_files`, `verdicts`, `directions_of`."""
-    parts = compared_files(paths, direction, units, shift, keep_spikes)
+    parts = compared_files(paths, direction, units, shift, keep_spikes, datum)
     directions = directions_of(parts)
     return parts, verdicts(parts, directions), directions
 
@@ -56,8 +55,9 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
         headline = f"{areal}; {said}"
     elif areal == ELSEWHERE or any(_elsewhere(one) for one in parts):
         headline = f"{ELSEWHERE}; {headline}"
-    if any(undecided(one.registration) for one in parts):
-        headline = f"{OPEN}; {'no change detected in the waves' if headline == 'no change shown' else headline}"
+    if any(one.open for one in parts):
+        said = "no change detected in the waves" if headline == "no change shown" else headline
+        headline = f"{next(one.open for one in parts if one.open)}; {said}"
     if any(_gain(one, "") and word != "no change shown" for one, word in zip(parts, words)):
         headline += ", all heights by the same factor, as an error in the instrument's gain would do"
     over = _over(parts) if parts[0].change is None else scans.over(parts[0].change)
@@ -68,7 +68,7 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
     for one, word, name in zip(parts, words, names):
         if not isinstance(one.before, Areal):
             out += [*_variant(one, name), _worn(one, name), *_no_place(one, name), *_reference(one),
-                    *_other_tracks(one), *other_reading(one.registration)]
+                    *_other_tracks(one), *([] if one.open else other_reading(one.registration))]
         if one.sizes or not isinstance(one.before, Areal):
             out += [_amplitude(one.amplitude_ratio, word, name), _slope(one.slope_ratio, name), *_gain(one, name)]
         else:
@@ -182,7 +182,7 @@ def _worn(one: Comparison, name: str) -> str:
                  "are deposits, or the two files are in the wrong order." if one.exchanged else
                  f" {1e12 * one.worn.deposited:.3g} um^2 of material lie above the first trace (before wear): there "
                  "are deposits or pile-up.")
-    if one.reference == "place" and not one.carried.by and not undecided(one.registration):
+    if one.reference == "place" and not one.carried.by and not one.open:
         seen = "" if one.visible is None else f" {would_show(one.visible)}"
         return f"Worn depth{name}: no wear detected.{above}{seen} {may_hide(one.registration, one.hidden)}"
     if mean.value is None:

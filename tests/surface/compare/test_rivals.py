@@ -52,7 +52,7 @@ def test_always_flanks_too_short_to_tell_leave_both_readings_with_their_numbers(
     assert headline.startswith("a scar or a bent datum, both are possible")
     line = found.registration.rival.found
     assert line.rest.mean() * np.ptp(line.x) == pytest.approx(true, rel=0.05)
-    told = re.search(r"datum bent by ([\d.]+) nm .* wore off ([\d.]+) um\^2, ([\d.]+) nm on average", said[0])
+    told = re.search(r"datum bent by ([\d.]+) nm .* trace ([\d.]+) um\^2 wore off, ([\d.]+) nm on average", said[0])
     assert float(told[1]) == pytest.approx(found.registration.bend * 1e9, rel=0.01)
     assert float(told[2]) == pytest.approx(true * 1e12, rel=0.05)
 
@@ -65,10 +65,12 @@ def test_always_a_scar_beside_flanks_of_a_bent_datum_is_not_given_as_wear_of_its
     assert "two readings" in verdicts([found])[1][0]
 
 
-def test_always_a_flat_floor_beside_short_flanks_has_its_other_reading_told():
+def test_always_a_flat_floor_beside_short_flanks_has_both_readings_told():
+    """The headline said that material grew."""
     found, true = worn_pair(HELD_OUT, scar(3.7 * MM, 20))
-    said = " ".join(verdicts([found])[1])
-    assert "Other reading: if the ends of the traces are unworn" in said
+    headline, said = verdicts([found])
+    assert headline.startswith("a scar or material that grew at the ends") and found.worn.area.value is None
+    assert "of material grew at the ends" in said[0] and "or the ends are unworn and in a scar" in said[0]
     line = found.registration.rival.found
     assert line.rest.mean() * np.ptp(line.x) == pytest.approx(true, rel=0.05)
 
