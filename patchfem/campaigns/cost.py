@@ -248,9 +248,9 @@ def _by_floor(one: Cost, names: list, tolerance: float) -> str:
     if not small:
         return ""
     share, name = max(small)
-    size = f"{100 * share:.2g} %" if share < inf else "more than its value 0"
-    others = f" and those of {len(small) - 1} others" if len(small) > 1 else ""
-    return f" or within its floor (the error of {name} is {size}{others})"
+    said = f"the error of {name} is {100 * share:.2g} %" if share < inf else f"{name} is 0"
+    more = f", and {len(small) - 1} more measures are as small" if len(small) > 1 else ""
+    return f" or below its floor ({said}{more})"
 
 
 def worst_of(runs: list, tolerance: float) -> set:

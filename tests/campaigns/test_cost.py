@@ -91,7 +91,7 @@ def test_exact_the_sentence_names_the_cheapest_run_or_the_worst_measure():
         "no run has an error of at most 1 % in every measure: with every setting the error of a is 2 %"
     floored = replace(made("2", 1, 1.6e-2), floors={"a": 1e-2, "b": 0.0})
     assert sentence([floored], 1e-2) == "a knob at 2: 1 CPU s per run, with an error of at most 1 % in every measure " \
-        "or within its floor (the error of a is 1.6 %)"
+        "or below its floor (the error of a is 1.6 %)"
     bold = [made("2", 1, 1e-3, 3e-2), *runs[1:]]  # states less than its distance to the best
     assert sentence(bold, 1e-2) == "a knob at 4: 2 CPU s per run, with an error of at most 1 % in every measure"
 
