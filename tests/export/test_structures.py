@@ -131,8 +131,8 @@ LEVELS = '[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "100 Hz"\nlev
 
 
 @pytest.mark.parametrize("text, says", [
-    (RUB, "; in these coordinates x the output is output·x, Fex1 is the force on each of them, the slide of "
-     "interface i is row i of slide·x\n"),
+    (RUB, "1 coordinate, 1 friction element; in these coordinates x the output is output·x, Fex1 is the force on each "
+          "of them, the slide of interface i is row i of slide·x\n"),
     (RUB + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n', "; not in the file: [wear]\n"),
     (RUB.replace("[structure]", '[structure]\ntravel = "5 mm"'), "; not in the file: structure.travel\n"),
     (RUB.replace("[drive]", '[structure.start]\ndisplacement = ["5 um"]\n[drive]'),
