@@ -8,6 +8,7 @@ from typing import NamedTuple
 from ..core import say
 from ..effects import has
 from ..response import rows
+from ..response.reasons import SETTLES
 from ..scales import plain
 from .patch import faces, high_order, ladder, press
 from .results import notes, patch_rows
@@ -179,6 +180,8 @@ def _finer_motion(seen, wide: dict, coarse) -> str:
         return f"set accuracy.shear_modes = {min(4 * seen.extra['shear_modes'], seen.patch.x.size)}"
     if cause == "bonds":
         return _finer_bonds(seen.model.accuracy)
+    if name == SETTLES:  # what is left of it dies out in a longer run
+        return "more drive cycles make this value more accurate; raise drive.cycles"
     balanced = seen.extra.get("harmonics")  # None where a steady motion is exact between yields
     return READ if balanced is None or name.startswith(OF_SAMPLES) else \
         notes.more_harmonics(balanced, _sharp(seen))
