@@ -151,6 +151,7 @@ cycles = 10
 """
 
 
+@pytest.mark.slow
 def test_the_intervals_contain_the_error_of_modes_left_out(tmp_path):
     """A curve of all modes of a chain fitted by a reduction to one: an interval without that error misses the truth."""
     k, m, n = 1e7, 0.02, 20

@@ -40,7 +40,8 @@ def test_refuses_whole_numbers_that_nothing_can_hold(text, key, size):
 
 @pytest.mark.parametrize("text, sets, says", [
     (PATCH, "contact.height=1e3 m", "contact.height: 1000 m is more than 10000 times contact.length"),
-    (PATCH, "contact.element_size=1e-300 m", "contact.element_size: 1e-300 m gives more than 100000 elements"),
+    (PATCH, "contact.element_size=1e-300 m",
+     "contact.element_size: elements of 1e-300 m on a length of 0.0127 m are more than 100000"),
     (RIG, "friction.order=1e50", "friction.order: must be <= 100, not 1e+50"),
     (RIG, "accuracy.tail=1e49", "accuracy.tail: must be <= 1, not 1e+49")])
 def test_refuses_numbers_that_overflow_what_is_made_of_them(text, sets, says):
