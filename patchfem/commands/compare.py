@@ -48,8 +48,8 @@ def compare(before: Path | None = None, after: Path | None = None, /, *other: Pa
                         'start at the same mark') = "",
             keep_spikes: flag("keep spikes, dropouts and dust; without this option they are removed from "
                               "traces") = False,
-            datum: word('write "straight" if the datum of the instrument is known to be straight; then no bow is '
-                        'subtracted from traces') = "",
+            datum: word("what is known of the datum of the instrument, such as straight; then no bow is subtracted "
+                        "from traces") = "",
             scene: Annotated[Path | None, Parameter(name="--scene", help="scene with a patch, such as rig.toml; the "
                                                                          "patch is pressed with each of the two "
                                                                          "surfaces in turn")] = None,

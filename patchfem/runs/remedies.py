@@ -8,7 +8,6 @@ from typing import NamedTuple
 from ..core import say
 from ..effects import has
 from ..response import rows
-from ..response.reasons import SETTLES
 from ..scales import plain
 from .patch import faces, high_order, ladder, press
 from .results import notes, patch_rows
@@ -23,6 +22,7 @@ SIZE = "contact.element_size"  # an even mesh finds the ends of a contact at fir
 OF_PEAK = ("pressure_peak", "loaded_fraction")
 OF_SAMPLES = ("stick_fraction", "slip_start_phase")  # of a cycle of a balance, however many harmonics it has
 RINGS = "ring_"  # measures of a ring beside the motion, which an engine without steps need not have
+STEADY = "relative_displacement_amplitude_steady"
 READ = "no known setting makes this value more accurate; use the value with its stated error"
 # what a run answers first, named before what misses its tolerance by more
 FIRST = ("relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area", "friction_ratio_peak",
@@ -180,7 +180,7 @@ def _finer_motion(seen, wide: dict, coarse) -> str:
         return f"set accuracy.shear_modes = {min(4 * seen.extra['shear_modes'], seen.patch.x.size)}"
     if cause == "bonds":
         return _finer_bonds(seen.model.accuracy)
-    if name == SETTLES:  # what is left of it dies out in a longer run
+    if name == STEADY:  # what is left of it dies out in a longer run
         return "more drive cycles make this value more accurate; raise drive.cycles"
     balanced = seen.extra.get("harmonics")  # None where a steady motion is exact between yields
     return READ if balanced is None or name.startswith(OF_SAMPLES) else \
