@@ -1,14 +1,13 @@
 """How many friction cases does a second of one processor answer, and to what error?
 
-Lanes 4000 with error bars, wrong by 2e-9 in the middle and 9e-7 rms (no bar of 10 000 missed); the exact engine 450;
-a loop of thirty lines 23 000, 11 000, 5600, 2800 at 100 to 800 steps a cycle, wrong by 5e-5 to 7e-8 in the middle and
-5e-3 to 8e-5 rms; DOP853 about 2 and CVODE 3, on a machine that did much else.
+Lanes 7000 with error bars, wrong by 2e-9 in the middle and 9e-7 rms (no bar of 2000 missed); the exact engine 790; a
+loop of thirty lines 22 000, 11 000, 5400, 2750 at 100 to 800 steps a cycle, wrong by 5e-5 to 7e-8 in the middle and
+5e-3 to 8e-5 rms; DOP853 3 and CVODE 4 to 6, on a machine that did much else.
 
-Whole sweeps (--laws 902, medians of three goes, on one of two cores while the other computed too), cases a second:
-Coulomb 7380, elastic-plastic 2270, Iwan 1020, tanh 1140, bonds 1620, Bouc-Wen 95 and LuGre 6 of soft contacts; a patch
-by level 115, by tilt 80, the shipped rig by tilt 28, static patches 1700 of 2000 cases; the last three by other seeds,
-with no mesh kept on disk. All cases meet their tolerance but 9 % and 34 % of those of the patch and 4 % of the static
-ones.
+Whole sweeps (--laws 903, medians of three goes, on one of two cores while the other computed too), cases a second:
+Coulomb 8290, elastic-plastic 2950, Iwan 1030, tanh 1230, bonds 1360, Bouc-Wen 158 and LuGre 7 of soft contacts; a patch
+by level 109, by tilt 85, the shipped rig by tilt 27, static patches 1800 of 2000 cases. All cases meet their tolerance
+but 9 % and 37 % of those of the patch and 4 % of the static ones.
 
 Random blocks on a spring (m = k = 1, damping ratio .003 to .1, friction .1 to .9 of the push) under 200 cycles of a
 base acceleration at their own frequency, from rest; the amplitude in the last cycle beside that of the exact engine.
