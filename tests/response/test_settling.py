@@ -266,7 +266,8 @@ def test_exact_a_rig_at_the_crest_of_its_ring_up_is_not_steady(cycles):
     steady = done.measures[f"{name}_steady"]
     assert truth.value == pytest.approx(443.852e-6, rel=2e-6) and done.outcome == "transient"
     assert abs(steady.value - truth.value) <= steady.error + truth.error and steady.error < 0.01 * truth.value
-    if steady.error > 1e-3 * steady.value:
+    if cycles == 25:
+        assert steady.error > 1e-3 * steady.value
         assert any(one.startswith(f"{name}_steady has") and "more drive cycles make this value more accurate" in one
                    for one in done.warnings)
 

@@ -117,7 +117,7 @@ def compared(before: Profile, after: Profile, direction: str = "", band: tuple =
         place = _without_specks(place, not straight)
     removed = tuple(int(one.missing.sum()) for one in (place.before, place.after))
     return _placed(place, direction, band, removed) if place.found is not None else \
-        _flanked(_apart(place, direction, band, removed))
+        _flanked(_apart(place, direction, band, removed), straight)
 
 
 def _named(track) -> dict:
@@ -228,14 +228,14 @@ def _apart(place: Place, direction: str, band: tuple, removed: tuple) -> Compari
                       of_flanks(flanks) if flanks is not None else Tracks(()), removed=removed)
 
 
-def _flanked(one: Comparison) -> Comparison:
+def _flanked(one: Comparison, straight: bool) -> Comparison:
     """The comparison without the depth below flanks which the first trace shows to be worn."""
     match = one.match
     if one.flanks is None or match is None or match.repeats or not match.clear > CLEAR:
         return one
-    why = flanks_differ(one.before, one.after, match.shift, one.flanks)
+    why = flanks_differ(one.before, one.after, match.shift, one.flanks, straight)
     return one if not why else replace(one, reference="", worn=worn_depth.nowhere(why), tracks=Tracks(()),
-                                       flanks=None, open=BENT)
+                                       flanks=None, open="" if straight else BENT)
 
 
 def _steps(before: Profile, after: Profile) -> tuple:

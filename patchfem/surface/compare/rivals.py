@@ -88,8 +88,9 @@ def _drift(found: Registration, before: Profile, after: Profile) -> str:
             "the datum on a flat, or each trace twice to see the drift")
 
 
-def flanks_differ(before: Profile, after: Profile, shift: float, flanks: Flanks) -> str:
+def flanks_differ(before: Profile, after: Profile, shift: float, flanks: Flanks, straight: bool) -> str:
     """Why flanks of the trace after are not unworn, with the reading of a straight datum; "" where they may be.
+    straight: whether the datum is known to be.
 
     At the shift [m] at which the traces agree most, their difference must be straight over unworn flanks: slow
     differences of a tenth of the depth are wear, or a datum that bends.
@@ -107,11 +108,13 @@ def flanks_differ(before: Profile, after: Profile, shift: float, flanks: Flanks)
     deep = off - np.polyval(np.polyfit(x[ends], off[ends], 1), x)
     edges = np.linspace(0, x.size, PARTS + 1).astype(int)
     means = np.add.reduceat(deep, edges[:-1]) / np.diff(edges)
-    return (f"beside a track that looks like one, the traces differ slowly along x by {say(slow, 3)}, so these "
-            "parts are not known to be unworn; two readings explain both traces: either the datum bent, or, if it is "
-            f"straight and both outermost ends are unworn, {say(float(deep.mean()), 3)} wore off on average over the "
-            f"common length and {say(float(means.max()), 3)} at the deepest place; measure longer flanks, or the datum "
-            "on a flat")
+    worn = f"{say(float(deep.mean()), 3)} wore off on average over the common length and " \
+           f"{say(float(means.max()), 3)} at the deepest place"
+    two = f"if both outermost ends are unworn, {worn}; measure longer flanks" if straight else \
+        "two readings explain both traces: either the datum bent, or, if it is straight and both outermost ends are " \
+        f"unworn, {worn}; measure longer flanks, or the datum on a flat"
+    return (f"beside a track that looks like one, the traces differ slowly along x by {say(slow, 3)}, so these parts "
+            f"are not known to be unworn; {two}")
 
 
 def other_reading(found: Registration | None) -> list:
