@@ -66,7 +66,7 @@ def compare(before: Path | None = None, after: Path | None = None, /, *other: Pa
     if direction not in ("", "x", "y"):
         raise Refused(f"compare --direction {direction}: the direction must be x or y")
     if datum not in ("", "straight"):
-        raise Refused(f"compare --datum {datum}: use --datum straight, or leave the option out if the datum may be bent")
+        raise Refused(f"compare --datum {datum}: give --datum straight, or leave it out if the datum may be bent")
     how = {"units": pair(units), "shift": quantity(shift, "length", "compare --shift"), "keep_spikes": keep_spikes,
            "datum": datum}
     files = [one for one in (before, after, *other) if one is not None]

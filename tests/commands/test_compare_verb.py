@@ -164,7 +164,7 @@ def test_refuses_a_scene_without_a_patch(files, tmp_path):
 
 @pytest.mark.parametrize("words, says", [
     (("--direction", "z"), "compare --direction z: the direction must be x or y"),
-    (("--datum", "bent"), "compare --datum bent: use --datum straight, or leave the option out"),
+    (("--datum", "bent"), "compare --datum bent: give --datum straight, or leave it out if the datum may be bent"),
     (("third.csv",), "compare: 3 files; two files are needed, or four"),
 ])
 def test_refuses_with_exit_code_2(files, words, says):

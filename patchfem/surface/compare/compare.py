@@ -117,7 +117,7 @@ def compared(before: Profile, after: Profile, direction: str = "", band: tuple =
         place = _without_specks(place, not straight)
     removed = tuple(int(one.missing.sum()) for one in (place.before, place.after))
     return _placed(place, direction, band, removed) if place.found is not None else \
-        _flanked(_apart(place, direction, band, removed), straight)
+        _flanked(_apart(place, direction, band, removed), straight, shift)
 
 
 def _named(track) -> dict:
@@ -228,12 +228,15 @@ def _apart(place: Place, direction: str, band: tuple, removed: tuple) -> Compari
                       of_flanks(flanks) if flanks is not None else Tracks(()), removed=removed)
 
 
-def _flanked(one: Comparison, straight: bool) -> Comparison:
-    """The comparison without the depth below flanks which the first trace shows to be worn."""
+def _flanked(one: Comparison, straight: bool, shift: float | None) -> Comparison:
+    """The comparison without the depth below flanks which the first trace shows to be worn, at the shift [m] that is
+    known or clear."""
     match = one.match
-    if one.flanks is None or match is None or match.repeats or not match.clear > CLEAR:
+    if shift is None and match is not None and not match.repeats and match.clear > CLEAR:
+        shift = match.shift
+    if one.flanks is None or shift is None:
         return one
-    why = flanks_differ(one.before, one.after, match.shift, one.flanks, straight)
+    why = flanks_differ(one.before, one.after, shift, one.flanks, straight)
     return one if not why else replace(one, reference="", worn=worn_depth.nowhere(why), tracks=Tracks(()),
                                        flanks=None, open="" if straight else BENT)
 

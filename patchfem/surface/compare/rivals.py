@@ -14,8 +14,8 @@ from .carried import Carried, median_of_five, raised
 from .flanks import Flanks
 from .registration import ENDS, PARTS, Registration, register, slow_of
 
-BENT, GREW, DRIFT = (f"a scar or {what}, both are possible" for what in
-                     ("a bent datum", "material that grew at the ends", "a datum that drifts"))
+BENT, GREW, NOISE, DRIFT = (f"a scar or {what}, both are possible" for what in
+                            ("a bent datum", "material that grew at the ends", "noise", "a datum that drifts"))
 CURVED = 0.1  # of the depth of a track, slow differences of the traces beside it that show these flanks to be worn
 DEEPER = 12.0  # standard deviations of the slow variation of unworn parts that a worn depth needs: 3 of its widths
 SLOW = 0.5  # share of the variance of the unworn parts, at least, that neighbouring parts do not have
@@ -31,7 +31,7 @@ def readings(found: Registration, by: Carried, before: Profile, after: Profile) 
         return DRIFT, _drift(found, before, after)
     if found.rival is not None and not (found.rival.told_apart and by.by):
         bow, line = (found, found.rival.found)[::-1 if found.rival.told_apart else 1]
-        return (BENT if bow.bend else GREW), bow_or_scar(bow, line)
+        return (BENT if bow.bend else GREW if _changed(bow) else NOISE), bow_or_scar(bow, line)
     if (by.by or raised(found)) and _drifts(found):
         return DRIFT, _drift(found, before, after)
     return "", ""
@@ -39,13 +39,23 @@ def readings(found: Registration, by: Carried, before: Profile, after: Profile) 
 
 def bow_or_scar(bow: Registration, line: Registration) -> str:
     """Why there is no worn depth where both are possible, with the numbers of both."""
-    above = plain(1e12 * worn_depth.of_registration(bow).deposited, 3)
-    one = (f"the datum bent by {say(bow.bend, 3)} (sag over the common length) and {_worn(bow)} at the ends"
-           if bow.bend else f"{above} um^2 of material grew at the ends, where it lies above the first trace (before "
-                            f"wear), and {_worn(bow)} elsewhere")
+    if bow.bend:
+        one = f"the datum bent by {say(bow.bend, 3)} (sag over the common length) and {_worn(bow)} at the ends"
+    elif _changed(bow):
+        above = plain(1e12 * worn_depth.of_registration(bow).deposited, 3)
+        one = f"{above} um^2 of material grew at the ends, where it lies above the first " \
+              f"trace (before wear), and {_worn(bow)} elsewhere"
+    else:
+        one = f"nothing grew and nothing wore off, and the traces differ by noise of {say(bow.noise, 3)}"
     return (f"two readings explain both traces alike: either {one}, or the ends are unworn and in a scar over most of "
             f"the trace {_worn(line)}, if the datum is straight; the flanks beside the scar are too short, or "
             "not on one straight line, to tell these readings apart; measure longer flanks, or the datum on a flat")
+
+
+def _changed(found: Registration) -> bool:
+    """Whether anything that can be printed grew or wore off in a reading."""
+    worn = worn_depth.of_registration(found)
+    return any(plain(1e12 * area, 3) != "0" for area in (worn.deposited, worn.area.value))
 
 
 def _shown(found: Registration) -> float:

@@ -6,6 +6,8 @@ from scars import HELD_OUT, KINDS, UM, pair, rough, score
 
 from patchfem.core import frozen_array
 from patchfem.surface.compare.compare import compared
+from patchfem.surface.compare.registration import register
+from patchfem.surface.compare.rivals import bow_or_scar
 from patchfem.surface.compare.same import found_place
 from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile, despiked
@@ -62,16 +64,39 @@ def test_always_a_floor_of_another_roughness_has_one_track():
     assert len(found.tracks.spans) == 1
 
 
+def parabola(width: float) -> tuple:
+    """(traces before and after, depth (n,) [um]) of a scar of so many um on 6 mm, 1.5 um deep."""
+    x = np.arange(0, 6000, 2.0)
+    deep = 1.5 * np.clip(1 - ((x - 3000) / (width / 2)) ** 2, 0, None)
+    random, first = np.random.default_rng(HELD_OUT), rough(HELD_OUT)(x)
+    return [Profile(frozen_array(x * UM), frozen_array((z + random.normal(0, 0.01, x.size)) * UM), name)
+            for z, name in ((first, "before"), (first - deep, "after"))], deep
+
+
 def test_always_a_straight_datum_that_is_declared_takes_no_bow_out():
     """A parabola of 5.5 mm on 6 mm: a scar or a bow, unless the datum is known to be straight."""
-    x = np.arange(0, 6000, 2.0)
-    deep = 1.5 * np.clip(1 - ((x - 3000) / 2750) ** 2, 0, None)
-    random, first = np.random.default_rng(HELD_OUT), rough(HELD_OUT)(x)
-    traces = [Profile(frozen_array(x * UM), frozen_array((z + random.normal(0, 0.01, x.size)) * UM), name)
-              for z, name in ((first, "before"), (first - deep, "after"))]
+    traces, deep = parabola(5500)
     assert verdicts([compared(*traces)])[0].startswith("a scar or a bent datum")
     found = compared(*traces, straight=True)
     assert found.registration.bend == 0 and found.worn.mean.value == pytest.approx(deep.mean() * UM, rel=0.01)
+
+
+def test_exact_a_reading_without_growth_and_wear_is_told_as_noise():
+    """ "0 um^2 of material grew, and 0 um^2 wore off" stood there as a reading of a scar."""
+    traces, _ = parabola(2000)
+    unworn, worn = (register(traces[0], after, 0.0, bow=False) for after in (traces[0], traces[1]))
+    told = bow_or_scar(unworn, worn)
+    assert "either nothing grew and nothing wore off, and the traces differ by noise of " in told
+    assert "either 0 um^2" not in told
+    assert "um^2 wore off" in bow_or_scar(worn, worn).partition(", or the ends")[0]
+
+
+def test_always_a_told_shift_does_not_make_worn_flanks_unworn():
+    """A scar of 5.8 mm on 6 mm was given as one of 4.7 mm, with an interval without the truth."""
+    traces, _ = parabola(5800)
+    found = compared(*traces, straight=True, shift=0.0)
+    assert found.worn.mean.value is None and "bent" not in found.worn.mean.reason
+    assert "either the datum bent" in compared(*traces, shift=0.0).worn.mean.reason
 
 
 def test_always_a_told_shift_is_believed_where_nearly_all_heights_agree():
