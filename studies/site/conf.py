@@ -24,7 +24,7 @@ root_doc = "studies/site/index"
 include_patterns = ["README.md", "patchfem/*.md", "patchfem/scene/*.md", "studies/README.md", "studies/*/README.md",
                     "studies/report/*.md", "studies/notebooks/*.ipynb", "studies/site/**.md", "tests/README.md"]
 exclude_patterns = [".venv", ".git", "out", "dist", "studies/site/README.md", "**/.*"]
-myst_enable_extensions = ["dollarmath", "deflist"]
+myst_enable_extensions = ["dollarmath", "deflist", "html_image"]
 myst_heading_anchors = 4
 nb_execution_mode = "cache"
 nb_execution_cache_path = str(ROOT / "out/site.cache")
@@ -43,6 +43,7 @@ html_static_path = []
 html_search_scorer = str(HERE / "scorer.js")
 html_theme_options = {"show_prev_next": False, "secondary_sidebar_items": ["page-toc"], "navigation_depth": 3,
                       "footer_start": ["copyright"], "footer_end": [], "logo": {"text": "patchfem"}}
+html_context = {"default_mode": "auto"}  # without it the theme reports an invalid mode on the first page of a visit
 suppress_warnings = ["myst.header"]  # a page of the repository may begin below its first heading
 
 
