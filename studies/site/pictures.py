@@ -1,82 +1,285 @@
-"""What a person gets, as pictures of the README: first screen, pages of a run, a sweep and a comparison, the pieces.
+"""Draw the pictures of README and site from fresh runs, or name the committed ones that are stale.
 
-Run it where Pillow and a Chromium are; it takes a minute.
+Without arguments this script writes all pictures into `pictures/`. With `--check` it draws them anew and compares; the
+exit status is 1 if a committed picture is stale. Texts and curves of every picture are kept beside it in numbers.json,
+with the SHA-256 of the picture. `.ci/site` runs the comparison, which takes about 20 CPU seconds. No browser is needed.
 """
 
-import html
+import json
 import os
-import shutil
-import subprocess
 import sys
+from collections.abc import Iterator
+from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+import matplotlib
 import numpy as np
+from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.figure import Figure
 
 ROOT = Path(__file__).parents[2]
+sys.path.insert(0, str(ROOT))
+
+import patchfem as pf  # noqa: E402
+from patchfem.export.drawing.film import film_of  # noqa: E402
+from patchfem.export.drawing.panels import borders  # noqa: E402
+from patchfem.export.drawing.paraview import stress_of  # noqa: E402
+from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE, STYLE  # noqa: E402
+from patchfem.export.fields.series import Frame, Series  # noqa: E402
+
 FOLDER = Path(__file__).parent / "pictures"
-CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome") or "chromium"
-SCREEN = "<body style='margin:0;background:#14181e;color:#dfe6ee'><pre style='font:15px/1.32 monospace;padding:14px'>"
+WIDTH = 4.4           # inch; the letters of 11 points stay 12 pixels high on a telephone that is 360 pixels wide
+DPI = 190             # dots per inch: 836 pixels, the column of a README on a code host
+MAX_BYTES = 1_000_000  # of a picture; a page of the site stays quick to load
+SAMPLES = 25          # values kept of each curve and of each field of stresses
+CURVE_TOL = 2e-3      # of the largest value of a curve; smaller differences cannot be seen in a picture
+LOOK = STYLE | {"font.size": 11, "axes.titlesize": 11, "axes.labelsize": 11, "legend.fontsize": 10.5,
+                "lines.linewidth": 1.6}
+TILT_LIMIT = 5.0      # %, the change of a measure up to which the recipe of the README allows a tilt
+UM, MM, MPA = 1e6, 1e3, 1e-6  # per SI unit
 
 
-def patchfem(*words: str) -> str:
-    """What a command prints."""
-    return subprocess.run([sys.executable, "-m", "patchfem", *map(str, words)], check=True, capture_output=True,
-                          text=True, env=os.environ | {"PYTHONPATH": str(ROOT)}).stdout
+def new_figure(height: float, rows: int = 1, **layout) -> tuple:
+    """Return an empty figure of the common width and its axes, one below the other."""
+    figure = Figure(figsize=(WIDTH, height))
+    return figure, figure.subplots(rows, 1, squeeze=False, **layout)[:, 0]
 
 
-def shot(page: Path, name: str, width: int, height: int) -> None:
-    """A page as a browser of this size shows it."""
-    path = FOLDER / f"{name}.png"
-    subprocess.run([CHROMIUM, "--headless=new", "--no-sandbox", "--disable-gpu", "--hide-scrollbars",
-                    f"--window-size={width},{height}", f"--screenshot={path}", "--virtual-time-budget=15000",
-                    page.as_uri()], check=True, capture_output=True)
-    small(path)
+def draw_interface(result) -> Figure:
+    """Draw normal and shear stress along the interface."""
+    figure, (axis,) = new_figure(3.1)
+    x = result.patch.x * MM
+    shear = result.fields["shear_stress"] * MPA
+    axis.plot(x, result.fields["normal_stress"][-1] * MPA, color=BLUE, label="normal stress σn")
+    axis.plot(x, shear[1:].T, color=GREY, lw=0.7)
+    axis.plot(x, shear[-1], color=GREY, lw=0.7, label=f"shear stress τ at {len(shear) - 1} instants")
+    axis.plot(x, shear.max(axis=0), color=ORANGE, label="largest τ of the cycle")
+    right = x[np.flatnonzero(result.fields["normal_stress"][-1] > 0)[-1]]
+    axis.set(xlabel="x [mm]", ylabel="stress [MPa]", xlim=(x[0], right + 0.15 * (right - x[0])),
+             title="Normal and shear stress where the pieces touch")
+    axis.legend()
+    return figure
 
 
-def small(path: Path) -> None:
-    """A picture in 256 colours, at most 1260 pixels wide."""
-    from PIL import Image
+def draw_loop(result) -> Figure:
+    """Draw the friction force against the relative displacement of the last cycles."""
+    figure, (axis,) = new_figure(3.1)
+    area = result.measures["loop_area"]
+    axis.plot(result.window.slide * UM, result.window.force, color=BLUE)
+    axis.set(xlabel="relative displacement [um]", ylabel="friction force [N]",
+             title=f"Friction loop: {area.value * 1e3:.3g} mJ dissipated per cycle")
+    return figure
 
-    found = Image.open(path).convert("RGB")
-    found.thumbnail((1260, 1260))
-    found.quantize(256, dither=Image.Dither.NONE).save(path, optimize=True)
+
+def draw_cells(axis, frame: Frame, panel, values, limits: tuple, colours: str):
+    """Draw the cells of a panel of both pieces, coloured by a stress; returns the collection of cells."""
+    sizes = np.diff(frame.offsets)
+    drawn = None
+    for count in np.unique(sizes[panel.cells]):
+        chosen = panel.cells & (sizes == count)
+        corners = frame.connectivity[frame.offsets[:-1][chosen][:, None] + np.arange(count)]
+        drawn = PolyCollection(panel.places[corners], array=values[chosen], cmap=colours, edgecolors="none",
+                               antialiaseds=False)
+        drawn.set_clim(*limits)
+        axis.add_collection(drawn)
+    for edges, colour in zip(borders(frame, panel.cells), ("black", "white")):
+        axis.add_collection(LineCollection(panel.places[edges], colors=colour, linewidths=1))
+    left, right, bottom, top = panel.window
+    axis.set(xlim=(left, right), ylim=(bottom, top), aspect="equal", ylabel="y [mm]")
+    axis.grid(False)
+    return drawn
 
 
-def traces(folder: Path = ROOT / "studies/wear") -> None:
-    """Write the made-up pair of the README's recipe: a ground surface before and after its crests wore off over the
-    middle half, to 0.4 um over its mean line."""
-    draw, x = np.random.default_rng(4), np.arange(0, 4e-3, 4e-6)
-    waves = [(2e-6, 190e-6, 0.3), (1.2e-6, 83e-6, 1.1), (0.6e-6, 31e-6, 2.0)]
-    height = sum(a * np.sin(2 * np.pi * x / length + 9e2 * x * phase) for a, length, phase in waves)
-    height = height + np.convolve(draw.standard_normal(x.size), np.ones(8) / 8, "same") * 1e-6
+def draw_pieces(series: Series, film) -> Figure:
+    """Draw normal and shear stress inside both pieces near their contact, at the largest shear stress."""
+    figure, axes = new_figure(4.9, 2, sharex=True)
+    frames = [series.frame(number) for number in film.numbers]
+    frame = max(frames, key=lambda frame: np.abs(stress_of(frame.cell_data, "tau_xy")).max())
+    panel = film.panels(frame)[1]
+    stresses = {"normal stress −σyy": -stress_of(frame.cell_data, "sigma_yy") * MPA,
+                "shear stress τxy": stress_of(frame.cell_data, "tau_xy") * MPA}
+    for axis, (name, values), colours in zip(axes, stresses.items(), ("Blues", "RdBu_r")):
+        top = np.quantile(np.abs(values[panel.cells]), 0.995)
+        limits = (0, top) if colours == "Blues" else (-top, top)
+        drawn = draw_cells(axis, frame, panel, values, limits, colours)
+        figure.colorbar(drawn, ax=axis, label="MPa", shrink=0.8, aspect=14)
+        axis.set_title(f"{name} inside both pieces")
+    axes[-1].set_xlabel(f"x [mm]  (gap magnified {panel.factor:g} times)")
+    return figure
+
+
+def draw_film(series: Series, film) -> Figure:
+    """Draw two frames of the film of a cycle: the upper piece farthest to the left and farthest to the right."""
+    figure, axes = new_figure(4.9, 2, sharex=True)
+    frames = [series.frame(number) for number in film.numbers]
+    slides = [film.panels(frame)[1].slide for frame in frames]
+    for axis, number in zip(axes, (int(np.argmin(slides)), int(np.argmax(slides)))):
+        frame = frames[number]
+        panel = film.panels(frame)[1]
+        values = frame.cell_data["von_mises"] * MPA
+        drawn = draw_cells(axis, frame, panel, values, (0, film.tops[1] * MPA), "viridis")
+        figure.colorbar(drawn, ax=axis, label="von Mises [MPa]", shrink=0.8, aspect=14)
+        axis.set_title(f"frame {number + 1} of {len(frames)}: upper piece at {slides[number] * MM:.1f} um")
+    axes[-1].set_xlabel(f"x [mm]  (displacement magnified {film.aside:g} times)")
+    return figure
+
+
+def draw_sweep(swept) -> Figure:
+    """Draw how far the tilt changes amplitude, loop area and friction force."""
+    figure, (axis,) = new_figure(3.4)
+    tilt = swept["contact_tilt_angle"].values * 1e3
+    measures = {"loop_area": "loop area", "relative_displacement_amplitude": "amplitude",
+                "friction_force_peak": "friction force"}
+    for (measure, name), colour in zip(measures.items(), (BLUE, ORANGE, GREY)):
+        values = swept[measure].values
+        axis.plot(tilt, 100 * (values / values[0] - 1), "o-", color=colour, ms=4, label=name)
+    axis.axhspan(-TILT_LIMIT, TILT_LIMIT, color=BLUE, alpha=0.1, lw=0, label=f"within {TILT_LIMIT:g} %")
+    allowed = swept.attrs["answer"].partition(";")[0].partition(")")[0].replace(" (", ",\n")
+    axis.set(xscale="log", xlabel="tilt [mrad]", ylabel="change [%]", title=allowed)
+    axis.xaxis.set_major_formatter("{x:g}")
+    axis.legend(loc="lower left")
+    return figure
+
+
+def draw_comparison(compared: dict, traces: tuple) -> Figure:
+    """Draw a part of both traces and what wore off between them."""
+    figure, (axis,) = new_figure(3.4)
+    (x, before), (_, after) = ((trace[:, 0], trace[:, 1]) for trace in traces)
+    start = compared["worn_from_before"]["value"] * MM
+    part = (x > start - 0.15) & (x < start + 0.65)
+    axis.fill_between(x[part], before[part], np.minimum(before, after)[part], color=ORANGE, alpha=0.35, lw=0,
+                      label="worn off")
+    axis.plot(x[part], before[part], color=GREY, label="before")
+    axis.plot(x[part], after[part], color=BLUE, label="after")
+    depth = compared["worn_depth_mean"]
+    value, low, high = (f"{depth[key] * UM:.3f}" for key in ("value", "low", "high"))
+    axis.set(xlabel="x [mm]", ylabel="height [um]",
+             title=f"Worn depth, mean over the trace:\n{value} um ({low} to {high} um)")
+    axis.set_ylim(top=1.5 * before[part].max())
+    axis.legend(ncols=3, loc="upper center")
+    return figure
+
+
+def figures() -> Iterator[tuple[str, Figure]]:
+    """Run the scenes and yield name and figure of every picture."""
+    wear = ROOT / "studies/wear"
+    with TemporaryDirectory() as place, matplotlib.rc_context(LOOK):
+        result = pf.run(ROOT / "studies/rig/rig.toml", say=lambda text: None)
+        yield "interface", draw_interface(result)
+        yield "loop", draw_loop(result)
+        result.save(place)
+        with Series(Path(place)) as series:
+            film = film_of(series)
+            yield "pieces", draw_pieces(series, film)
+            yield "film", draw_film(series, film)
+        os.chdir(place)  # a sweep writes its folder where it runs
+        yield "sweep", draw_sweep(pf.sweep(pf.new("misalignment")))
+        os.chdir(ROOT)
+        files = [wear / "before.csv", wear / "after.csv"]
+        traces = tuple(np.loadtxt(file, delimiter=",", skiprows=1) for file in files)
+        yield "compare", draw_comparison(pf.compare(*files, direction="x"), traces)
+
+
+def sample(values) -> list:
+    """Return a few of the values, in their order, with 6 digits; those that are not drawn are left out."""
+    shown = np.ma.compressed(np.ma.masked_invalid(values))
+    places = np.linspace(0, len(shown) - 1, min(SAMPLES, len(shown))).astype(int)
+    return [float(f"{value:.6g}") for value in shown[places]]
+
+
+def read_numbers(figure: Figure) -> dict:
+    """Return the texts and samples of the curves and fields that a figure shows."""
+    texts = []
+    curves = []
+    for axis in figure.axes:
+        texts += [axis.get_title(), axis.get_xlabel(), axis.get_ylabel()]
+        texts += [text.get_text() for text in axis.get_legend().get_texts()] if axis.get_legend() else []
+        for line in axis.lines:
+            curves += [sample(line.get_xdata()), sample(line.get_ydata())]
+        curves += [sample(np.sort(cells.get_array())) for cells in axis.collections if cells.get_array() is not None]
+    return {"texts": [text for text in texts if text], "curves": curves}
+
+
+def find_changes(kept: dict, fresh: dict) -> list[str]:
+    """Return what a committed picture shows that a fresh one does not show, as sentences."""
+    changes = [f'the text "{text}" is no longer shown' for text in kept["texts"] if text not in fresh["texts"]]
+    changes += [f'the text "{text}" is new' for text in fresh["texts"] if text not in kept["texts"]]
+    if [len(curve) for curve in kept["curves"]] != [len(curve) for curve in fresh["curves"]]:
+        return [*changes, "the number of curves or of their points has changed"]
+    for number, (old, new) in enumerate(zip(kept["curves"], fresh["curves"])):
+        difference = np.abs(np.subtract(old, new)).max(initial=0)
+        largest = np.abs(old).max(initial=0)
+        if difference > CURVE_TOL * largest:
+            changes.append(f"curve {number} differs by {difference:.3g}, its largest value is {largest:.3g}")
+    return changes
+
+
+def find_stale(drawn) -> list[str]:
+    """Compare freshly drawn figures, pairs of name and figure, with the committed pictures; returns what differs."""
+    kept = json.loads((FOLDER / "numbers.json").read_text("utf-8"))
+    stale = []
+    for name, figure in drawn:
+        if name not in kept:
+            stale.append(f"{name}.png: it has not been drawn yet")
+            continue
+        stale += [f"{name}.png: {change}" for change in find_changes(kept[name], read_numbers(figure))]
+    return stale
+
+
+def find_foreign() -> list[str]:
+    """Return the committed pictures that are not those of numbers.json."""
+    kept = json.loads((FOLDER / "numbers.json").read_text("utf-8"))
+    files = {path.stem: sha256(path.read_bytes()).hexdigest() for path in FOLDER.glob("*.png")}
+    names = sorted(files.keys() | kept.keys())
+    return [f"{name}.png" for name in names if files.get(name) != kept.get(name, {}).get("sha256")]
+
+
+def write_traces(folder: Path) -> None:
+    """Write the made-up traces of the README's recipe: a ground surface before and after wear.
+
+    Over the middle half the crests are worn off to 0.4 um above the mean line; both traces have noise of 20 nm.
+    """
+    generator = np.random.default_rng(4)
+    x = np.arange(0, 4e-3, 4e-6)
+    waves = [(2e-6, 190e-6, 0.3), (1.2e-6, 83e-6, 1.1), (0.6e-6, 31e-6, 2.0)]  # amplitude, length [m], phase
+    height = sum(amplitude * np.sin(2 * np.pi * x / length + 9e2 * x * phase) for amplitude, length, phase in waves)
+    height = height + np.convolve(generator.standard_normal(x.size), np.ones(8) / 8, "same") * 1e-6
     worn = np.where(abs(x - 2e-3) < 1e-3, np.minimum(height, 0.4e-6), height)
     for name, z in (("before", height), ("after", worn)):
-        noisy = z + 2e-8 * draw.standard_normal(x.size)
-        np.savetxt(folder / f"{name}.csv", np.c_[1e3 * x, 1e6 * noisy], "%.3f", delimiter=",", header="x [mm],z [um]",
+        noisy = z + 2e-8 * generator.standard_normal(x.size)
+        np.savetxt(folder / f"{name}.csv", np.c_[x * MM, noisy * UM], "%.3f", delimiter=",", header="x [mm],z [um]",
                    comments="")
 
 
-def main() -> None:
-    """All pictures, anew."""
-    FOLDER.mkdir(exist_ok=True)
-    with TemporaryDirectory() as room:
-        here = Path(room)
-        os.chdir(here)
-        (here / "screen.html").write_text(f"{SCREEN}$ patchfem\n{html.escape(patchfem())}", "utf-8")
-        shot(here / "screen.html", "first_screen", 760, 700)
-        patchfem("run", ROOT / "studies/rig/rig.toml", "-o", "rig")
-        shot(here / "rig/report.html", "run", 1130, 760)
-        patchfem("view", "rig", "-o", FOLDER / "pieces.png")
-        small(FOLDER / "pieces.png")
-        patchfem("new", "misalignment", "-o", "tilts.toml")
-        patchfem("sweep", "tilts.toml", "-o", "tilts")
-        shot(here / "tilts/report.html", "sweep", 1130, 900)
-        traces()
-        patchfem("compare", *(ROOT / f"studies/wear/{name}.csv" for name in ("before", "after")), "--direction", "x",
-                 "-o", "worn")
-        shot(here / "worn/report.html", "compare", 1130, 760)
+def write_all() -> None:
+    """Write the made-up traces, every picture and numbers.json; remove pictures that are no longer drawn."""
+    write_traces(ROOT / "studies/wear")
+    for path in FOLDER.glob("*.png"):
+        path.unlink()
+    numbers = {}
+    for name, figure in figures():
+        path = FOLDER / f"{name}.png"
+        figure.savefig(path, dpi=DPI, metadata={"Software": None})
+        numbers[name] = {"sha256": sha256(path.read_bytes()).hexdigest(), **read_numbers(figure)}
+    entries = []
+    for name, entry in numbers.items():
+        parts = [f'    "{key}": {json.dumps(value, ensure_ascii=False)}' for key, value in entry.items()]
+        entries.append(f'  "{name}": {{\n' + ",\n".join(parts) + "\n  }")
+    (FOLDER / "numbers.json").write_text("{\n" + ",\n".join(entries) + "\n}\n", "utf-8")
+
+
+def main(words: list[str]) -> int:
+    """Draw all pictures, or with --check compare them; the exit status."""
+    if words != ["--check"]:
+        write_all()
+        return 0
+    stale = find_foreign() + find_stale(figures())
+    print(*stale, sep="\n")
+    if stale:
+        print(f"draw the pictures anew: python {Path(__file__).relative_to(ROOT)}")
+    return int(bool(stale))
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main(sys.argv[1:]))

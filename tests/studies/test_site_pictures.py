@@ -1,0 +1,40 @@
+"""Pictures of README and site: those that are committed show the numbers of today's runs; a stale one is named."""
+
+import struct
+import sys
+from pathlib import Path
+
+import pytest
+
+import patchfem as pf
+
+SITE = Path(__file__).parents[2] / "studies" / "site"
+sys.path.insert(0, str(SITE))
+pictures = __import__("pictures")
+
+
+def loop_of(friction: str):
+    """Return the picture of a friction loop at a friction coefficient."""
+    return pictures.draw_loop(pf.run(pf.new("bench"), **{"friction.static": friction}))
+
+
+def test_always_the_committed_pictures_belong_to_their_numbers():
+    assert pictures.find_foreign() == []
+    for path in pictures.FOLDER.glob("*.png"):
+        content = path.read_bytes()
+        assert len(content) < pictures.MAX_BYTES
+        assert struct.unpack(">II", content[16:24])[0] == round(pictures.WIDTH * pictures.DPI)
+
+
+def test_always_a_picture_of_other_numbers_is_stale():
+    first = pictures.read_numbers(loop_of("0.3"))
+    assert pictures.find_changes(first, pictures.read_numbers(loop_of("0.3"))) == []
+    changes = pictures.find_changes(first, pictures.read_numbers(loop_of("0.302")))
+    assert any("curve 1 differs" in change for change in changes)
+    assert any("is no longer shown" in change for change in changes)
+    assert pictures.find_stale([("loop", loop_of("0.3"))])  # the committed loop is that of the rig
+
+
+@pytest.mark.slow
+def test_always_no_committed_picture_is_stale():
+    assert pictures.find_stale(pictures.figures()) == []
