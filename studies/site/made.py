@@ -264,15 +264,21 @@ def glossary() -> str:
 
 
 def commands() -> str:
-    """The help of every verb, as the command line prints it."""
+    """The first screen and the help of every verb, as the command line prints them."""
     from patchfem.__main__ import VERBS
 
-    parts = ["# Commands", "The text that `patchfem VERB --help` prints."]
+    parts = ["# Commands", "`patchfem` without arguments prints:", fenced("text", output_of()),
+             "The sections below are the texts that `patchfem VERB --help` prints."]
     for verb in VERBS:
-        said = subprocess.run([sys.executable, "-m", "patchfem", verb, "--help"], capture_output=True, text=True,
-                              cwd=ROOT, check=True, env=dict(examples.ENVIRON, COLUMNS="110")).stdout
-        parts += [f"## patchfem {verb}", fenced("text", said)]
+        parts += [f"## patchfem {verb}", fenced("text", output_of(verb, "--help"))]
     return "\n\n".join(parts) + "\n"
+
+
+def output_of(*words: str) -> str:
+    """Return what the command line prints on a terminal of 110 columns."""
+    environment = dict(examples.ENVIRON, COLUMNS="110")
+    return subprocess.run([sys.executable, "-m", "patchfem", *words], capture_output=True, text=True, cwd=ROOT,
+                          check=True, env=environment).stdout
 
 
 def python() -> str:
