@@ -96,7 +96,7 @@ def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
     if text := words.headline(answer, summary.cycles_of(written.result), released=released.released(written.result)):
         print(text)
     sys.stdout.flush()
-    if text := words.least_known(written.result):
+    if text := words.tolerance_sentence(written.result):
         print(text, flush=True)
     for text in answer["warnings"]:
         say(f"warning: {text}")

@@ -19,9 +19,9 @@ from patchfem.export.pages.words import (
     SHARP,
     group_of,
     headline,
-    least_known,
     pair,
     table_of,
+    tolerance_sentence,
     verdict,
     zero_below,
 )
@@ -163,20 +163,51 @@ def test_exact_a_worn_run_answers_with_what_was_worn(worn, text):
     assert headline({"kind": "bench", "outcome": "done", "measures": measures}, 2.0) == text
 
 
+def tolerance_said(tolerance=1e-2, **measures):
+    """The sentence of a run with these measures."""
+    plan = SimpleNamespace(model=SimpleNamespace(accuracy=SimpleNamespace(tolerance=tolerance)))
+    return tolerance_sentence(SimpleNamespace(plan=plan, measures=measures, outcome=Outcome.STEADY))
+
+
 def test_exact_a_level_between_two_others_does_not_claim_the_tolerance():
     """A jump at 5 g between levels 2 g apart; all that the tolerance steers is known to it."""
-    def said(**measures):
-        model = SimpleNamespace(accuracy=SimpleNamespace(tolerance=1e-2))
-        return least_known(SimpleNamespace(plan=SimpleNamespace(model=model), measures=measures,
-                                           outcome=Outcome.STEADY))
-
     jump, fine = Measure(5 * 9.80665, "m s-2", 9.80665, 9.80665), Measure(2.0, "J", 1e-2)
-    between = "jump_level, 5.0 ± 1.0 g, has an error of one step between the drive levels of the scene"
-    assert said(jump_level=jump, loop_area=fine) == "Every measure with an error estimate meets the tolerance 0.01; " \
-        f"closest to the tolerance is loop_area, 2.000 ± 0.010 J; {between}."
-    assert said(jump_level=jump) == f"{between}."
-    assert said(loop_area=fine).endswith("closest to the tolerance is loop_area, 2.000 ± 0.010 J.")
-    assert said(jump_level=jump, loop_area=Measure(2.0, "J", 1.0)) == ""
+    between = " (jump_level: one step between the drive levels of the scene)"
+    least = "0.005 of the value (loop_area, 2.000 ± 0.010 J)."
+    meets = "Every measure with an error estimate meets the tolerance 0.01"
+    assert tolerance_said(jump_level=jump, loop_area=fine) == \
+        f"{meets}{between}; the largest of the other errors is {least}"
+    assert tolerance_said(jump_level=jump) == f"{meets}{between}."
+    assert tolerance_said(loop_area=fine) == f"{meets}; the largest error is {least}"
+    assert tolerance_said(jump_level=jump, loop_area=Measure(2.0, "J", 1.0)) == ""
+
+
+def test_exact_a_limit_that_is_no_part_of_the_value_is_said_with_its_measure():
+    """A phase of 4.2 deg is known to 2.1 % of itself and to .05 % of the 180 deg that it may take."""
+    phase = Measure(0.0729, "rad", 0.0015, 0.0324)
+    stick = Measure(0.06977, "1", 0.00070, 0.011)
+    drift = Measure(2e-6, "m", 5e-7, 1e-6)
+    loaded = Measure(0.0862, "1", 0.00075)
+    said = tolerance_said(slip_start_phase=phase, stick_fraction=stick, loaded_fraction=loaded)
+    assert said == (
+        "Every measure with an error estimate meets the tolerance 0.01 (slip_start_phase: 0.01 of its range of "
+        "180 deg; stick_fraction: 0.01 of its range of 100 %); the largest of the other errors is 0.0087 of the value "
+        "(loaded_fraction, 8.620 ± 0.075 %).")
+    assert "(" not in tolerance_said(0.05, slip_start_phase=phase, stick_fraction=stick).split(";")[0]
+    assert "(drift_per_cycle: 1.02 um)" in tolerance_said(drift_per_cycle=drift)
+    # a floor of 1e-3 in radians is more than 1e-4 of the range: the limit itself is printed
+    assert "(slip_start_phase: 0.0578 deg)" in tolerance_said(
+        1e-4, slip_start_phase=Measure(0.0729, "rad", 9e-4, 1.001e-3))
+
+
+def test_exact_the_largest_error_is_that_of_a_value_that_a_reader_sees():
+    """Not the one that a floor holds, nor one that reads 0."""
+    small, large = Measure(1.0, "J", 2e-3, 0.0), Measure(1.0, "N", 8e-3, 1.0)
+    said = tolerance_said(loop_area=small, friction_force_peak=large, moment=Measure(1e-12, "N m", 5e-3, 1e-2))
+    assert "; the largest error is 0.008 of the value (friction_force_peak, 1.0000 ± 0.0080 N)" in said
+    assert "moment" not in said and SHARP not in said.split(";")[0]
+    unknown = tolerance_said(loop_area=Measure(1.0, "J", 0.0), friction_work=Measure(1.0, "J", None))
+    assert unknown.endswith(f"; {SHARP}, except where the error is unknown.")
 
 
 @pytest.mark.parametrize("more, part", [({}, "part of it slips"), ({"contact_fraction": (1.0, 0.0, "1")},
@@ -300,7 +331,7 @@ def test_exact_the_work_of_a_loop_that_changes_is_told_with_its_cycles(kind, out
 def test_exact_a_motion_that_grows_claims_no_tolerance(outcome, there):
     plan = SimpleNamespace(model=SimpleNamespace(accuracy=SimpleNamespace(tolerance=1e-2)))
     load = Measure(1.0, "N", 0.0, 0.0)
-    said = least_known(SimpleNamespace(plan=plan, measures={"normal_load": load}, outcome=outcome,
+    said = tolerance_sentence(SimpleNamespace(plan=plan, measures={"normal_load": load}, outcome=outcome,
                                        response=SimpleNamespace(time=[0.0, 2.0])))
     assert there in said and ("tolerance" in said) == (outcome is Outcome.STEADY)
 

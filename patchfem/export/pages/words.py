@@ -7,7 +7,7 @@ from math import ceil, floor, inf, isfinite, log10, pi
 from types import MappingProxyType
 
 from ... import scales
-from ...core import Outcome
+from ...core import Outcome, allowed
 from ...response.outcome import UNSETTLED
 from ...response.rows import TABLE as MOTION
 from ...response.rows import of_first, of_number
@@ -45,11 +45,13 @@ RELEASED = "The run ended before the motion came to rest; raise drive.cycles to 
 GROWN = ("The motion still grows at the end of the run, after {}: the measures describe its last cycles and have no "
          "error estimate.")
 CHANGES = ("transient", "grows")  # outcomes of a motion whose last cycles differ
-BETWEEN = ("jump_level",)  # known to lie between two levels of the drive, whatever the tolerance
+STEPPED = ("jump_level",)  # lies between two drive levels of the scene, whatever the tolerance
+RANGES = {"fraction": 1.0, "phase": pi}  # range of a measure [SI], by the end of its name
 ROUND = 1e-12  # of the friction force times the motion: work that is round-off
 NONE = MappingProxyType({})
 UNKNOWN = " (error unknown)"
 SHARP = "values without ± are exact to the last digit shown"
+SHARP_BUT_UNKNOWN = f"{SHARP}, except where the error is unknown"
 
 
 def units(name: str, value: float, unit: str, error: float | None = None) -> list:
@@ -285,29 +287,63 @@ def placed(contact: dict | None, fraction: float | None = None) -> str:
     return f", from x = {told}{here}" if count <= FEW else f", in {count} stretches from x = {told}{here}"
 
 
-def least_known(result: Result) -> str:
-    """The measure known least well for the tolerance, as one sentence; "" where one misses it, which a warning says."""
+def tolerance_sentence(result: Result) -> str:
+    """Say that all measures meet the tolerance, by which limits, and which error is the largest.
+
+    Parameters
+    ----------
+    result : Result
+
+    Returns
+    -------
+    str
+        "" if a measure misses the tolerance (a warning says so) or no error is known.
+    """
     tolerance = result.plan.model.accuracy.tolerance
-    wide = {name: one.beyond(tolerance) for name, one in result.measures.items()
-            if one.value is not None and one.error is not None and not name.endswith(SCATTER)}
+    known = {name: one for name, one in result.measures.items()
+             if one.value is not None and one.error is not None and not name.endswith(SCATTER)}
     if result.outcome is Outcome.GROWS and result.response is not None:
         return GROWN.format(scales.short(float(result.response.time[-1]), "s", 3))
-    if not wide or max(wide.values()) > 1:
+    if not known or max(one.beyond(tolerance) for one in known.values()) > 1:
         return ""
-    told = {name: pair(name, measure_object(result.measures[name])) for name in wide}
+    texts_of = {name: pair(name, measure_object(one)) for name, one in known.items()}
+    visible = {name: known[name] for name, text in texts_of.items() if "±" in text and not text.startswith("0 ")}
+    absolute = [name for name, one in visible.items() if one.error > tolerance * abs(one.value)]
+    relative = {name: one.error / abs(one.value) for name, one in visible.items() if name not in absolute}
+    sentence = f"Every measure with an error estimate meets the tolerance {tolerance:g}"
+    if absolute:
+        sentence += f" ({_absolute_limits(absolute, known, tolerance)})"
+    if relative:
+        name = max(relative, key=lambda one: (relative[one], one))
+        which = "of the other errors" if absolute else "error"
+        share = scales.plain(relative[name], 2)
+        sentence += f"; the largest {which} is {share} of the value ({name}, {texts_of[name]})"
+    if len(visible) < len(known):
+        unknown = any(one.value is not None and one.error is None for one in result.measures.values())
+        sentence += f"; {SHARP_BUT_UNKNOWN if unknown else SHARP}"
+    return f"{sentence}."
 
-    def known(name: str) -> str:
-        return f"{name}, {told[name]}"
 
-    steps = [name for name in wide if name in BETWEEN]
-    name = max(wide.keys() - set(steps), key=lambda one: ("±" in told[one], wide[one], one), default="")
-    of_steps = f"{', '.join(map(known, steps))}, has an error of one step between the drive levels of the scene"
-    if not name:
-        return f"{of_steps}."
-    but = f"; {of_steps}" if steps else ""
-    least = f"; closest to the tolerance is {known(name)}" if "±" in told[name] else ""
-    sharp = "" if all("±" in one for one in told.values()) else f"; {SHARP}"
-    return f"Every measure with an error estimate meets the tolerance {tolerance:g}{least}{but}{sharp}."
+def _absolute_limits(names: list, known: dict, tolerance: float) -> str:
+    """Say what the tolerance allows measures whose error is a larger part of their value."""
+    parts = []
+    for name in names:
+        one = known[name]
+        full = next((size for kind, size in RANGES.items() if of_first(name).endswith(kind)), 0.0)
+        limit = allowed(tolerance, one.value, one.floor)
+        if name in STEPPED:
+            parts.append(f"{name}: one step between the drive levels of the scene")
+        elif one.error <= tolerance * full:
+            parts.append(f"{name}: {tolerance:g} of its range of {_plain_value(name, full, one.unit)}")
+        else:
+            parts.append(f"{name}: {_plain_value(name, limit, one.unit)}")
+    return "; ".join(parts)
+
+
+def _plain_value(name: str, value: float, unit: str) -> str:
+    """Format a value [SI] of a measure with three digits in the unit that people read."""
+    shown, scale = units(name, value, unit)[0]
+    return f"{scales.plain(value * scale, 3)} {shown}".rstrip()
 
 
 def linked(text: str, name: str, more: str = "") -> str:
