@@ -170,25 +170,26 @@ def new(kind: str, /) -> str:
 
 def cost(scene: str | Path | Scene | Model, /, *, over: str = "", out: str | Path | None = None,
          say: Callable[[str], None] | None = None, **sets: Any) -> dict[str, Any]:
-    """Measure error against CPU seconds for the numerical settings of a scene: the dict of `patchfem cost --json`.
+    """Measure error against CPU seconds of a scene for several tolerances: the dict of `patchfem cost --json`.
 
     scene and sets are those of `load`. over: one setting (element_size, steps_per_cycle, shear_modes, jumps) instead of
-    all settings of the scene. out: folder for cost.csv and pictures. say: function that takes one line of text per run;
-    default: print to stderr.
+    the tolerance. out: folder for cost.csv and the picture. say: function that takes one line of text per run; default:
+    print to stderr.
 
-    The dict has an entry per setting with `runs`, `cheapest` and `sentence`. Each run has CPU `seconds`,
-    `wall_seconds`, and by measure its `values`, its stated `errors` and its `distances` from the best run, in SI.
-    Settings that gave bit-identical runs are listed as one. The dict is empty if the solution is exact. Raises
-    PatchfemError for a setting that the scene does not have.
+    The dict has the entry "tolerance", or that of the setting, with `runs`. Each run has its `label`, `tolerance`, CPU
+    `seconds`, `wall_seconds`, the `worst` measure with its error (relative to what a tolerance of 1 would allow),
+    `meets_tolerance`, the `remedies` of its warnings, and by measure its `values` and its stated `errors` in SI. Runs
+    with a setting that was tried because a tolerance was missed have the same `tolerance`. For one setting there are
+    also `distances` from the best run, `cheapest` and `sentence`, and settings that gave bit-identical runs are listed
+    as one. Raises PatchfemError for a setting that the scene does not have.
     """
     model, runs = build(scene, **sets), {}
-    for knob in [over] if _word(over, "cost: over") else cost_curves.knobs_of(model):
+    for knob in [over] if _word(over, "cost: over") else [cost_curves.TOLERANCE]:
         runs[knob] = cost_curves.curve(model, knob, _on_stderr if say is None else say)
         if out is not None:
             cost_files.write(Path(out), runs)
-            names = cost_files.shown(runs[knob], model.accuracy.tolerance)
-            cost_files.write_picture(Path(out), knob, runs[knob], model.accuracy.tolerance, names)
-    return {knob: cost_files.answer_of(each, model.accuracy.tolerance) for knob, each in runs.items()}
+            cost_files.write_picture(Path(out), knob, runs[knob], model.accuracy.tolerance)
+    return {knob: cost_files.answer_of(knob, each, model.accuracy.tolerance) for knob, each in runs.items()}
 
 
 def backbone(scene: str | Path | Scene | Model, /, *, mode: str = "",

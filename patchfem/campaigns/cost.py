@@ -1,13 +1,17 @@
-"""Cost of accuracy in time: a scene run again and again with one knob turned, each run timed against its error.
+"""Error of a scene against computing time, for several tolerances or for several values of one numerical setting.
 
-Seconds are those of the processor, this process and its children together: a machine that is busy with other work takes
-longer by the clock and counts the same.
+Read `tolerance_curve` first: it runs the scene at each tolerance, and where a run misses its tolerance it tries the
+setting that the run itself proposes. `curve` varies one setting alone.
+
+Seconds are CPU seconds of this process and its children: other work on the machine does not change them.
 """
 
 import os
+import re
 from dataclasses import dataclass, replace
 from math import inf
 from time import perf_counter, process_time
+from typing import NamedTuple
 
 from ..compiled import cache_folder
 from ..core import NotConverged, PatchfemError, allowed
@@ -17,11 +21,18 @@ from ..runs.patch.ladder import solve_split
 from ..runs.patch.measures import measures
 from ..runs.plan import plan
 from ..runs.run import run
-from .knobs import KNOBS, Setting, knobs_of, settings
+from ..scales import plain
+from .knobs import KNOBS, Setting, knobs_of, settings, with_setting, with_tolerance
 
-__all__ = ["KNOBS", "Cost", "cheapest", "curve", "knobs_of", "quickest", "sentence", "turned_by"]
-TIMINGS = 3  # of a run, the shortest of which counts: other work only adds to it
-LONG = 10.0  # CPU seconds of a run that is timed once
+__all__ = ["KNOBS", "TOLERANCE", "Cost", "cheapest", "curve", "knobs_of", "quickest", "sentence", "tolerance_curve",
+           "turned_by"]
+TOLERANCE = "tolerance"  # name of the curve over tolerances, beside KNOBS
+TIMINGS = 3  # of a short run; the shortest counts, because other work only adds to it
+LONG = 0.3  # CPU seconds from which a run is timed once: timings of it differ by some percent
+MAX_TRIAL_SECONDS = 10.0  # CPU seconds for the settings that runs propose, so that `cost` takes some seconds
+# how a warning of a run ends: the tolerance, what to do, and of this the setting that can be tried here
+_REMEDY = re.compile(r"; the tolerance is [^;]*; (.*)", re.DOTALL)
+_PROPOSED = re.compile(r"set accuracy\.(steps_per_cycle|shear_modes|harmonics) = (\d+)")
 APART = 1.5  # ratio of the seconds by the clock to those of the processor from which both are told
 NOISE = 1.1  # ratio of seconds up to which two runs cost the same
 JITTER = 2e-3  # CPU seconds by which timings of one short run differ
@@ -38,6 +49,8 @@ class Cost:
     scene's tolerance chose; words: the setting in a sentence; CPU seconds of the whole run with its error estimates,
     the least of so many timings, and those by the clock in the same timing. By measure: values; errors, as the run
     states them, in the unit of the value; floors of these; distances to the run `best`, which has none itself.
+    tolerance: what the run was asked for; remedies: what its warnings propose where it misses the tolerance; steps: of
+    a cycle, None if it has none.
     """
 
     label: str
@@ -50,6 +63,14 @@ class Cost:
     errors: dict
     floors: dict
     distances: dict
+    tolerance: float = 0.0
+    remedies: tuple = ()
+    steps: int | None = None
+
+    def meets_tolerance(self) -> bool:
+        """Whether every stated error is within the tolerance that the run was asked for."""
+        return all(error <= allowed(self.tolerance, self.values[name], self.floors[name])
+                   for name, error in self.errors.items())
 
     def off(self, name: str) -> float | None:
         """Error of a measure: the larger of what the run states and its distance to the best; None without either."""
@@ -70,12 +91,64 @@ class Cost:
         return off is not None and off <= allowed(tolerance, self.values[name], self.floors[name])
 
 
+def tolerance_curve(model: Model, say=None) -> list:
+    """Run a model at several tolerances, that of its scene among them.
+
+    Parameters
+    ----------
+    model : Model
+    say : callable, optional
+        Takes a line of text per run.
+
+    Returns
+    -------
+    list of Cost
+        From the widest to the tightest tolerance. Behind a run that misses its tolerance stand the runs with the
+        settings that were tried next, which have the same `tolerance`.
+    """
+    with placed(model.source):
+        wanted = with_tolerance(model)
+        _tried(wanted[0], "first run, not timed", None)  # imports and compiling stay out of the times
+        runs, spent = [], 0.0
+        for setting in wanted:
+            one = _timed(setting, True, say)
+            while one is not None:
+                if runs and one.same_as(runs[-1]):  # the faster timing holds for both
+                    quick = min(runs[-1], one, key=lambda each: each.seconds)
+                    runs[-1], one = (replace(each, seconds=quick.seconds, wall_seconds=quick.wall_seconds)
+                                     for each in (runs[-1], one))
+                runs.append(one)
+                setting = None if one.meets_tolerance() else _proposed(setting, one, MAX_TRIAL_SECONDS - spent)
+                if setting is None:
+                    break
+                one = _timed(setting, True, say)
+                spent += one.seconds if one is not None else 0.0
+    if not runs:
+        raise NotConverged("cost: no run of this scene succeeded", "")
+    return runs
+
+
+def _proposed(setting: Setting, one: Cost, seconds: float) -> Setting | None:
+    """Return the setting that the warnings of a run propose; None if there is none that takes at most `seconds`."""
+    for remedy in one.remedies:
+        if found := _PROPOSED.match(remedy):
+            key, count = found[1], int(found[2])
+            before = getattr(setting.model.accuracy, key) or (one.steps if key == "steps_per_cycle" else 1) or 1
+            # the time of a run grows about as its steps, modes or harmonics
+            if before < count and one.seconds * count / before <= seconds:
+                label = f"{one.tolerance:g}, {count} {key.replace('_', ' ')}"
+                return Setting(label, one.tolerance, f"tolerance {label}", with_setting(setting.model, key, count))
+    return None
+
+
 def curve(model: Model, knob: str, say=None) -> list:
-    """Cost of every value of a knob, coarse to fine.
+    """Cost of every value of a knob, coarse to fine; knob: of KNOBS, or TOLERANCE.
 
     What its tolerance chooses stands behind the values that a scene pins. PatchfemError for a knob that this scene does
     not have.
     """
+    if knob == TOLERANCE:
+        return tolerance_curve(model, say)
     with placed(model.source):
         mine = knobs_of(model)
         if knob not in mine:
@@ -131,16 +204,18 @@ def _timed(setting: Setting, coarse: bool, say, before=()) -> Cost | None:
         if found is None:
             return None
         timings.append((_cpu() - begin[0], perf_counter() - begin[1]))
-        known = {name: m for name, m in found.items() if m.value is not None}
+        measured, warnings, steps = found
+        known = {name: m for name, m in measured.items() if m.value is not None}
         one = Cost(setting.label, setting.value, setting.words, *min(timings), len(timings),
                    {name: m.value for name, m in known.items()},
                    {name: m.error for name, m in known.items() if m.error is not None},
-                   {name: m.floor for name, m in known.items()}, {})
+                   {name: m.floor for name, m in known.items()}, {}, setting.model.accuracy.tolerance,
+                   tuple(remedy[1] for text in warnings if (remedy := _REMEDY.search(text))), steps)
         if one.seconds >= LONG and _compiled() == kept:
             break
-    again = "".join(f", the same run as {other.label}" for other in before if one.same_as(other))
+    again = "".join(f", the same run as with {other.words}" for other in before if one.same_as(other))
     if say is not None:
-        say(f"{one.label}: {one.seconds:.2f} CPU s" + f" ({one.wall_seconds:.2f} s elapsed)" * one.waited() +
+        say(f"{one.words}: {one.seconds:.2f} CPU s" + f" ({one.wall_seconds:.2f} s elapsed)" * one.waited() +
             (again or ", timed once" * (one.timings == 1)))
     return one
 
@@ -159,13 +234,15 @@ def _compiled() -> int:
         return 0
 
 
-def _tried(setting: Setting, label: str, say, coarse: bool = True) -> dict | None:
-    """Measures of a setting, condensed anew; None where it does not converge or memory ends."""
+def _tried(setting: Setting, label: str, say, coarse: bool = True) -> tuple | None:
+    """(Measures, warnings, steps per cycle) of a setting, condensed anew; None if it does not converge or memory ends.
+    """
     try:
         if setting.level:
             fine, *more = solve_split(setting.model.patch, setting.level, coarse)
-            return measures(fine, *more)
-        return run(plan(setting.model), fresh=True).measures
+            return measures(fine, *more), (), None
+        done = run(plan(setting.model), fresh=True)
+        return done.measures, done.warnings, done.extra.get("steps_per_cycle") or done.extra.get("steps")
     except (NotConverged, MemoryError) as error:
         if say is not None:
             say(f"{label}: left out ({error or 'out of memory'})")
@@ -208,27 +285,27 @@ def _confirmed(runs: list, good) -> list:
 def quickest(runs: list, tolerance: float) -> Cost | None:
     """The run with least CPU seconds that has all measures within a tolerance, of those that cost the same the one
     with the smallest setting; None where no run has."""
-    names = _stated(runs)
+    names = stated_names(runs)
     good = _confirmed(runs, lambda one: all(one.within(name, tolerance) for name in names if name in one.values))
     least = min((one.seconds for one in good), default=inf)
     return next((one for one in runs if one in good and one.seconds <= NOISE * least + JITTER), None)
 
 
 def sentence(runs: list, tolerance: float) -> str:
-    """What it costs to have all measures within a tolerance: the quickest run that has, or the measure that is worst in
-    the best one."""
-    names, percent = _stated(runs), f"{100 * tolerance:g} %"
+    """Say which setting meets a tolerance in the least time, or which measure misses it in the best run."""
+    names = stated_names(runs)
     if one := quickest(runs, tolerance):
-        return f"{one.words}: {_seconds(one)} per run, with an error of at most {percent} in every measure" \
-               + _by_floor(one, names, tolerance) \
+        return f"{one.words}: {_seconds(one)} per run, with every measure within the tolerance {tolerance:g}" \
                + _effect(runs, tolerance)
     known = [one for one in runs if one.errors or one.distances]
-    share, name, least = min(((*_worst(one, names, tolerance), one) for one in known), key=lambda found: found[0])
-    if share >= STUCK * max(_worst(one, [name], tolerance)[0] for one in known if name in one.values):
-        return (f"no run has an error of at most {percent} in every measure: with every setting the error of {name} is "
-                f"{100 * share:.2g} %")
-    return (f"no run has an error of at most {percent} in every measure: the best run, with {least.words}, has an "
-            f"error of {100 * share:.2g} % in {name} and takes {_seconds(least)}")
+    worst, least = min(((worst_error(one, names, tolerance), one) for one in known), key=lambda found: found[0])
+    share = plain(worst.share, 2)
+    if worst.share >= STUCK * max(worst_error(one, [worst.name], tolerance).share for one in known
+                                  if worst.name in one.values):
+        return (f"no setting meets the tolerance {tolerance:g}: with every setting the error of {worst.name} is "
+                f"{share}")
+    return (f"no setting meets the tolerance {tolerance:g}: the best run, with {least.words}, has an error of "
+            f"{share} in {worst.name} and takes {_seconds(least)}")
 
 
 def _effect(runs: list, tolerance: float) -> str:
@@ -241,35 +318,34 @@ def _effect(runs: list, tolerance: float) -> str:
     return "; the other settings change no result" + (" by more than the tolerance" if turned else " of this scene")
 
 
-def _by_floor(one: Cost, names: list, tolerance: float) -> str:
-    """What a run owes to the floors of measures, as words behind the sentence on its errors; "" for nothing."""
-    small = [(one.off(name) / abs(one.values[name]) if one.values[name] else inf, name) for name in names
-             if name in one.values and one.off(name) is not None and one.off(name) > tolerance * abs(one.values[name])]
-    if not small:
-        return ""
-    share, name = max(small)
-    said = f"the error of {name} is {100 * share:.2g} %" if share < inf else f"{name} is 0"
-    more = f", and {len(small) - 1} more measures are as small" if len(small) > 1 else ""
-    return f" or below its floor ({said}{more})"
-
-
-def worst_of(runs: list, tolerance: float) -> set:
-    """The measure of each run that is farthest from a tolerance."""
-    names = _stated(runs)
-    return {_worst(one, names, tolerance)[1] for one in runs if one.errors or one.distances}
-
-
 def _seconds(one: Cost) -> str:
-    """CPU seconds to two digits."""
-    return f"{float(f'{one.seconds:.2g}'):g} CPU s"
+    """Format CPU seconds with two digits."""
+    return f"{plain(one.seconds, 2)} CPU s"
 
 
-def _worst(one: Cost, names: list, tolerance: float) -> tuple:
-    """(error over what the tolerance of 1 would allow, name) of the measure of a run that is farthest from it."""
-    allowed = {name: abs(one.values[name]) + one.floors[name] / tolerance for name in names if one.off(name)}
-    return max(((one.off(name) / size if size else inf, name) for name, size in allowed.items()), default=(0.0, ""))
+class WorstError(NamedTuple):
+    """The measure of a run that is farthest from a tolerance.
+
+    share: its error over what a tolerance of 1 would allow, to be compared with the tolerance; name: of the measure, ""
+    if no error is known.
+    """
+
+    share: float
+    name: str
 
 
-def _stated(runs: list) -> list:
+def worst_error(one: Cost, names: list, tolerance: float) -> WorstError:
+    """Find the measure, of `names`, that is farthest from a tolerance in a run."""
+    sizes = {name: abs(one.values[name]) + one.floors[name] / tolerance for name in names if one.off(name)}
+    return max((WorstError(one.off(name) / size if size else inf, name) for name, size in sizes.items()),
+               default=WorstError(0.0, ""))
+
+
+def worst_of_run(one: Cost) -> WorstError:
+    """`worst_error` of all measures of a run for the tolerance that it was asked for."""
+    return worst_error(one, list(one.values), one.tolerance)
+
+
+def stated_names(runs: list) -> list:
     """Measures whose error any run states, or all where none does."""
     return [name for name in runs[-1].values if any(name in one.errors for one in runs)] or list(runs[-1].values)

@@ -13,6 +13,7 @@ from ..scene.rules.draft import acts
 KNOBS = ("element_size", "steps_per_cycle", "shear_modes", "jumps")
 LEVELS = 5  # values of a knob, each twice as fine as the one before
 TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5)  # of a mesh that is chosen
+SCENE_TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4)  # of a whole scene; tighter ones take long and few scenes meet them
 MOST_CELLS = 1600  # columns of the finest even mesh
 MOST_STEPS = 12800
 MIDDLE = {"shear_modes": 8, "jumps": 8}  # of the values where the scene pins none
@@ -57,6 +58,18 @@ def settings(model: Model, knob: str) -> list:
 
 def _split_words(level: int) -> str:
     return f"contact.mesh with every element edge halved {level} times" if level else "contact.mesh as it is"
+
+
+def with_tolerance(model: Model) -> list:
+    """Settings for a row of values of accuracy.tolerance, wide to tight, that of the scene among them."""
+    own = model.accuracy.tolerance
+    models = {one: with_setting(model, "tolerance", one) for one in SCENE_TOLERANCES} | {own: model}
+    return [Setting(f"{one:g}", one, f"tolerance {one:g}", models[one]) for one in sorted(models, reverse=True)]
+
+
+def with_setting(model: Model, key: str, value: float) -> Model:
+    """Return a model with another value of a key of [accuracy]."""
+    return replace(model, accuracy=model.accuracy.model_copy(update={key: value}))
 
 
 def _by_tolerance(model: Model) -> list:
@@ -114,4 +127,4 @@ def _middle(model: Model, knob: str) -> int:
 def _with(model: Model, knob: str, value: int) -> Model:
     if knob == "jumps":
         return replace(model, wear=replace(model.wear, jumps=value))
-    return replace(model, accuracy=model.accuracy.model_copy(update={knob: value}))
+    return with_setting(model, knob, value)

@@ -35,27 +35,28 @@ from .shared import (
 
 def cost(scene: Path, /, *, over: word("vary only one setting: element_size, steps_per_cycle, shear_modes or "
                                        "jumps") = "",
+         verbose: flag("vary also each setting alone, and print the errors of several measures", "-v",
+                       "--verbose") = False,
          out: Out = None, set_: Sets = (), json_: Json = False, quiet: Quiet = False):
-    """Measure how the error of SCENE depends on computing time (CPU seconds), for one accuracy setting or for all
-    settings that SCENE has.
+    """Measure how the error of SCENE depends on computing time (CPU seconds): one run for each of several tolerances,
+    or for each value of one accuracy setting.
 
     Example: patchfem cost rig.toml --over steps_per_cycle
     """
     found = model_of(scene, set_)
     if over and over not in cost_curves.KNOBS:
         raise Refused(f"cost --over {over}: unknown key; use one of {', '.join(cost_curves.KNOBS)}")
-    knobs = [over] if over else cost_curves.knobs_of(found)
-    if not knobs:
-        raise Refused(f"{scene}: no accuracy setting changes the results of this scene")
+    knobs = [over] if over else [cost_curves.TOLERANCE, *(cost_curves.knobs_of(found) if verbose else ())]
     target, curves, answer = placed(out, f"{found.source.path.stem}-cost"), {}, {}
     for knob in knobs:
         runs = curves[knob] = cost_curves.curve(found, knob, None if quiet else say)
-        names = cost_files.shown(runs, found.accuracy.tolerance)
         table = cost_files.write(target, curves)
-        picture = cost_files.write_picture(target, knob, runs, found.accuracy.tolerance, names)
-        answer[knob] = cost_files.answer_of(runs, found.accuracy.tolerance)
+        picture = cost_files.write_picture(target, knob, runs, found.accuracy.tolerance)
+        answer[knob] = cost_files.answer_of(knob, runs, found.accuracy.tolerance)
         if not json_:
-            _print_cost(knob, runs, names, answer[knob]["sentence"])
+            tabled = verbose and knob != cost_curves.TOLERANCE
+            lines = cost_files.details_of if tabled else cost_files.lines_of
+            print("\n".join(lines(knob, runs, found.accuracy.tolerance)))
             print(f"results: {table} {picture}")
     if json_:
         print(json.dumps(answer))
@@ -94,9 +95,6 @@ def backbone(scene: Path, /, *, mode: word("name of the mode, such as axial, or 
         print(f"results: {target}")
     if not one.curves:
         raise NotReached
-
-
-EXACT = 1e-12  # of a value, below which an error is round-off
 
 
 @dataclass(frozen=True)
@@ -157,25 +155,3 @@ def fit(scene: Path, /, *, to: word(
         print(f"results: {target}")
     if answer["outcome"] == "not_converged":
         raise NotReached
-
-
-def _print_cost(knob: str, runs: list, names: list, text: str) -> None:
-    """The table of a cost curve, in relative errors, and what it comes to; seconds by the clock beside those of the
-    processor where any run waited."""
-    wall, first = any(one.waited() for one in runs), max(len(knob), *(len(one.label) for one in runs))
-    head = [f"{knob:<{first}}", f"{'CPU s':>7}", *[f"{'clock s':>7}"] * wall, *(f"{one:>17}" for one in names)]
-    print("  ".join(head))
-    print("  ".join([" " * len(one) for one in head[:2 + wall]] + ["stated (distance)".rjust(max(17, len(one)))
-                                                                   for one in names]))
-    for one in runs:
-        cells = [f"{one.label:<{first}}", f"{one.seconds:7.3f}", *[f"{one.wall_seconds:7.3f}"] * wall]
-        print("  ".join(cells + [_shares(one, name).rjust(max(17, len(name))) for name in names]))
-    print(text)
-
-
-def _shares(one, name: str) -> str:
-    """Error that a run states and, in brackets, its distance to the best run, both relative to the value."""
-    size = abs(one.values.get(name, 0.0))
-    shares = (part[name] / size if size and name in part else None for part in (one.errors, one.distances))
-    stated, away = ("-" if one is None else "exact" if one < EXACT else f"{one:.1e}" for one in shares)
-    return f"{stated} ({away})"

@@ -1,23 +1,124 @@
-"""Error against time of the knobs of a scene: a table in a file and a picture of each."""
+"""Error of a scene against computing time: lines for the screen, cost.csv and one picture."""
 
 from pathlib import Path
 
-from ..campaigns.cost import cheapest, quickest, sentence, turned_by, worst_of
-from ..disk.whole import write_rows, write_text
-from .drawing.pictures import drawing, styled
+import numpy as np
 
-AXES = {"element_size": "element size", "steps_per_cycle": "steps per cycle", "shear_modes": "shear modes",
-        "jumps": "jumps over the cycles of wear"}
+from ..campaigns.cost import (
+    TOLERANCE,
+    Cost,
+    cheapest,
+    sentence,
+    stated_names,
+    turned_by,
+    worst_error,
+    worst_of_run,
+)
+from ..disk.whole import write_rows, write_text
+from ..scales import plain
+from .drawing.pictures import BLUE, drawing, styled
+
+AXES = {TOLERANCE: "tolerance", "element_size": "element size", "steps_per_cycle": "steps per cycle",
+        "shear_modes": "shear modes", "jumps": "jumps over the cycles of wear"}
 MAIN = ("worn_depth_max", "relative_displacement_amplitude", "absolute_acceleration_peak", "loop_area",
         "friction_force_peak", "pressure_peak", "contact_fraction", "approach", "rotation", "normal_stiffness",
-        "tangential_stiffness")  # the measures that pictures and the screen show, of those that a knob turns
-TOUCHING = 0.14  # share of the width within which two labels would touch
+        "tangential_stiffness")  # measures of the detailed table, as far as a setting changes them
+EXACT = 1e-12  # of a value, below which an error is round-off
+LABEL_HEIGHT = 0.06  # of the height of the axes, by which labels are apart
+HEIGHT = 210.0  # points: about the height of the axes
+
+
+def lines_of(knob: str, runs: list, tolerance: float) -> list[str]:
+    """Format the runs of a curve for the screen: one line per tolerance, or per value of a setting.
+
+    Parameters
+    ----------
+    knob : str
+        TOLERANCE or a numerical setting.
+    runs : list of Cost
+    tolerance : float
+        That of the scene.
+
+    Returns
+    -------
+    list of str
+    """
+    if knob != TOLERANCE:
+        names = stated_names(runs)
+        rows = [(one, worst_error(one, names, tolerance), "") for one in runs]
+        last = [sentence(runs, tolerance)]
+    else:
+        groups = _by_tolerance(runs)
+        rows = [(group[0], worst_of_run(group[0]), _outcome(group)) for group in groups]
+        missed = [group[-1] for group in groups if not group[-1].meets_tolerance()][-1:]
+        last = [f"tolerance {one.tolerance:g}: {remedy}" for one in missed for remedy in one.remedies]
+    width = max(len(knob), *(len(one.label) for one, *_ in rows))
+    out = [f"{knob:<{width}}  {'CPU s':>6}  {'error':>8}  worst measure"]
+    for one, worst, comment in rows:
+        share = plain(worst.share, 2) if worst.share > EXACT else "exact"
+        text = f"{one.label:<{width}}  {plain(one.seconds, 2):>6}  {share:>8}  {worst.name}"
+        out.append(f"{text.rstrip()}{comment}")
+    return [*out, *last]
+
+
+def _by_tolerance(runs: list) -> list[list]:
+    """Group the runs of a curve over tolerances: each tolerance with the settings that were tried for it."""
+    out: list[list] = []
+    for one in runs:
+        if out and out[-1][0].tolerance == one.tolerance:
+            out[-1].append(one)
+        else:
+            out.append([one])
+    return out
+
+
+def _outcome(group: list) -> str:
+    """Say whether a tolerance is met, by a run as it is or by the settings that were tried next."""
+    first, last = group[0], group[-1]
+    if first.meets_tolerance():
+        return ""
+    of_steps = any("accuracy.steps_per_cycle = " in remedy for remedy in first.remedies)
+    missed = f"; not with {first.steps} steps per cycle" if of_steps else "; not reached"
+    if last is first:
+        return missed
+    tried = last.label.partition(", ")[2]
+    seconds = f"{tried} ({plain(last.seconds, 2)} CPU s)"
+    if last.meets_tolerance():
+        return f"{missed}, but with {seconds}"
+    worst = worst_of_run(last)
+    return f"{missed}, nor with {seconds}: {plain(worst.share, 2)} in {worst.name}"
+
+
+def details_of(knob: str, runs: list, tolerance: float) -> list[str]:
+    """Format a table of several measures: stated error and distance to the best run at every value of a setting."""
+    names = shown(runs, tolerance)
+    waited, width = any(one.waited() for one in runs), max(len(knob), *(len(one.label) for one in runs))
+    head = [f"{knob:<{width}}", f"{'CPU s':>7}", *[f"{'clock s':>7}"] * waited, *(f"{one:>17}" for one in names)]
+    out = ["  ".join(head)]
+    out.append("  ".join([" " * len(one) for one in head[:2 + waited]] + ["stated (distance)".rjust(max(17, len(one)))
+                                                                          for one in names]))
+    for one in runs:
+        cells = [f"{one.label:<{width}}", f"{one.seconds:7.3f}", *[f"{one.wall_seconds:7.3f}"] * waited]
+        out.append("  ".join(cells + [_shares(one, name).rjust(max(17, len(name))) for name in names]))
+    return [*out, sentence(runs, tolerance)]
+
+
+def _shares(one: Cost, name: str) -> str:
+    """Format the stated error of a measure and, in brackets, its distance to the best run, relative to the value."""
+    size = abs(one.values.get(name, 0.0))
+    shares = (part[name] / size if size and name in part else None for part in (one.errors, one.distances))
+    stated, away = ("-" if one is None else "exact" if one < EXACT else f"{one:.1e}" for one in shares)
+    return f"{stated} ({away})"
 
 
 def shown(runs: list, tolerance: float) -> list:
-    """Names of the measures that a picture and the table of a knob show: those of MAIN that it turns, and each that is
-    farthest from the tolerance in a run, by which the sentence judges; where these are none, all that it turns."""
-    turned, worst = turned_by(runs), worst_of(runs, tolerance)
+    """Return the measures of the detailed table.
+
+    They are those of MAIN that the setting changes and the worst measure of each run; all that it changes if there are
+    none of these.
+    """
+    turned, names = turned_by(runs) or stated_names(runs), stated_names(runs)
+    worst = {worst_error(one, names, tolerance).name for one in runs if one.errors or one.distances}
     return [name for name in (*MAIN, *sorted(worst.difference(MAIN))) if name in turned] or turned
 
 
@@ -40,103 +141,97 @@ def write(folder: Path, curves: dict) -> Path:
     return table
 
 
-def write_picture(folder: Path, knob: str, runs: list, tolerance: float, names: list) -> Path:
-    """Write cost_KNOB.svg into a folder that exists, and return its path; arguments as `draw`."""
-    picture = Path(folder) / f"cost_{knob}.svg"
-    write_text(picture, draw(knob, runs, tolerance, names))
+def write_picture(folder: Path, knob: str, runs: list, tolerance: float) -> Path:
+    """Write the picture of a curve, cost.svg or cost_KNOB.svg, into a folder that exists, and return its path."""
+    picture = Path(folder) / ("cost.svg" if knob == TOLERANCE else f"cost_{knob}.svg")
+    write_text(picture, draw(knob, runs, tolerance))
     return picture
 
 
-def answer_of(runs: list, tolerance: float) -> dict:
-    """What the runs of a knob come to, in plain lists and dicts; SI.
+def answer_of(knob: str, runs: list, tolerance: float) -> dict:
+    """Return what the runs of a curve come to, in plain lists and dicts; SI.
 
-    runs: Costs coarse to fine; tolerance: of the scene. `runs` holds each with its label, value of the knob, seconds
-    of the processor and by the clock, values, errors and distances by measure, `cheapest` the label of the quickest run
-    within the tolerance by measure, `sentence` what all measures cost.
+    `runs` holds each with its label, value of the setting, tolerance, CPU seconds and seconds by the clock, values,
+    errors and distances by measure, `worst` {`measure`, `error` as in the picture} and `meets_tolerance`; `cheapest`
+    the label of the quickest run within the tolerance by measure, `sentence` what all measures cost; both None for
+    TOLERANCE, whose runs have different tolerances.
     """
-    parts = ("label", "value", "seconds", "wall_seconds", "timings", "values", "errors", "distances")
-    return {"runs": [{name: getattr(one, name) for name in parts} for one in runs],
-            "cheapest": cheapest(runs, tolerance), "sentence": sentence(runs, tolerance)}
+    parts = ("label", "value", "tolerance", "seconds", "wall_seconds", "timings", "values", "errors", "distances")
+    out = []
+    for one in runs:
+        worst = worst_of_run(one)
+        out.append({name: getattr(one, name) for name in parts}
+                   | {"worst": {"measure": worst.name, "error": worst.share}, "meets_tolerance": one.meets_tolerance(),
+                      "remedies": list(one.remedies)})
+    alone = knob != TOLERANCE
+    return {"runs": out, "cheapest": cheapest(runs, tolerance) if alone else None,
+            "sentence": sentence(runs, tolerance) if alone else None}
 
 
 @styled
-def draw(knob: str, runs: list, tolerance: float, names: list):
-    """Relative error of each measure against the CPU seconds of a run, as SVG text.
+def draw(knob: str, runs: list, tolerance: float):
+    """Draw the worst error of each run against its CPU seconds, as SVG text.
 
-    Left the errors that the runs state, right their distances to the best run; rings mark the quickest run that has
-    all measures within the tolerance. knob: its name; runs: Costs coarse to fine; tolerance: a broken line; names: of
-    the measures shown.
+    The error is that of the measure that is farthest from the tolerance. A hollow point misses its tolerance.
+
+    Parameters
+    ----------
+    knob : str
+        TOLERANCE or a numerical setting.
+    runs : list of Cost
+    tolerance : float
+        That of the scene, drawn as a broken line.
     """
-    figure, axes = drawing(2, 4.6, sharex=True, sharey=True)
-    for axis, part, title in ((axes[0], "errors", "error estimated by the run"),
-                              (axes[1], "distances", "difference from the best run")):
-        axis.set(xscale="log", yscale="log", xlabel="CPU seconds of a run", title=title)
-        for number, name in enumerate(names):
-            _line(axis, runs, part, name, f"C{number % 10}")
-        _ring(axis, quickest(runs, tolerance), part, names)
-        axis.axhline(tolerance, color="0.4", linestyle="--", linewidth=1, label=f"tolerance {tolerance:g}")
-        axis.margins(x=0.1)
-    groups, (low, high) = _groups(runs), axes[0].get_ylim()
-    axes[0].set_ylim(low, high * (high / low)**(0.05 + 0.06 * max(len(group) for group in groups)))
-    for axis in axes:
-        _name_runs(axis, groups)
-    axes[0].set_ylabel("error or difference, divided by the measure")
-    stars = "; star: setting that follows from the scene's tolerance" if any(one.value is None for one in runs) else ""
-    by = "tolerance of the mesh" if runs[0].words.startswith("element size set by the tolerance") else AXES[knob]
-    figure.suptitle(f"What accuracy costs, by {by}{stars}", fontsize=11)
-    labelled = [axis.get_legend_handles_labels() for axis in axes]
-    handles = {label: handle for found in labelled for handle, label in zip(*found, strict=True)}
-    figure.legend(handles.values(), handles.keys(), loc="outside lower center", ncols=4, fontsize=9)
+    figure, (axis,) = drawing(1, 4.2)
+    names = stated_names(runs)
+    worst = [worst_of_run(one) if knob == TOLERANCE else worst_error(one, names, tolerance) for one in runs]
+    points = [(one, found.share) for one, found in zip(runs, worst, strict=True) if found.share > EXACT]
+    axis.set(xscale="log", yscale="log", xlabel="CPU seconds of a run", ylabel="error of the worst measure")
+    axis.set_title(f"What accuracy costs, by {AXES[knob]}")
+    axis.plot([one.seconds for one, _ in points], [share for _, share in points], "-", color=BLUE, linewidth=1)
+    for label, face in (("meets its tolerance", BLUE), ("misses its tolerance", "white")):
+        alike = [(one.seconds, share) for one, share in points
+                 if (share <= (one.tolerance or tolerance)) == (face == BLUE)]
+        if alike:
+            axis.plot(*zip(*alike, strict=True), "o", color=BLUE, markersize=6, markerfacecolor=face, label=label)
+    axis.axhline(tolerance, color="0.4", linestyle="--", linewidth=1, label=f"tolerance of the scene, {tolerance:g}")
+    if points:
+        _set_limits(axis, [one.seconds for one, _ in points], [tolerance, *(share for _, share in points)])
+        _label_points(axis, points)
+    figure.legend(loc="outside lower center", ncols=3, fontsize=9)
     return figure
 
 
-def _line(axis, runs: list, part: str, name: str, colour: str) -> None:
-    """The errors or distances of a measure, joined in the order of the knob, and a star for what the tolerance
-    chose."""
-    for alone, mark in ((False, "o-"), (True, "*")):
-        points = [point for one in runs if (one.value is None) == alone and (point := _point(one, part, name))]
-        if points:
-            axis.plot(*zip(*points, strict=True), mark, color=colour, markersize=11 if alone else 4,
-                      label=name.replace("_", " ") if not alone else None)
-
-
-def _point(one, part: str, name: str) -> tuple | None:
-    """(CPU seconds, relative error or distance) of a run; None where it has none above 0."""
-    size = abs(one.values.get(name, 0.0))
-    found = getattr(one, part).get(name, 0.0) / size if size else 0.0
-    return (one.seconds, found) if found > 0 else None
-
-
-def _ring(axis, one, part: str, names: list) -> None:
-    """Rings around the points of the quickest run within the tolerance, where there is one."""
-    points = [point for name in names if one is not None and (point := _point(one, part, name))]
-    if points:
-        axis.plot(*zip(*points, strict=True), "o", color="0.25", markersize=11, fillstyle="none", zorder=4,
-                  label="cheapest within the tolerance")
-
-
-def _groups(runs: list) -> list:
-    """Runs sorted by their seconds, those together whose labels would touch."""
-    ordered = sorted(runs, key=lambda one: one.seconds)
-    near, out = (ordered[-1].seconds / ordered[0].seconds)**TOUCHING, [[ordered[0]]]
-    for one in ordered[1:]:
-        if one.seconds <= near * out[-1][0].seconds:
-            out[-1].append(one)
-        else:
-            out.append([one])
-    return out
-
-
-def _name_runs(axis, groups: list) -> None:
-    """The settings at the top above their runs, and ticks of the seconds that do not touch."""
+def _set_limits(axis, seconds: list, shares: list) -> None:
+    """Leave room for labels around the points, and write the seconds as plain numbers."""
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    for group in groups:
-        for one in group:
-            axis.axvline(one.seconds, color="0.85", linewidth=0.8, zorder=0)
-        text = "\n".join(one.label.removeprefix("tolerance ") for one in group)
-        axis.annotate(text, (group[0].seconds, 0.99), xycoords=("data", "axes fraction"), ha="center", va="top",
-                      fontsize=8, color="0.3")
-    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 3.0)))
+    low, high = min(seconds), max(seconds)
+    room = max(high / low, 2.0)**0.15
+    axis.set_xlim(low / room, high * room)
+    low, high = min(shares), max(shares)
+    room = max(high / low, 10.0)**0.15
+    axis.set_ylim(low / room, high * room)
+    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 5.0, 7.0)))
     axis.xaxis.set_major_formatter(FuncFormatter(lambda seconds, _: f"{seconds:g}"))
     axis.xaxis.set_minor_formatter(NullFormatter())
+
+
+def _label_points(axis, points: list) -> None:
+    """Write the settings of each point above it, those of equal runs together; labels that would overlap move up.
+
+    points: (Cost, error) of each.
+    """
+    groups: dict[tuple, list] = {}
+    for one, share in points:
+        groups.setdefault((one.seconds, share), []).append(one.label)
+    decades = float(np.ptp(np.log(axis.get_ylim())))
+    start, width = np.log(axis.get_xlim()[0]), float(np.ptp(np.log(axis.get_xlim())))
+    height = -1.0
+    for (seconds, share), labels in sorted(groups.items(), key=lambda found: found[0][1]):
+        place = np.log(share / axis.get_ylim()[0]) / decades
+        height = max(place, height + LABEL_HEIGHT)
+        right = np.log(seconds) - start < 0.6 * width
+        axis.annotate("; ".join(labels), (seconds, share), xytext=(8 if right else -2, 7 + (height - place) * HEIGHT),
+                      textcoords="offset points", ha="left" if right else "center", fontsize=9, color="0.2",
+                      bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5})

@@ -92,7 +92,7 @@ def test_exact_the_table_of_the_mesh_is_what_the_command_prints(words, tmp_path,
     error of the contact fraction is 1.8e-6, 2.2e-6 and 2.3e-6, and no other differs by more than 4 %.
     """
     monkeypatch.setattr("patchfem.campaigns.cost.TIMINGS", 1)
-    said = cli("cost", STUDIES / "rig/pieces.toml", *words, "-o", tmp_path, "-q")
+    said = cli("cost", STUDIES / "rig/pieces.toml", "--over", "element_size", "-v", *words, "-o", tmp_path, "-q")
     assert said.code == 0, said.err
     blocks = re.findall(r"(?s)```text\n(element_size .*?)```", (STUDIES / "README.md").read_text("utf-8"))
     (names, ours, said), (printed, theirs, sentence) = (table(one) for one in (said.out.split("results:")[0],
