@@ -15,8 +15,8 @@ changes its force), "memoryless" (of the last motion alone), "creeps" (it never 
 elements).
 
 A shape of the gap is an effect, its table in `scene.keys.contact` and a function of `contact.gaps`. A waveform of the
-drive is an effect with its keys, and a row of `structure.drives.MADE`. Traits: "steady" (harmonic balance finds its
-motion or the curve of them), "endless" (it needs cycles or a duration to end).
+drive is an effect with its keys and a row of `MADE` in its module, `structure.drives` unless the effect names another.
+Its traits are the words of the properties of `Waveform`, which is all that other files ask of it.
 """
 
 from importlib import import_module
@@ -28,7 +28,7 @@ MOST_COORDINATES = 2000  # masses or modes of a rig, whose matrices are full; he
 class Effect(NamedTuple):
     """module: "" where the scene's own values suffice; needs, gives: what earlier effects hand on; of a law of friction
     or a waveform the keys that it must have, "a|b" for one of two, and those that it may have besides; of a law what
-    carries it; of both their traits."""
+    carries it; of both their traits; phrase: of a waveform, what the page says of it (see `Waveform`)."""
 
     module: str
     equations: str
@@ -37,6 +37,81 @@ class Effect(NamedTuple):
     keys: tuple = ("", "")
     carries: str = ""
     traits: str = ""
+    phrase: str = ""
+
+
+class Waveform(NamedTuple):
+    """Waveform of the drive as other files see it: they ask these properties and never compare its name.
+
+    Attributes
+    ----------
+    name : str
+        Value of `drive.waveform`; "" of a release, which has none.
+    keys : tuple of str
+        Keys of [drive] that it requires, and those that it takes besides, separated by blanks.
+    traits : str
+        Words that turn the properties below on: "sine levels swept step random base-only endless".
+    phrase : str
+        What the page says of the drive. `{what}` is the driven quantity ("base acceleration"), `{level}` its size,
+        `{place}` the driven mass; a key such as `{frequency}` is its value in the scene. "" for general words.
+    """
+
+    name: str = ""
+    keys: tuple = ("", "")
+    traits: str = ""
+    phrase: str = ""
+
+    def takes(self, key: str) -> bool:
+        """Return whether the waveform requires or takes a key of [drive]."""
+        return key in " ".join(self.keys).split()
+
+    def _has(self, trait: str) -> bool:
+        return trait in self.traits.split()
+
+    @property
+    def required_keys(self) -> list:
+        """Keys of [drive] that the waveform requires."""
+        return self.keys[0].split()
+
+    @property
+    def is_sine(self) -> bool:
+        """Whether the drive is a single sine of constant amplitude and frequency."""
+        return self._has("sine")
+
+    @property
+    def has_levels(self) -> bool:
+        """Whether the drive is a sine whose amplitude changes from level to level of `drive.levels`."""
+        return self._has("levels")
+
+    @property
+    def is_swept(self) -> bool:
+        """Whether the drive is a sine whose frequency runs from `drive.from` to `drive.to`."""
+        return self._has("swept")
+
+    @property
+    def is_step(self) -> bool:
+        """Whether the drive jumps at t = 0 and stays constant, so that the motion decays."""
+        return self._has("step")
+
+    @property
+    def is_random(self) -> bool:
+        """Whether the drive is a stationary random record; `drive.file` then holds its spectral density."""
+        return self._has("random")
+
+    @property
+    def is_for_base_only(self) -> bool:
+        """Whether the drive can only shake the base and is refused as a force."""
+        return self._has("base-only")
+
+    @property
+    def needs_length(self) -> bool:
+        """Whether the scene must say when the run ends, by `drive.cycles` or `drive.duration`."""
+        return self._has("endless")
+
+    @property
+    def has_steady_motion(self) -> bool:
+        """Whether a harmonic balance finds the steady motion, or the curve of steady motions."""
+        return self.is_sine or self.has_levels or self.is_swept
 
 
 GAPS = "patchfem.contact.gaps"  # a shape of the gap is a function there of the places x and the keys of its table
@@ -50,8 +125,9 @@ _SIZE = "acceleration displacement force"
 CLIMB = "F = V (t + phi)/(1 - phi t), V = N + m (t q'' + t' q'^2), t = A k sin(k q - phase)"
 
 
-def _wave(equations: str, keys: tuple, traits: str = "", module: str = "patchfem.structure.drives") -> Effect:
-    return Effect(module, equations, (), (), (keys[0], f"{keys[1]} cycles duration".strip()), "", traits)
+def _wave(equations: str, keys: tuple, traits: str = "", phrase: str = "",
+          module: str = "patchfem.structure.drives") -> Effect:
+    return Effect(module, equations, (), (), (keys[0], f"{keys[1]} cycles duration".strip()), "", traits, phrase)
 
 
 EFFECTS = {
@@ -128,20 +204,24 @@ EFFECTS = {
     "drive.kind=base": Effect("patchfem.dynamics.propagator", "G_i = -base_i a(t)", ("modes",), ("motion",)),
     "drive.kind=force": Effect("patchfem.dynamics.propagator", "G_i = phi_i F(t)", ("modes",), ("motion",)),
     "drive.kind=free": Effect("patchfem.dynamics.propagator", "z(0), z'(0) given, G = 0", ("modes",), ("motion",)),
-    "drive.waveform=sine": _wave("a(t) = a sin(2 pi f t)", ("frequency", _SIZE), "steady endless", module=""),
+    "drive.waveform=sine": _wave("a(t) = a sin(2 pi f t)", ("frequency", _SIZE), "sine endless",
+                                 "{what} of {level} at {frequency}{place}"),
     "drive.waveform=step": _wave("a(t) = a; or the base is displaced by X at t = 0: z(0) = -base X", ("", _SIZE),
-                                 "endless"),
+                                 "step endless", "a step of {level} in {what}{place}"),
     "drive.waveform=sweep": _wave("a(t) = a sin(2 pi int f dt), f' or f'/f constant",
-                                  ("from to", f"rate log_rate {_SIZE}"), "steady"),
+                                  ("from to", f"rate log_rate {_SIZE}"), "swept",
+                                  "{what} of {level} swept from {from} to {to}{place}"),
     "drive.waveform=levels": _wave("a(t) = a_k sin(2 pi f t), level after level",
-                                   ("frequency levels", "onset onset_length"),
-                                   "steady endless"),
-    "drive.waveform=file": _wave("a(t) is linear between the rows of a table", ("file", "")),
+                                   ("frequency levels", "onset onset_length"), "levels endless",
+                                   "{count} levels of {what} from {first} to {last} at {frequency}{place}"),
+    "drive.waveform=file": _wave("a(t) is linear between the rows of a table", ("file", ""), "",
+                                 "recorded {what} of {file}{place}"),
     "drive.waveform=tones": _wave("a(t) = sum_k a_k sin(2 pi f_k t + phi_k)", ("frequencies accelerations", "phases"),
-                                  "endless", "patchfem.structure.tones"),
+                                  "base-only endless", "base acceleration of {accelerations} at {frequencies}",
+                                  "patchfem.structure.tones"),
     "drive.waveform=random": _wave("a(t) = sum_k A_k cos 2 pi f_k t + B_k sin 2 pi f_k t, A_k, B_k normal of variance "
-                                   "G(f_k)/T", ("", "spectrum file from to seed"), "endless",
-                                   "patchfem.structure.noise"),
+                                   "G(f_k)/T", ("", "spectrum file from to seed"), "random base-only endless",
+                                   "random {what} {density}, record {seed}", "patchfem.structure.noise"),
     "structure.stiffening": Effect("patchfem.dynamics.march.joints", "F = k_3 x^3 at the output"),
     "accuracy.method=exact": Effect("patchfem.dynamics.events.histories", "closed form or series between events"),
     "accuracy.method=march": Effect("patchfem.dynamics.march.loop_kernels",
@@ -186,8 +266,11 @@ def absent(named) -> list:
 LAWS = {name.removeprefix("friction.law="): effect for name, effect in EFFECTS.items()
         if name.startswith("friction.law=")}
 SHAPES = {name.removeprefix("contact."): effect for name, effect in EFFECTS.items() if effect.module == GAPS}
-WAVEFORMS = {name.removeprefix("drive.waveform="): effect for name, effect in EFFECTS.items()
-             if name.startswith("drive.waveform=")}
+WAVEFORMS = {name.removeprefix("drive.waveform="): Waveform(name.removeprefix("drive.waveform="), effect.keys,
+                                                            effect.traits, effect.phrase)
+             for name, effect in EFFECTS.items() if name.startswith("drive.waveform=")}
+NO_WAVEFORM = Waveform()  # of a release, and of a name that is no waveform
+SINE = WAVEFORMS["sine"]  # waveform of a scene that names none
 LISTED = "two-directions"  # what carries the readings and orders of 2.17 that need the sum over all bonds
 
 
@@ -196,11 +279,11 @@ def has(law: str | None, trait: str) -> bool:
     return law in LAWS and trait in LAWS[law].traits.split()
 
 
-def waves(waveform: str | None, trait: str) -> bool:
-    """Whether a waveform of the drive, by its name in a scene, has a trait or takes a key; none has that is not
-    there."""
-    found = WAVEFORMS.get(waveform)
-    return found is not None and trait in f"{' '.join(found.keys)} {found.traits}".split()
+def waveform_of(drive) -> Waveform:
+    """Return the waveform of a [drive] table; NO_WAVEFORM without a drive, of a release and of an unknown name."""
+    if drive is None or drive.kind == "free":
+        return NO_WAVEFORM
+    return WAVEFORMS.get(drive.waveform, NO_WAVEFORM)
 
 
 def listed(friction) -> bool:

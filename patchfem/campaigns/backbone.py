@@ -24,7 +24,7 @@ from ..dynamics.harmonic.forces import Group
 from ..dynamics.harmonic.harmonic import pack as harmonics_packed
 from ..dynamics.harmonic.laws import synthesis
 from ..dynamics.harmonic.point import balance_of, top
-from ..effects import has, unbuilt
+from ..effects import NO_WAVEFORM, has, unbuilt
 from ..friction.record import loop_from
 from ..model.model import Model
 from ..model.slide import SlidePath
@@ -785,8 +785,8 @@ def released(joint: Joint, amplitude: float) -> Model:
     model, modes = decays.steadily(joint.model), joint.modes
     start = _start(joint, amplitude)
     period = 2 * np.pi / (joint.held[0] or modes.omega[joint.mode])
-    rig = replace(model.rig, drive=drives.release(period), start=start, kind="free", waveform="", frequency=None,
-                  levels=(), level_cycles=0.0, force=None)
+    rig = replace(model.rig, drive=drives.release(period), start=start, kind="free", waveform=NO_WAVEFORM,
+                  frequency=None, levels=(), level_cycles=0.0, force=None)
     return replace(model, rig=rig)
 
 

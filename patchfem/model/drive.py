@@ -2,10 +2,8 @@
 
 from functools import lru_cache
 
-import numpy as np
-
-from ..core import BaseSine, ModalBasis, PatchfemError
-from ..effects import module_of
+from ..core import ModalBasis, PatchfemError
+from ..effects import module_of, waveform_of
 from ..inputs import signals
 from ..structure import drives
 from ..structure.drive_sizes import DriveKeys, level_cycles, own_period
@@ -18,15 +16,12 @@ def drive_of(scene, modes: ModalBasis):
     if drive.kind == "free":
         return drives.release(own_period(modes))
     asked = DriveKeys(drive, modes.mass, own_period(modes), lambda: recorded(scene))
-    if drive.waveform == "sine":
-        omega = 2 * np.pi * drive.frequency
-        return BaseSine(float(asked.size(omega)), float(omega), asked.moving)
     return module_of(f"drive.waveform={drive.waveform}").MADE[drive.waveform](asked)
 
 
 def levelled(asked) -> bool:
     """Whether the drive is raised in levels."""
-    return asked.kind != "free" and asked.waveform == "levels"
+    return waveform_of(asked).has_levels
 
 
 def cycles_per_level(asked) -> float:
@@ -50,7 +45,8 @@ def recorded(scene) -> tuple:
     """
     try:
         path = scene.beside(scene.drive.file)
-        return signals.read_spectrum(path) if scene.drive.waveform == "random" else record(path, scene.drive.kind)
+        is_spectrum = waveform_of(scene.drive).is_random
+        return signals.read_spectrum(path) if is_spectrum else record(path, scene.drive.kind)
     except PatchfemError as error:
         raise type(error)(f"{scene.where('drive.file')}: {error}") from None
 

@@ -7,6 +7,7 @@ check otherwise.
 
 from pathlib import Path
 
+from ..effects import waveform_of
 from ..faults import PatchfemError
 from ..inputs import measured
 from ..mesh import files
@@ -96,7 +97,7 @@ def _slide(path: Path, tables, whole: bool) -> None:
 
 
 def _drive(path: Path, tables, whole: bool) -> None:
-    if tables.drive.waveform == "random":
+    if waveform_of(tables.drive).is_random:
         drive.signals.read_spectrum(path)
     elif whole or tables.drive.kind is not None:
         drive.record(path, tables.drive.kind)

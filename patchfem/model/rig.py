@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 
 from ..core import ModalBasis, Start
+from ..effects import Waveform, waveform_of
 from ..structure.drive_sizes import decay_rate, omega_of, peak_speed
 from .drive import cycles_of, cycles_per_level, drive_of, levelled
 from .law import interface_laws_of, interface_names
@@ -31,7 +32,7 @@ NOTHING = 1e-9  # of the largest slide of a mode: one below it is round-off
 class Rig:
     """Modes with their drive and what rubs on them.
 
-    start: None at rest. kind: "base", "force" or "free"; waveform as in the scene; frequency [Hz] of a sine or of
+    start: None at rest. kind: "base", "force" or "free"; waveform of the drive; frequency [Hz] of a sine or of
     levels, else None; levels: accelerations [m s-2] of a drive in levels, or forces over the modal mass, level_cycles
     of each; onset: what their onset means, (kind, length [m] or None); cycles of the whole run; force [N] of a force
     drive, else None. interfaces: an InterfaceLaw each, none in a linear rig; names: of interfaces between masses.
@@ -52,7 +53,7 @@ class Rig:
     drive: object
     start: Start | None
     kind: str
-    waveform: str
+    waveform: Waveform
     frequency: float | None
     levels: tuple
     level_cycles: float
@@ -138,7 +139,7 @@ def _rig(scene, alone: ModalBasis, faces: tuple, joint: float | None = None) -> 
     rows = levelled(asked)
     bends = bonded is not None and bonded.wavelength is not None
     cubic = structure.stiffening.cubic if structure.stiffening is not None else None
-    return Rig(modes, drive, start_of(scene, modes), asked.kind, asked.waveform, asked.frequency,
+    return Rig(modes, drive, start_of(scene, modes), asked.kind, waveform_of(asked), asked.frequency,
                tuple(part.amplitude for part in drive.segments) if rows else (),
                cycles_per_level(asked) if rows else 0.0, float(cycles_of(asked, drive)),
                asked.force if asked.kind == "force" else None, faces,

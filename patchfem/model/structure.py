@@ -9,7 +9,7 @@ from math import inf, pi
 import numpy as np
 
 from ..core import ModalBasis, PatchfemError, Start, frozen_array
-from ..effects import has, module_of
+from ..effects import has, module_of, waveform_of
 from ..friction import record
 from ..scene.keys.same import once
 from ..structure import masses, starts
@@ -180,7 +180,7 @@ def start_state(scene, found: ModalBasis) -> Start:
             raise PatchfemError(f"{scene.where('drive.mass')}: the rig has only {moved.size} coordinates")
         moved[pushed_mass(structure, drive) - 1] = drive.displacement
         return starts.given(found, moved)
-    if drive.kind == "base" and drive.waveform == "step" and drive.displacement is not None:
+    if drive.kind == "base" and waveform_of(drive).is_step and drive.displacement is not None:
         return step_start(found, drive.displacement)
     return starts.at_rest(found)
 

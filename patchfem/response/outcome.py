@@ -29,14 +29,14 @@ SMALL = 1e-12  # of the displacement a/omega^2 of the drive: a change of the amp
 def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0.0, slowest: float = 0.0) -> tuple:
     """Outcome of a run, and its measures with the steady estimate where there is one.
 
-    Under a sine, and under levels in their last one, the amplitudes of successive windows decide (`classify`), and what
-    free motion is left in them (`left_over`). A steady one that will still change by TELLS of the tolerance has the
-    estimate too. A release or a step is steady once it is at rest, to the floor of its amplitude; else the same
-    amplitudes decide, but
-    a release grows only where a mode gains energy. A motion whose middle moves on is not steady (`moves_on`). A sweep
-    or a recorded signal changes to the end: unless it leaves the interface stuck it is transient, without a steady
-    estimate; a random one is done where both halves of its record move as much. So is an interface that holds while
-    what it holds still rises. What rises to a motion that is known to exist, `raw.bounded`, does not grow.
+    Under a periodic drive, and under levels in their last one, the amplitudes of successive windows decide
+    (`classify`), and what free motion is left in them (`left_over`). A steady one that will still change by TELLS of
+    the tolerance has the estimate too. A release or a step is steady once it is at rest, to the floor of its amplitude;
+    else the same amplitudes decide, but a release grows only where a mode gains energy. A motion whose middle moves on
+    is not steady (`moves_on`). A sweep or a recorded signal changes to the end: unless it leaves the interface stuck it
+    is transient, without a steady estimate; a random one is done where both halves of its record move as much. So is an
+    interface that holds while what it holds still rises. What rises to a motion that is known to exist, `raw.bounded`,
+    does not grow.
     level_cycles: of each level, 0 without levels; slowest: rate [1/s] at which the slowest mode decays, below 0 where
     one gains energy.
     """
@@ -46,22 +46,23 @@ def settle(raw, measures: dict, tolerance: float, drive, level_cycles: float = 0
         return raw.outcome, measures
     if hasattr(drive, "band"):
         return Outcome.DONE if stationary.steady(raw.window, drive) else Outcome.TRANSIENT, measures
-    if not drive.segments and not hasattr(drive, "beat"):
+    if not drive.segments and drive_sizes.repeat_cycles(drive) is None:
         return Outcome.TRANSIENT, measures
-    if not drive.segments:
+    if not drive.segments and not drive_sizes.is_periodic(drive):  # tones, of which a window holds whole beats
         found = classify(raw.amplitudes, tolerance, SMALL * drive_sizes.largest(drive) / drive_sizes.omega_of(drive)**2)
         return found, without_bars(measures) if found is Outcome.GROWS else measures
-    amplitudes, extremes, last = raw.amplitudes, raw.extremes, drive.segments[-1]
+    amplitudes, extremes = raw.amplitudes, raw.extremes
     window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
     floor = SMALL * drive_sizes.largest(drive) / drive_sizes.omega_of(drive)**2
     if level_cycles:
         amplitudes = amplitudes[-max(1, int(level_cycles / window)):]
         extremes = None if extremes is None else extremes[-int(level_cycles):]
-    if last.amplitude == 0:
+    if not drive_sizes.is_periodic(drive):
         rests = amplitudes[-1] <= max(floor, measures["relative_displacement_amplitude"].floor)
         outcome = Outcome.STEADY if rests else _held(classify(amplitudes, tolerance, floor), measures, tolerance,
                                                      _middle(extremes, window))
-        outcome = Outcome.TRANSIENT if outcome is Outcome.GROWS and not last.constant and slowest >= 0 else outcome
+        if outcome is Outcome.GROWS and not drive.segments[-1].constant and slowest >= 0:
+            outcome = Outcome.TRANSIENT
         return outcome, without_bars(measures) if outcome is Outcome.GROWS else measures
     number, steady, error = (one[0] for one in settled(
         np.asarray(amplitudes, float)[None], None if extremes is None else np.asarray(extremes)[None], window,
@@ -184,7 +185,7 @@ def unsettled(raw, measures: dict, limits: tuple, drive, cycles: float) -> list:
     last window will still change, with the cycles after which a free motion at that rate is below the tolerance.
     """
     (tolerance, slowest), main = limits, measures["relative_displacement_amplitude"]
-    if raw.outcome is not Outcome.STUCK or not drive_sizes.sinusoidal(drive) or raw.extremes is None or not main.value:
+    if raw.outcome is not Outcome.STUCK or not drive_sizes.is_periodic(drive) or raw.extremes is None or not main.value:
         return []
     window = max(1, round((raw.window.time[-1] - raw.window.time[0]) / drive.period))
     decay = slowest * drive.period
@@ -216,15 +217,19 @@ def rings_on(left: float, sizes: tuple, limits: tuple, cycles: float) -> list:
 
 def changing_note(outcome: Outcome, drive) -> list:
     """The sentence, in a list, on measures under a drive that changes to the end; an empty list for other drives."""
-    if outcome is not Outcome.TRANSIENT or drive.segments or hasattr(drive, "beat"):
+    if outcome is not Outcome.TRANSIENT or drive.segments or \
+            drive_sizes.repeat_cycles(drive) is not None:
         return []
     return ["the drive changes until the end of the run, so the motion cannot become steady; the measures are those of "
             "the last cycles, and result.nc contains the whole motion"]
 
 
 def steady_of(drive, amplitudes, phasors) -> tuple:
-    """Steady amplitude and its error under a drive that ends as a sine, (None, None) under any other.
+    """Steady amplitude and its error under a periodic drive, (None, None) under any other.
 
-    A released or struck rig comes to rest, whatever the tail of its amplitudes looks like.
+    A released or struck rig comes to rest, whatever the tail of its amplitudes looks like. Under a drive that is no
+    sine the motion may have no first harmonic, so the amplitudes are extrapolated in place of the phasors.
     """
-    return steady_amplitude(amplitudes, phasors) if drive_sizes.sinusoidal(drive) else (None, None)
+    if not drive_sizes.is_periodic(drive):
+        return None, None
+    return steady_amplitude(amplitudes, phasors if drive_sizes.sinusoidal(drive) else amplitudes)

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..core import Measure, Outcome
 from ..scales import plain
-from ..structure.drive_sizes import sinusoidal, whole
+from ..structure.drive_sizes import is_periodic, sinusoidal, whole
 from .measures import lateral
 from .rows import TABLE
 
@@ -17,9 +17,9 @@ CYCLIC = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", *ACC
 HOLDS = "the whole interface sticks throughout the last cycles"
 UNBOUNDED = "no bounded motion exists at this drive"
 STILL = "the output does not move: the first harmonic of its acceleration is 0 within the accuracy of the computation"
-APERIODIC = "the drive is not a sine at the end of the run, so no period is known over which to take the mean slide"
+APERIODIC = "the drive is not periodic at the end of the run, so no period is known over which to take the mean slide"
 BEATS = ("under tones the mean slide over one cycle changes within their beat without any drift; this measure exists "
-         "only for a drive that is a sine at the end of the run")
+         "only for a drive that repeats in every cycle")
 STOPS = ("the interface sticks where its slide is largest: during this stick the friction force takes different values "
          "at the same slide")
 UNSEEN = "the motion changes in such a way that the run does not show what it settles to: a longer run does"
@@ -55,17 +55,17 @@ def stopping(values) -> dict:
 
 
 def unsettled(values, outcome: Outcome, drive) -> dict:
-    """The steady amplitude without a value, by name, of a motion under a sine that has not settled and does not show
-    what to. values: by name, those that the run has; drive."""
+    """The steady amplitude without a value, by name, of a motion under a periodic drive that has not settled and does
+    not show what to. values: by name, those that the run has; drive."""
     return {SETTLES: Measure(None, TABLE[SETTLES].unit, None, TABLE[SETTLES].floor, reason=UNSEEN)} \
-        if outcome is Outcome.TRANSIENT and sinusoidal(drive) and SETTLES not in values else {}
+        if outcome is Outcome.TRANSIENT and is_periodic(drive) and SETTLES not in values else {}
 
 
 def undrifting(values, drive) -> dict:
     """The drift without a value, by name, where no drive gives the period over which a mean stands still: means over
     other spans differ without any drift. values: Measure by name; drive."""
     one = values.get("drift_per_cycle")
-    return {} if one is None or sinusoidal(drive) else {
+    return {} if one is None or is_periodic(drive) else {
         "drift_per_cycle": replace(one, value=None, error=None, reason=BEATS if hasattr(drive, "beat") else APERIODIC)}
 
 
@@ -84,7 +84,7 @@ def unclosed(values, window, drive) -> dict:
     only: one of them does not close where it gives back more than it takes while none creates energy.
     """
     ledger, loop = window.extra.get("ledger"), values.get("loop_area")
-    if ledger is None or loop is None or sinusoidal(drive):
+    if ledger is None or loop is None or is_periodic(drive):
         return {}
     _, stored, lost, created = np.abs(ledger[:, -1] - ledger[:, 0])
     loops = {name: one for name, one in values.items() if name.startswith("loop_area")}

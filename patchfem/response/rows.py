@@ -248,7 +248,7 @@ ROWS = (
     Row("drift_per_cycle", "m", 1e-11,
         "drift of the slide per cycle: (mean slide over the last cycle of the window - mean slide over the "
         "first cycle of the window)/(number of cycles between these two cycles); if the interface slides in a plane, "
-        "the length of this vector; null if the drive is not a sine at the end of the run",
+        "the length of this vector; null if the drive is not periodic at the end of the run",
         lambda s: drift_of(s) if s.own.drift is None else s.own.drift,
         term=("slip amplitude (without slip: amplitude of the motion)", _moved), halves=FOURTH),
     Row("slip_amplitude", "m", 1e-10,
@@ -273,8 +273,8 @@ ROWS = (
         lambda s: s.load, group="friction"),
     Row("loop_area", "J", 1e-10,
         "friction work per cycle in this interface alone (the energy dissipated, if the loop closes), in both "
-        "directions if the interface slides in a plane; null if the drive is not a sine and the friction loop does not "
-        "close, because the interface then stores or returns more energy than it dissipates",
+        "directions if the interface slides in a plane; null if the drive is not periodic and the friction loop does "
+        "not close, because the interface then stores or returns more energy than it dissipates",
         lambda s: s.cycle.get("loop_area"), group="energy"),
     Row("equivalent_stiffness", "N m-1", 1.0,
         "part of the first harmonic of the friction force that is in phase with the slide, divided by the first "
@@ -311,9 +311,9 @@ ROWS = (
     Row("open_fraction", "1", 1e-3, "fraction of the time of the last cycles in which the surfaces are not in contact",
         lambda s: s.of_load(lambda load: np.mean(load <= 0)), 4.0, group="friction", term=("1", lambda _: 1.0)),
     Row("relative_displacement_amplitude_steady", "m", 1e-10,
-        "steady amplitude under a sine, extrapolated if the motion has not settled or may still change by more than "
-        "0.02 tolerance × amplitude; absent if it may not, null if the motion has not settled and does not show what "
-        "to"),
+        "steady amplitude under a periodic drive, extrapolated if the motion has not settled or may still change by "
+        "more than 0.02 tolerance × amplitude; absent if it may not, null if the motion has not settled and does not "
+        "show what to"),
     Row("peak_frequency", "Hz", 0.0, "drive frequency, within the swept range, at which the curve of steady amplitudes "
         "is largest; a resonance unless it is an end of that range"),
     Row("friction_ratio_end", "1", 1e-9, "friction force divided by normal load, both at the end of the slide",

@@ -165,16 +165,16 @@ def _of_rig(model: Model, engine: str, steps: int, numerics) -> list:
             size = 2.0 * model.accuracy.harmonics * max(1, len(rig.interfaces))
             parts.append(Need(WAVE * size**2, f"{model.accuracy.harmonics} harmonics", "accuracy.harmonics"))
     elif numerics is not None:
-        window, key = of_rig.kept_samples(numerics), "drive.duration" if rig.waveform == "random" else "drive.cycles"
-        key = "accuracy.steps_per_cycle" if model.accuracy.steps_per_cycle else key
+        window = of_rig.kept_samples(numerics)
+        length_key = "drive.duration" if rig.waveform.is_random else "drive.cycles"
+        key = "accuracy.steps_per_cycle" if model.accuracy.steps_per_cycle else length_key
         parts.append(Need(KEPT_BY.get(engine, KEPT) * width * window, f"{window:.0f} samples of the last cycles", key))
         turns = min(TURNS * rig.cycles, resume.MOST_KEPT)
         size = CYCLE_BY.get(engine, CYCLE) * rig.cycles + TURN_BY.get(engine, TURN) * width * turns
-        parts.append(Need(size, f"the histories of {rig.cycles:.3g} cycles",
-                          "drive.duration" if rig.waveform == "random" else "drive.cycles"))
+        parts.append(Need(size, f"the histories of {rig.cycles:.3g} cycles", length_key))
     rows = len(getattr(rig.drive, "breaks", ())) if not rig.drive.segments else 0
-    parts.append(Need(ROW * rows, f"{rows} rows of the drive",
-                      "drive.duration" if rig.waveform != "file" else "drive.file"))
+    rows_key = "drive.file" if "file" in rig.waveform.required_keys else "drive.duration"
+    parts.append(Need(ROW * rows, f"{rows} rows of the drive", rows_key))
     return parts
 
 

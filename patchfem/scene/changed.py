@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..effects import waveform_of
 from .lines import key_lines, pieces_of
 from .reader import Draft, apply_set
 from .rules.structure import HEAVY
@@ -140,7 +141,7 @@ def _lumped(scene: Scene) -> bool:
     if structure.measured != "free":
         return False
     return bool(structure.mode) and not structure.interface and law.temperature is None and law.spread is None and \
-        (drive.kind, drive.waveform, drive.duration) == ("base", "sine", None) and not files_of(scene)
+        drive.kind == "base" and waveform_of(drive).is_sine and drive.duration is None and not files_of(scene)
 
 
 def _pressed(scene: Scene) -> bool:
@@ -159,7 +160,7 @@ def _pressed(scene: Scene) -> bool:
                            and not scene.structure.interface and not scene.structure.bonded
                            and scene.structure.measured == "free"
                            and drive.duration is None
-                           and (drive.kind, drive.waveform) == ("base", "sine"))
+                           and drive.kind == "base" and waveform_of(drive).is_sine)
 
 
 def _place_of(scene: Scene, key: str) -> tuple | None:

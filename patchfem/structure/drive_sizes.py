@@ -99,8 +99,22 @@ def fastest(drive) -> float:
 
 
 def sinusoidal(drive) -> bool:
-    """Whether a drive ends as a sine, without which phases and steady cycles mean nothing."""
+    """Whether a drive ends as a sine, which phases and ratios of first harmonics need."""
     return bool(drive.segments) and drive.segments[-1].amplitude != 0
+
+
+def is_periodic(drive) -> bool:
+    """Whether a drive repeats after each of its cycles until it ends, as a sine does.
+
+    Steady amplitudes and values per cycle need this, and nothing more. A drive that is no sine says so by its attribute
+    `is_periodic`.
+    """
+    return sinusoidal(drive) or getattr(drive, "is_periodic", False)
+
+
+def repeat_cycles(drive) -> float | None:
+    """Return the number of cycles after which a drive repeats: 1, the `beat` of tones, or None if it never does."""
+    return 1.0 if is_periodic(drive) else getattr(drive, "beat", None)
 
 
 def whole(span: float, drive) -> bool:

@@ -1,11 +1,12 @@
 """Drives beyond the plain sine: steps, levels and releases in closed form, sweeps, recorded signals.
 
 Every drive has `period` [s] of what counts as its cycle, `moving` (the base accelerates; False: a force over the modal
-mass), `segments` (core.Segment, () where it is not made of constants and sines) and `values(t)` [m s-2]. One without
-segments has `largest` [m s-2], `fastest`, its highest frequency over that of its cycle, `duration` [s], after which it
-ends, and for the event engine its local series: `breaks` (k,) [s], where its formula changes; `series(number, time,
-unit, terms)` [m s-2] after `number` of them, in (t - time)/unit, exact to round-off for 27 terms where unit <= 2/rate;
-`rate` [1/s]; `phase(t)` [rad].
+mass), `segments` (core.Segment, () where it is not made of constants and sines) and `values(t)` [m s-2]. One that is no
+sine and still repeats after each period until it ends says so by `is_periodic`. One without segments has `largest`
+[m s-2], `fastest`, its highest frequency over that of its cycle, `duration` [s], after which it ends, and for the event
+engine its local series: `breaks` (k,) [s], where its formula changes; `series(number, time, unit, terms)` [m s-2] after
+`number` of them, in (t - time)/unit, exact to round-off for 27 terms where unit <= 2/rate; `rate` [1/s]; `phase(t)`
+[rad].
 `MADE` has the function that makes the drive of each waveform.
 """
 
@@ -13,17 +14,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core import PatchfemError, Segment
+from ..core import BaseSine, PatchfemError, Segment
 from .drive_sizes import DriveKeys, level_cycles
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Piecewise:
-    """A drive of segments, the first from t = 0; period [s]: what counts as a cycle."""
+    """A drive of segments, the first from t = 0; period [s]: what counts as a cycle.
+
+    is_periodic: the segments repeat after each period until the run ends; a last segment that is a sine needs no mark.
+    """
 
     segments: tuple
     period: float
     moving: bool = True
+    is_periodic: bool = False
 
     def values(self, t):
         """Drive [m s-2] at times t (k,) >= 0 [s]; at the border of two segments that of the later one."""
@@ -140,7 +145,8 @@ class Sweep:
 class Recorded:
     """A signal read off a table, straight between its rows and 0 after the last.
 
-    time: (k,) [s] rising from 0; value: (k,) [m s-2]; period [s]: what counts as a cycle; moving as in `step`.
+    time: (k,) [s] rising from 0; value: (k,) [m s-2]; period [s]: what counts as a cycle; moving as in `step`;
+    is_periodic: the table repeats after each period until it ends.
     PatchfemError for fewer than two rows or times that do not rise from 0.
     """
 
@@ -148,6 +154,7 @@ class Recorded:
     value: np.ndarray
     period: float
     moving: bool = True
+    is_periodic: bool = False
 
     def __post_init__(self):
         if len(self.time) < 2 or self.time[0] != 0 or not np.all(np.diff(self.time) > 0):
@@ -192,6 +199,11 @@ class Recorded:
         return np.interp(np.asarray(t, float), self.time, self.value, right=0.0)
 
 
+def _sine(asked: DriveKeys) -> BaseSine:
+    omega = 2 * np.pi * asked.keys.frequency
+    return BaseSine(float(asked.size(omega)), float(omega), asked.moving)
+
+
 def _levels(asked: DriveKeys) -> Piecewise:
     return levels(asked.levels, 2 * np.pi * asked.keys.frequency, level_cycles(asked.keys), asked.moving)
 
@@ -216,4 +228,4 @@ def _recorded(asked: DriveKeys) -> Recorded:
     return Recorded(time, scale * value, asked.period, asked.moving)
 
 
-MADE = {"levels": _levels, "step": _step, "sweep": _sweep, "file": _recorded}
+MADE = {"sine": _sine, "levels": _levels, "step": _step, "sweep": _sweep, "file": _recorded}

@@ -50,7 +50,7 @@ def noise(frequency, level, duration: float, seed: int, period: float) -> Random
     transform = np.zeros(count // 2 + 1, complex)
     transform[lines] = (a - 1j * b) * (count / 2) / np.sinc(f * step)**2
     value = np.fft.irfft(transform, count)
-    return Random(step * np.arange(count + 1), np.append(value, value[0]), period, True, (low, high))
+    return Random(step * np.arange(count + 1), np.append(value, value[0]), period, band=(low, high))
 
 
 def _random(asked: DriveKeys) -> Random:

@@ -38,7 +38,7 @@ def tones(frequencies, accelerations, phases, duration: float) -> Tones:
     time = step * np.arange(int(np.ceil(duration / step)) + 2)
     value = sum(a / np.sinc(f * step)**2 * np.sin(2 * np.pi * f * time + phi)
                 for f, a, phi in zip(frequencies, accelerations, phases))
-    return Tones(time, value, 1 / frequencies[0], True, beat_of(frequencies), top)
+    return Tones(time, value, 1 / frequencies[0], beat=beat_of(frequencies), top=top)
 
 
 def beat_of(frequencies) -> float:

@@ -93,7 +93,7 @@ def test_exact_a_table_of_one_level_is_the_spectrum_of_that_level(tmp_path):
 
 
 @pytest.mark.parametrize("given, said", [
-    ({"kind": "force"}, r"drive\.kind: a random drive can only shake the base"), ({"to": "20 Hz"}, "is not above"),
+    ({"kind": "force"}, r"drive\.kind: waveform .random. can only shake the base"), ({"to": "20 Hz"}, "is not above"),
     ({"file": "x.csv"}, "exclude each other"), ({"spectrum": None}, "or drive.file, a table"),
     ({"from": None}, r"drive\.from.*needs a lowest frequency"), ({"duration": None}, r"drive\.cycles|drive\.duration"),
     ({"spectrum": "0.01 g"}, "acceleration spectrum"), ({"seed": -1}, "seed"), ({"spectrum": "0 g^2/Hz"}, "spectrum"),

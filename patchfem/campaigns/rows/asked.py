@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ...core import BaseSine, PatchfemError
+from ...effects import waveform_of
 from ...model.model import Model, build
 from ...runs import joint
 from ...scene.changed import Base
@@ -52,7 +53,7 @@ class Asked:
             raise PatchfemError(f"{where}to fit a file whose rows give frequency and input, the scene must be a rig, "
                                 f"but this is a {scene.kind} scene; to fit a loop with a column of displacement, use a "
                                 "scene with [slide]")
-        if drive.kind != "base" or drive.waveform != "sine":
+        if drive.kind != "base" or not waveform_of(drive).is_sine:
             raise PatchfemError(f"{where}each row was measured under a sine of the base; set drive.kind = 'base' and "
                                 "drive.waveform = 'sine'")
         if drive.displacement is not None:

@@ -74,8 +74,7 @@ def _left_out(model: Model) -> str:
     out += ["the initial motion"] * (rig.start is not None)
     unit = "" if isinstance(rig.drive, BaseSine) or rig.kind == "free" else \
         (f"; Fex1 is the excitation for an amplitude of {'1 N' if rig.kind == 'force' else '1 m/s^2'}, not for "
-         f"waveform = "
-         f"'{rig.waveform}'")
+         f"waveform = '{rig.waveform.name}'")
     return unit + ("; not in the file: " + ", ".join(out) if out else "")
 
 

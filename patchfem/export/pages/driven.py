@@ -5,6 +5,7 @@ from pathlib import Path
 from textwrap import shorten
 
 from ...core import G_N
+from ...effects import SINE, WAVEFORMS
 from ...scales import LADDERS, axis_unit
 
 PLAIN = {"m/s^2": ("g", 1 / G_N), "m/s": ("mm/s", 1e3), "Hz": ("Hz", 1.0), "m^2/s^3": ("g^2/Hz", G_N**-2)}
@@ -28,33 +29,50 @@ def driven(resolved: dict) -> str:
 
 
 def _drive(keys: dict) -> str:
+    """Describe the drive by the phrase of its waveform."""
     if keys["kind"] == "free":
         start = f" released {size(keys['displacement'])} from rest" if "displacement" in keys else ""
         return f"free motion{start}"
-    force = keys["kind"] == "force"
-    what = next((name for name in ("displacement", "acceleration", "force") if name in keys), keys["kind"])
-    what = f"{'' if force else 'base '}{'force' if force else what if what != 'base' else 'acceleration'}"
-    where = f" on mass {keys['mass']}" if force and "mass" in keys else ""
-    waveform = keys.get("waveform", "sine")
-    if waveform == "file":
-        return f"recorded {what} of {Path(keys['file']).name}{where}"
-    if waveform == "levels":
-        levels = keys["levels"]
-        told = f"{len(levels)} levels of {what} from {size(levels[0])} to {size(levels[-1])}"
-        return f"{told} at {size(keys['frequency'])}{where}"
-    if waveform == "tones":
-        return f"base acceleration of {' and '.join(map(size, keys['accelerations']))} at " + \
-            " and ".join(map(size, keys["frequencies"]))
-    if waveform == "random":
-        told = f"with the spectrum of {Path(keys['file']).name}" if "file" in keys else f"of {size(keys['spectrum'])}"
-        ends = "".join(f" {name} {size(keys[name])}" for name in ("from", "to") if name in keys)
-        return f"random {what} {told}{ends}, record {keys.get('seed', 0)}"
-    level = size(next(keys[name] for name in ("displacement", "acceleration", "force") if name in keys))
-    if waveform == "step":
-        return f"a step of {level} in {what}{where}"
-    if waveform == "sweep":
-        return f"{what} of {level} swept from {size(keys['from'])} to {size(keys['to'])}{where}"
-    return f"{what} of {level} at {size(keys['frequency'])}{where}"
+    waveform = WAVEFORMS[keys.get("waveform", SINE.name)]
+    values = _drive_values(keys)
+    try:
+        return waveform.phrase.format_map(values) or _in_general(waveform.name, values)
+    except KeyError:  # the scene leaves out a key that the phrase names
+        return _in_general(waveform.name, values)
+
+
+def _drive_values(keys: dict) -> dict:
+    """Return the fields of the phrase of a waveform, as text by name (see `effects.Waveform`)."""
+    values = {key: _text_of(key, value) for key, value in keys.items()}
+    values["seed"] = keys.get("seed", 0)
+    sized = next((name for name in ("displacement", "acceleration", "force") if name in keys), None)
+    if sized is not None:
+        values["level"] = values[sized]
+    is_force = keys["kind"] == "force"
+    values["what"] = "force" if is_force else f"base {sized or 'acceleration'}"
+    values["place"] = f" on mass {keys['mass']}" if is_force and "mass" in keys else ""
+    if "levels" in keys:
+        values |= {"count": len(keys["levels"]), "first": size(keys["levels"][0]), "last": size(keys["levels"][-1])}
+    if "file" in keys or "spectrum" in keys:
+        density = f"with the spectrum of {values['file']}" if "file" in keys else f"of {values['spectrum']}"
+        values["density"] = density + "".join(f" {end} {values[end]}" for end in ("from", "to") if end in keys)
+    return values
+
+
+def _text_of(key: str, value) -> str:
+    """Return the value of a key of [drive] as people read it."""
+    if key == "file":
+        return Path(value).name
+    if isinstance(value, (list, tuple)):
+        return " and ".join(size(part) for part in value)
+    return size(value) if isinstance(value, str) and value[:1] in "+-.0123456789" else str(value)
+
+
+def _in_general(name: str, values: dict) -> str:
+    """Describe a drive by its size and frequency, as far as the scene has them, and the name of its waveform."""
+    level = f" of {values['level']}" if "level" in values else ""
+    frequency = f" at {values['frequency']}" if "frequency" in values else ""
+    return f"{values['what']}{level}{frequency}{values['place']} (waveform '{name}')"
 
 
 def _slide(keys: dict) -> str:

@@ -89,7 +89,7 @@ def group(model: Model) -> Hashable:
 def no_lanes(model: Model) -> str:
     """Why a model that is not refused does not march in lanes; "" where it may."""
     rig, law = model.rig, model.bonds
-    if rig.waveform != "sine" or rig.kind != "base" or rig.levels or rig.start is not None or rig.bends or rig.names:
+    if not rig.waveform.is_sine or rig.kind != "base" or rig.levels or rig.start is not None or rig.bends or rig.names:
         return "the case is not a rig that starts at rest and is driven by a base motion of one sine"
     if rig.modes.gauge is not None or rig.richer is not None or np.isfinite(rig.travel):
         return "the case has a gauge, a reduced structure or a stop"

@@ -81,7 +81,8 @@ def _kind(batch: Batch, model: Model) -> str:
     rig = model.rig
     if rig is None:
         return batch.name
-    return " ".join([batch.name, rig.waveform, *(one.numbers.law for one in rig.interfaces), str(bool(model.soft))])
+    laws = [one.numbers.law for one in rig.interfaces]
+    return " ".join([batch.name, rig.waveform.name, *laws, str(bool(model.soft))])
 
 
 def batch_of(model: Model, study: int = 1) -> Batch | None:

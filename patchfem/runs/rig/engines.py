@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...dynamics.events.elements import JOINED
-from ...effects import has
+from ...effects import NO_WAVEFORM, has
 from ...model.model import Model
 from ...response.coarser import Coarser, coarser_space
 from ...response.errors import cells_error, change, modes_error, pieces_error, step_error, tolerance_error
@@ -120,7 +120,7 @@ def _met(model: Model, steady: bool = False) -> methods.Motion:
     spring = "[structure.stiffening]" if rig.cubic is not None else \
         "structure.bonded.wavelength" if rig.interlock is not None else \
         f"[{model.grooves.key}]" if model.grooves is not None else ""
-    waveform = "" if steady or rig.kind == "free" else rig.waveform
+    waveform = NO_WAVEFORM if steady else rig.waveform
     return methods.Motion([one.numbers for one in rig.interfaces], [model.soft or one.soft for one in rig.interfaces],
                           "under a load that changes" if rig.load_varies else "", rig.strips_slide_apart, spring,
                           waveform, plane=rig.modes.lateral_faces is not None)

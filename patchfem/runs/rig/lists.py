@@ -50,7 +50,7 @@ def quadrature_of(model: Model, numerics: Numerics):
 def _summed_by(model: Model, numerics: Numerics, stretch: float, engine: str):
     """The Choice of `quadrature_of` by an engine, or "auto", for a block that bonds let move by `stretch` lengths."""
     law, accuracy = model.bonds, model.accuracy
-    once = model.rig.kind == "free" or model.rig.waveform == "step"
+    once = model.rig.kind == "free" or model.rig.waveform.is_step
     left = HELD if chatters(model) else DECAYED if once else 1.0
     stroke = max(4 * left * min(model.speed / omega_of(model.rig.drive) / law.length, stretch), 1e-9)
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)

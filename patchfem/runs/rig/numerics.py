@@ -7,7 +7,7 @@ import numpy as np
 
 from ...effects import has
 from ...model.model import Model
-from ...structure.drive_sizes import sinusoidal, slowest
+from ...structure.drive_sizes import repeat_cycles, sinusoidal, slowest
 from .costs import pairs_of, steps_per_cycle
 from .engines import engine_of
 
@@ -57,11 +57,12 @@ def choose(model: Model, per_point: bool = False) -> Numerics:
     accuracy, rig = model.accuracy, model.rig
     engine = engine_of(model, per_point)
     window = int(max(1, min(10, (rig.cycles + WHOLE) // 10)))
-    if rig.waveform == "random":  # all of the record but what the start leaves
+    if rig.waveform.is_random:  # all of the record but what the start leaves
         rate = slowest(rig.modes) * rig.drive.period
         window = int(max(1, rig.cycles - min(rig.cycles / 4, SETTLED / rate if rate else np.inf) + WHOLE))
-    if rig.waveform == "tones" and rig.drive.beat <= rig.cycles:  # whole beats
-        window = int(rig.drive.beat * max(1, min(10, rig.cycles // (10 * rig.drive.beat))) + WHOLE)
+    beat = repeat_cycles(rig.drive) or 0.0
+    if 1 < beat <= rig.cycles:  # whole beats
+        window = int(beat * max(1, min(10, rig.cycles // (10 * beat))) + WHOLE)
     if rig.levels:
         window = min(window, int(rig.level_cycles + WHOLE))
     steps = steps_per_cycle(model)

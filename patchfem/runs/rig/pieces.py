@@ -20,7 +20,7 @@ from ...response.measures import REST, harmonic
 from ...response.ringing import held_modes, held_ring, strongest
 from ...response.rows import stuck_share
 from ...response.spectrum import distorted
-from ...structure.drive_sizes import largest, omega_of, sinusoidal, slowest, whole
+from ...structure.drive_sizes import is_periodic, largest, omega_of, sinusoidal, slowest, whole
 from ..bench import averaged
 from . import interface, strips
 from .levels import by_levels, without_part_of_cycle
@@ -120,7 +120,7 @@ class Pieces(Reader):
         springs = [one.stiffness for one in self.groups]
         held = self.rubs and not self.rigid and all(one.size == 1 for one in springs) and \
             not any(one.slip for one in run.loops) and (not run.log.time.size or run.log.time[-1] < motion.time[0])
-        if not held or sinusoidal(drive) or not drive.segments or motion.time.size < 2:
+        if not held or is_periodic(drive) or not drive.segments or motion.time.size < 2:
             return []
         return held_modes(self.model.rig.modes, np.concatenate(springs), motion)
 

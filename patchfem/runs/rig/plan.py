@@ -157,7 +157,7 @@ def run_away(model: Model) -> dict:
     """{`drive`: acceleration of the base, `knee`: that above which friction alone does not limit the amplitude} [m s-2]
     of one mode that a sine drives at its resonance; {} of another rig."""
     rig = model.rig
-    if rig is None or rig.waveform != "sine" or rig.force or rig.modes.omega.size != 1 or not rig.by_modes \
+    if rig is None or not rig.waveform.is_sine or rig.force or rig.modes.omega.size != 1 or not rig.by_modes \
             or abs(rig.own_frequency * rig.drive.period - 1) > RESONANT:
         return {}
     knee = groups(model).get("knee")
@@ -251,7 +251,7 @@ def steady_cost(model: Model, numerics, unknowns: dict) -> tuple:
     """Points of a curve of steady motions and the seconds that they take, those of coarser runs and of one with more
     modes of a reduced structure among them."""
     rig, by = model.rig, steady_by(model).name
-    points = CURVE[by == "balance"] if rig.waveform == "sweep" else max(1, len(rig.levels))
+    points = CURVE[by == "balance"] if rig.waveform.is_swept else max(1, len(rig.levels))
     soft = [one for one in rig.interfaces if one.soft or model.soft] if by == "yields" else ()
     passes = 1.0 + 0.5 * len(soft)  # a coarser mesh of each has half the elements
     seconds = points * passes * _steady_point(model, by)

@@ -14,7 +14,7 @@ from ...response.errors import unseen, with_errors
 from ...response.outcome import settle, without_bars
 from ...response.rows import judged
 from ...response.settling import slip_period
-from ...structure.drive_sizes import decay_rate, sinusoidal
+from ...structure.drive_sizes import decay_rate, is_periodic
 from ..patch import faces
 from ..results.result import FRAMES, Result, on_a_mesh_of_known_error, without_errors
 from ..results.travel import outcome_on_piece
@@ -179,7 +179,7 @@ def _extra(run: Coupled, notes: list) -> dict:
         out["elements" if hasattr(reduced, "yield_slide") else "shear_modes"] = int(np.size(reduced.stiffness))
     if raw.summed is not None:
         out["quadrature"] = raw.summed.engine
-    if rig.waveform == "random":
+    if rig.waveform.is_random:
         out["spectra"] = stationary.spectra(raw.window, rig.drive)
         notes = [*notes, *stationary.short(run.measures, raw.window)]
     return out | {"still_rings": run.rings.remedies, "book": raw.book, "period": run.drive.period, "notes": notes}
@@ -309,10 +309,10 @@ def errors_met(measures, tolerance: float) -> bool:
 
 
 def _whole_period(model, numerics, found) -> int:
-    """Cycles of a window that holds a whole stick-slip period, where no sine sets the pace of a run (a belt); 0 where
-    the run has none that lasts, or none two windows long."""
+    """Cycles of a window that holds a whole stick-slip period, where no periodic drive sets the pace of a run (a
+    belt); 0 where the run has none that lasts, or none two windows long."""
     drive = model.rig.drive
-    if model.friction is None or not drive.segments or sinusoidal(drive):
+    if model.friction is None or not drive.segments or is_periodic(drive):
         return 0
     cycles = ceil(slip_period(found.response.time, found.response.slide_rate) / drive.period)
     return cycles if 2 * cycles <= numerics.cycles else 0

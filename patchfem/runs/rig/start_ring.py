@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from ...core import Measure, Outcome
 from ...response.rows import of_first
-from ...structure.drive_sizes import sinusoidal, whole
+from ...structure.drive_sizes import is_periodic, whole
 
 LEAST_DAMPING = 1e-6  # of a ring, below which no number of cycles is named
 OF_WORK = ("loop_area", "equivalent_damping")
@@ -29,12 +29,12 @@ def start_ring(outcome, measures: dict, window, drive, cycles: float, tolerance:
     """StartRing of a run: the change of the stored energy per cycle belongs to the error of the work per cycle.
 
     outcome; measures: by name; window: Response of the last cycles; drive; cycles: of the run. Only an interface that
-    holds under a sine has it: where it slips the work is mostly loss.
+    holds under a periodic drive has it: where it slips the work is mostly loss.
     """
     ledger, loop = window.extra.get("ledger"), measures.get("loop_area")
     span = window.time[-1] - window.time[0]
     if outcome is not Outcome.STUCK or ledger is None or loop is None or not loop.value or loop.error is None \
-            or not sinusoidal(drive) or not whole(span, drive):
+            or not is_periodic(drive) or not whole(span, drive):
         return StartRing(measures, {}, [])
     change = abs(float(ledger[1][-1] - ledger[1][0])) * drive.period / span
     wide = {name: _wider(one, change / abs(work)) for name, one in measures.items() if of_first(name) in OF_WORK

@@ -6,7 +6,7 @@ what was written. A rule says every mistake it finds and stays silent about valu
 
 from __future__ import annotations
 
-from ...effects import has
+from ...effects import has, waveform_of
 from ..keys.tables import Friction
 from .accuracy import _knobs, _quadrature
 from .contact import check_contacts
@@ -47,7 +47,7 @@ def _measured(draft: Draft) -> None:
     if low and not cut:
         draft.lacks("measured.reading_cutoff", "reading 'lowpass' needs this key, such as '600 Hz'")
     drive = draft.tables.drive
-    if draft.tables.measured.reading != "peak" and (drive is None or drive.kind == "free" or drive.waveform != "sine"):
+    if draft.tables.measured.reading != "peak" and not waveform_of(drive).is_sine:
         draft.remark("measured.reading has a meaning only under a sine drive and is not used")
     if cut and not low:
         draft.remark(f"measured.reading_cutoff has no meaning for reading '{draft.tables.measured.reading}' and is not "

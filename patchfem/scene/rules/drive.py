@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
-from ...effects import WAVEFORMS, waves
+from ...effects import NO_WAVEFORM, WAVEFORMS, Waveform, waveform_of
 from .draft import Draft
 from .structure import drives_mass
 
@@ -17,8 +17,9 @@ def check_drive(draft: Draft) -> None:
     drive = draft.tables.drive
     if drive is None:
         return
-    if drive.kind in ("base", "force") and drive.waveform in WAVEFORMS:
-        for key in WAVEFORMS[drive.waveform].keys[0].split():
+    waveform = waveform_of(drive) if drive.kind in ("base", "force") else NO_WAVEFORM
+    if waveform.name:
+        for key in waveform.required_keys:
             if not draft.given(f"drive.{key}"):
                 draft.lacks(f"drive.{key}", f"waveform '{drive.waveform}' needs this key")
         for key in sorted(waveform_unused(drive)):
@@ -27,16 +28,19 @@ def check_drive(draft: Draft) -> None:
     cycles, duration = draft.given("drive.cycles"), draft.given("drive.duration")
     if cycles and duration:
         draft.say("drive.duration", "`cycles` and `duration` exclude each other: keep one")
-    if not cycles and not duration and (drive.kind == "free" or waves(drive.waveform, "endless")):
+    if not cycles and not duration and (drive.kind == "free" or waveform_of(drive).needs_length):
         draft.lacks("drive.cycles", "or drive.duration instead")
     _size(draft, drive)
-    if drive.kind in ("base", "force") and drive.waveform == "sweep":
+    if drive.kind == "force" and waveform.is_for_base_only:
+        draft.say("drive.kind", f"waveform '{waveform.name}' can only shake the base; set drive.kind = 'base', or give "
+                                "a record of the force with drive.waveform = 'file'")
+    if waveform.is_swept:
         _sweep(draft, drive)
-    if drive.kind in ("base", "force") and drive.waveform == "levels":
+    if waveform.has_levels:
         _onset(draft, drive)
-    if drive.kind in ("base", "force") and drive.waveform == "tones":
-        _tones(draft, drive)
-    if drive.kind in ("base", "force") and drive.waveform == "random":
+    if waveform.takes("frequencies"):
+        _tones(draft, drive, waveform)
+    if waveform.is_random:
         _random(draft, drive)
 
 
@@ -59,24 +63,18 @@ def _sweep(draft: Draft, drive: Any) -> None:
                               "frequency")
 
 
-def _tones(draft: Draft, drive: Any) -> None:
-    if drive.kind == "force":
-        draft.say("drive.kind", "tones can only shake the base; set drive.kind = 'base', or give a record of the "
-                                "force with drive.waveform = 'file'")
+def _tones(draft: Draft, drive: Any, waveform: Waveform) -> None:
     for key in ("accelerations", "phases"):
-        given = getattr(drive, key)
+        given = getattr(drive, key) if waveform.takes(key) else None
         if given is not None and drive.frequencies is not None and len(given) != len(drive.frequencies):
             draft.say(f"drive.{key}", f"{len(given)} values for {len(drive.frequencies)} frequencies; give one value "
                                       "for each frequency")
-    if drive.accelerations is not None and not any(drive.accelerations):
+    if waveform.takes("accelerations") and drive.accelerations is not None and not any(drive.accelerations):
         draft.say("drive.accelerations", "all accelerations are 0, so nothing moves")
 
 
 def _random(draft: Draft, drive: Any) -> None:
     level, table = draft.given("drive.spectrum"), draft.given("drive.file")
-    if drive.kind == "force":
-        draft.say("drive.kind", "a random drive can only shake the base; set drive.kind = 'base', or give a "
-                                "record of the force with drive.waveform = 'file'")
     if level and table:
         draft.say("drive.file", "`spectrum` and `file` exclude each other: keep one")
     elif not level and not table:
@@ -90,14 +88,16 @@ def _random(draft: Draft, drive: Any) -> None:
 
 
 def _size(draft: Draft, drive: Any) -> None:
-    sized = waves(drive.waveform, "acceleration")
     acceleration, displacement = draft.given("drive.acceleration"), draft.given("drive.displacement")
-    if drive.kind == "base" and sized:
-        if acceleration and displacement:
+    waveform = waveform_of(drive)
+    if drive.kind == "base" and waveform.takes("acceleration"):
+        either = waveform.takes("displacement")
+        if acceleration and displacement and either:
             draft.say("drive.displacement", "`acceleration` and `displacement` exclude each other: keep one")
-        if not acceleration and not displacement:
-            draft.lacks("drive.acceleration", "or drive.displacement instead")
-    if drive.kind == "force" and sized and not draft.given("drive.force"):
+        if not acceleration and not (displacement and either):
+            draft.lacks("drive.acceleration", "or drive.displacement instead" if either
+                        else f"waveform '{drive.waveform}' needs this key")
+    if drive.kind == "force" and waveform.takes("force") and not draft.given("drive.force"):
         draft.lacks("drive.force", "kind 'force' needs this key")
     begins = draft.given("structure.start")
     if drive.kind == "free" and not displacement and not begins:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from ...effects import WAVEFORMS, carries, has, named, refusal, unbuilt, waves
+from ...effects import Waveform, carries, has, named, refusal, unbuilt, waveform_of
 from ..keys.tables import Interface, Tables
 from .draft import Draft
 
@@ -14,15 +14,15 @@ KEY = "accuracy.method"
 class Motion(NamedTuple):
     """What a method meets: tables of the laws of all interfaces; give: what lets the patch of each slip part by part;
     varies: how the load changes; yaws: strips slide each by themselves; spring that bends, or grooves; waveform of the
-    drive, none of a release and of the sine of a curve; drive as its table; lower: the key that puts the pressure on
-    the lower piece; plane: whether an interface slides in one. Texts are empty where there is nothing."""
+    drive, NO_WAVEFORM of a release and of the sine of a curve; drive as its table; lower: the key that puts the
+    pressure on the lower piece; plane: whether an interface slides in one. Texts are empty where there is nothing."""
 
     laws: list
     give: list
     varies: str
     yaws: bool
     spring: str
-    waveform: str
+    waveform: Waveform
     drive: Any = None
     lower: str = ""
     plane: bool = False
@@ -45,13 +45,13 @@ BESIDE = {  # word -> what a Motion has of it, as words behind an engine; "" whe
     "no-law": lambda m: "" if m.laws else "for law 'none'",
     "load": lambda m: m.varies,
     "yaw": lambda m: "with strips that yaw" if m.yaws else "",
-    "yaw-levels": lambda m: "with strips that yaw and waveform 'levels'" if m.yaws and m.waveform == "levels" else "",
+    "yaw-levels": lambda m: "with strips that yaw and waveform 'levels'" if m.yaws and m.waveform.has_levels else "",
     "parts": lambda m: f"with {m.soft}" if m.laws and m.soft else "",
     "grooves": lambda m: f"with {m.spring}" if m.spring.endswith("grooves]") else "",
     "spring": lambda m: f"with {m.spring}" if m.spring and not m.spring.endswith("grooves]") else "",
     "plane": lambda m: "with structure.interface.lateral" if m.plane else "",
     "faces": lambda m: "with several interfaces" if len(m.laws) > 1 else "",
-    "levels": lambda m: "with waveform 'levels'" if m.waveform == "levels" else ""}
+    "levels": lambda m: "with waveform 'levels'" if m.waveform.has_levels else ""}
 TAKES = {  # engine -> what it takes; the records of `runs.rig.engines` refer to it by name
     "exact": Takes("exact", "no-law yaw faces levels"),
     "piecewise": Takes("pieces", "parts faces levels"),
@@ -118,7 +118,7 @@ def motion(tables: Tables, kind: str) -> Motion:
             for one in laws]
     return Motion(laws, give, beside_load(cause), apart,
                   bending(structure) or (climbed(tables) if rubs else ""),
-                  drive.waveform or "" if drive is not None and drive.kind != "free" else "", drive,
+                  waveform_of(drive), drive,
                   lower[0] if rubs and lower else "",
                   any(getattr(one, "lateral", None) is not None for one in laws))
 
@@ -183,11 +183,11 @@ def _exact(m: Motion, method: str) -> str:
 def _harmonic(m: Motion, method: str) -> str:
     """A steady motion needs a drive that repeats, and one way to find it for every force in the scene."""
     drive = m.drive
-    once = drive is not None and drive.waveform in WAVEFORMS and not waves(drive.waveform, "steady")
+    once = m.waveform.name and not m.waveform.has_steady_motion
     if drive is not None and (drive.kind == "free" or once):
         return ("'harmonic' finds only steady motion: under a sine, over the frequencies of a sweep, or over the "
                 "levels of waveform 'levels'; use 'march' or leave `method` out")
-    if drive is not None and drive.kind == "base" and drive.waveform == "sweep" and drive.displacement is not None:
+    if drive is not None and drive.kind == "base" and m.waveform.is_swept and drive.displacement is not None:
         return ("'harmonic' needs a constant acceleration over a sweep; give drive.acceleration in place of "
                 "drive.displacement")
     if why := lacking(method, m):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import pi, sqrt
 from typing import Any
 
-from ...effects import unbuilt
+from ...effects import unbuilt, waveform_of
 from ..keys.types import choices
 from .draft import Draft
 
@@ -129,8 +129,9 @@ def _instruments(draft: Draft, modes: tuple) -> None:
     beside = next((key for key in ("structure.travel", "structure.stiffening") if draft.given(key)), "")
     if drive is not None and not beside:
         steady = draft.tables.accuracy is not None and draft.tables.accuracy.method == "harmonic"
+        waveform = waveform_of(drive)
         beside = "drive.kind = 'free'" if drive.kind == "free" else \
-            f"drive.waveform = '{drive.waveform}'" if drive.waveform in ("sweep", "levels") and not steady else ""
+            f"drive.waveform = '{drive.waveform}'" if (waveform.is_swept or waveform.has_levels) and not steady else ""
     if beside:
         draft.say(written[0], unbuilt(f"with {beside}", "give `accelerometer` and `gauge` the value of `output`"))
 

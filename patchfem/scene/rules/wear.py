@@ -3,7 +3,7 @@
 from itertools import pairwise
 from math import pi
 
-from ...effects import has, takes, unbuilt, using
+from ...effects import has, takes, unbuilt, using, waveform_of
 from ..keys.tables import WornFriction
 from .draft import Draft
 from .grooves import grooves_of
@@ -115,7 +115,8 @@ def _beside(draft: Draft, tables, kind: str):
         yield "[[structure.interface]]", LATER.format("describe a single interface by [friction] and [normal]")
     if structure is not None and any(mode.normal or mode.pitch for mode in structure.mode or ()):
         yield "modes with `normal` or `pitch`", LATER.format("these keys")
-    if kind == "rig" and drive is not None and (drive.kind == "free" or drive.waveform not in (None, "sine")):
+    waveform = waveform_of(drive)
+    if kind == "rig" and drive is not None and (drive.kind == "free" or (waveform.name and not waveform.is_sine)):
         yield "drive.kind = 'free'" if drive.kind == "free" else f"drive.waveform = '{drive.waveform}'", \
             "wear is computed from the last cycle of a steady motion: use " + \
             ("kind 'base' or 'force'" if drive.kind == "free" else "waveform 'sine'")

@@ -11,6 +11,7 @@ from ....dynamics.harmonic import orbits
 from ....dynamics.harmonic.laws import synthesis
 from ....dynamics.march import march as engine
 from ....dynamics.periodic import is_stable
+from ....effects import SINE
 from ....response.measures import peaks_between
 from ..interface import contact_of
 from ..march import MarchReader
@@ -36,7 +37,7 @@ def left_grooves(model, numerics, patch, drive, contact, start=None) -> Solution
     if not model.grooves.lifted_mass:
         return None
     begin, found = perf_counter(), []
-    rig = replace(model.rig, drive=drive, levels=(), waveform="sine")
+    rig = replace(model.rig, drive=drive, levels=(), waveform=SINE)
     for steps in (STEPS, STEPS // 2):
         done = engine.march(rig.modes, drive, contact, LEAD, steps, 1, rig.travel, start=start, whole=False)
         if done.outcome is not Outcome.LEAVES_GROOVES:
