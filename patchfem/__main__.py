@@ -9,6 +9,7 @@ if __name__ == "__main__" and not sys.flags.safe_path:
 import gc
 import importlib
 import os
+import re
 import signal
 from types import ModuleType
 
@@ -59,6 +60,7 @@ import threading
 from difflib import get_close_matches
 from errno import ENAMETOOLONG
 from pathlib import Path
+from traceback import walk_tb
 from typing import Annotated, Literal
 
 from cyclopts import App, CycloptsError, Parameter
@@ -233,11 +235,28 @@ def _guarded(words: list, before=lambda: None) -> int:
         if isinstance(code, int) and type(error).__module__.startswith("patchfem"):
             say(plain(str(error)))
             return code
-        say(plain(f"patchfem: internal fault, please report it: {type(error).__name__}: {error} (send the command, the "
-                  "scene with its files and what `patchfem doctor` says to the project's issue tracker)"))
+        said = " ".join(f"{type(error).__name__}: {error}".split())
+        say(plain(f"patchfem: internal fault{_place_of_fault(error)}: {said}"))
+        say("patchfem: please report it: send these lines, the command, the scene with its files and what `patchfem "
+            "doctor` says to the project's issue tracker; PATCHFEM_DEBUG=1 before the command shows the traceback")
         if os.environ.get("PATCHFEM_DEBUG"):
             raise
         return 1
+
+
+def _place_of_fault(error: Exception) -> str:
+    """Return " in FILE:LINE (FUNCTION)" of the innermost frame of this package; "" if there is none.
+
+    An error of another process carries the frames of that process as the text of its cause.
+    """
+    root, place = Path(__file__).resolve().parent, ""
+    frames = [(frame.f_code.co_filename, line, frame.f_code.co_name) for frame, line in walk_tb(error.__traceback__)]
+    frames += re.findall(r'File "(.+)", line (\d+), in (\S+)', str(error.__cause__ or ""))
+    for file, line, function in frames:
+        path = Path(file).resolve()
+        if root in path.parents:
+            place = f" in {root.name}/{path.relative_to(root).as_posix()}:{line} ({function})"
+    return place
 
 
 def _interrupted() -> str:

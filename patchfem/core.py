@@ -280,6 +280,7 @@ class Row(NamedTuple):
     them from the values of the same interface by name; the tolerance times it is a floor as well. halves: what it may
     be off by where it is read off the samples of a motion that is exact: times its change by every second of them, and
     of a sample's share of the cycle. A reading of first order is off by its change, one of second order by a third.
+    needs_run: it is read off the histories of the whole run, which the runs behind its error then keep too.
     """
 
     name: str
@@ -291,6 +292,7 @@ class Row(NamedTuple):
     group: str = "motion"
     term: tuple[str, Callable] | None = None
     halves: tuple[float, float] = (1.5, 0.0)
+    needs_run: bool = False
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -1,11 +1,15 @@
 """A command as a process of its own: how it ends, and how many threads it brings."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
+
+import patchfem
 
 LEAVING = """\
 import atexit, sys, threading, time
@@ -54,6 +58,27 @@ from patchfem.__main__ import main
 leave = os._exit
 os._exit = lambda code: leave(40 + code)
 main()
+"""
+FAULTY = """\
+from patchfem.__main__ import main
+from patchfem.structure import drive_sizes
+
+drive_sizes.own_period = lambda modes: {}["a key"]
+main()
+"""
+RIG = """\
+[structure]
+moving_mass = "1 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "140 Hz"
+damping = 0.05
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "143 Hz"
+acceleration = "1 g"
+cycles = 20
 """
 WRONG = '[drive]\nkind = "bass"\n'
 THREADS = "import os, patchfem.__main__, numpy; numpy.ones((9, 9)) @ numpy.ones((9, 9)); print(len(os.listdir('{}')))"
@@ -129,3 +154,15 @@ def test_exact_a_pipe_that_nobody_reads_ends_a_command_quietly(words):
     finally:
         os.close(writes)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_always_an_internal_fault_names_file_and_line(tmp_path):
+    """Two lines without a traceback: the innermost line of the package, which is that of the call, and what to send."""
+    (tmp_path / "rig.toml").write_text(RIG, "utf-8")
+    done = subprocess.run([sys.executable, "-c", FAULTY, "plan", "rig.toml"], cwd=tmp_path, capture_output=True,
+                          text=True)
+    first, second = done.stderr.splitlines()
+    found = re.fullmatch(r"patchfem: internal fault in patchfem/(\S+):(\d+) \(\w+\): KeyError: 'a key'", first)
+    assert done.returncode == 1 and found and "patchfem doctor" in second, done.stderr
+    line = (Path(patchfem.__file__).parent / found[1]).read_text("utf-8").splitlines()[int(found[2]) - 1]
+    assert "own_period(" in line

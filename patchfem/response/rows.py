@@ -1,7 +1,7 @@
 """Measures of a motion as rows of one table, applied to the solution of every engine alike.
 
 A row has a name, a unit, the absolute floor of its error, a definition in one sentence, and the function that reads it
-off the last cycles of a run. A new measure is a new row.
+off the last cycles of a run, or off all of it. A new measure is a new row of SINGLE_RUN_ROWS.
 """
 
 from collections.abc import Callable
@@ -41,7 +41,9 @@ class Seen:
     window holds no whole cycle; ledger (4, k) [J] or None; known: name -> value that the engine has itself, None where
     it has none. by: how the force is read where the slide turns, as `loops.turns_of` takes it; still: half range of the
     slide [m] up to which it is round-off; even: equally spaced samples of the window, None where they are its own;
-    together: the interfaces are parts of one, which has no others beside it; number: of the interface, from 0.
+    together: the interfaces are parts of one, which has no others beside it; number: of the interface, from 0. run:
+    histories of the whole run from t = 0 on, thinned before the last cycles but with every reversal and stop; None
+    where they are not kept.
     """
 
     window: Response
@@ -60,6 +62,7 @@ class Seen:
     even: Response | None = None
     together: bool = False
     number: int = 0
+    run: Response | None = None
 
     @cached_property
     def span(self) -> float:
@@ -222,6 +225,9 @@ def _shaken(name: str, unit: str, floor: float, words: str, group: str = "motion
                 term=(name, lambda values: np.abs(values.get(name, 0.0)))))
 
 
+# Measures that only single runs compute. While there are any, a sweep runs each case of a rig by itself, because its
+# batches compute no others than the shipped measures.
+SINGLE_RUN_ROWS: tuple[Row, ...] = ()
 FOURTH = 0.2, 0.0  # of the change by half the samples: what is read off cubics between them is of fourth order
 ROWS = (
     Row("relative_displacement_amplitude", "m", 1e-10, "half the peak-to-peak displacement at the output, relative to "
@@ -348,7 +354,9 @@ ROWS = (
     Row("level_hysteresis", "m", 0.0,
         "hysteresis: largest difference between the amplitudes reached at the same level with rising and with falling "
         "levels"),
+    *SINGLE_RUN_ROWS,
 )
+NEEDS_RUN = tuple(row for row in ROWS if row.needs_run)
 TABLE = {row.name: row for row in ROWS}
 OF_EACH = ("slip_amplitude", "stick_fraction", "friction_force_peak", "loop_area")  # of every interface
 MOVED = ("relative_displacement_amplitude", "relative_displacement_amplitude_steady", "slip_amplitude",
@@ -362,11 +370,19 @@ def measures_of(seen: Seen) -> dict:
 
     The engine's own value comes before the one that is read off the samples.
     """
-    out = {row.name: seen.known[row.name] if row.name in seen.known else row.of(seen) if row.of is not None else None
-           for row in ROWS}
+    out = {row.name: _value_of(row, seen) for row in ROWS}
     for number, other in enumerate(seen.others(), 1):
         out |= {of_number(name, number): TABLE[name].of(other) for name in OF_EACH}
     return {name: value for name, value in (out | seen.known).items() if value is not None}
+
+
+def _value_of(row: Row, seen: Seen) -> float | None:
+    """Return the value of a row; None where the run does not have it, or does not keep the histories that it needs."""
+    if row.name in seen.known:
+        return seen.known[row.name]
+    if row.of is None or (row.needs_run and seen.run is None):
+        return None
+    return row.of(seen)
 
 
 def stuck_share(stuck, span):

@@ -52,11 +52,22 @@ def _batch(name: str, kind: str, share: float = 0.0, compile: float = 0.0, least
 
     def parts(models: Sequence) -> dict:
         some_of = [models.first] if isinstance(models, Alike) else models
-        return module().parts(models) if any(getattr(one, "kind", "") == kind for one in some_of) else {}
+        if not any(getattr(one, "kind", "") == kind for one in some_of) or _of_single_runs(kind):
+            return {}
+        return module().parts(models)
+
+    def refuses(model: Model) -> str:
+        return _of_single_runs(kind) or asked(model) if model.kind == kind else f"it is a {model.kind}"
 
     asked = of("refuses")
-    return Batch(name, lambda model: asked(model) if model.kind == kind else f"it is a {model.kind}", of("group"),
-                 of("solve"), share, compile, least, parts if columns else None, together)
+    return Batch(name, refuses, of("group"), of("solve"), share, compile, least, parts if columns else None, together)
+
+
+@cache
+def _of_single_runs(kind: str) -> str:
+    """Return why no batch takes cases of a kind: it lacks a measure of single runs; "" if there is no such measure."""
+    rows = import_module("patchfem.response.rows").SINGLE_RUN_ROWS if kind == "rig" else ()
+    return f"the measure {rows[0].name} is computed only by single runs" if rows else ""
 
 
 # the first that does not refuse a model takes it

@@ -14,7 +14,7 @@ from ...response.levels import KEPT, Level
 from ...response.loops import at_turns
 from ...response.measures import slip_noise, window_amplitudes, window_ends
 from ...response.outcome import steady_of
-from ...response.rows import measures_of, row_of
+from ...response.rows import NEEDS_RUN, measures_of, row_of
 from .solution import Solution, decaying, last_cycles
 
 
@@ -42,7 +42,7 @@ class Reader:
         """Measures of the last cycles of a run, or of a mark of it; drive: where it is not the model's; ledger: as
         `Seen` has it."""
         drive = drive or self.model.rig.drive
-        given = {"own": self.integrated(run, drive)} | self.more(run, drive, stuck)
+        given = {"own": self.integrated(run, drive), "run": _from_the_start(run)} | self.more(run, drive, stuck)
         if self.rubs:
             given = {"by": at_turns(self.model), "ledger": ledger} | given
         window, book = given.pop("window", run.window), given.pop("book", run.ledger)
@@ -85,6 +85,15 @@ class Reader:
         return {name: row_of(name).halves[0] * gap + row_of(name).halves[1] / self.steps
                 for name, gap in apart.items()} if own.loops or hasattr(drive, "band") else {}
 
+    def thinned(self, run, drive, values: dict) -> dict:
+        """Return what thinned histories leave open of the measures of the whole run, by every second of their samples.
+        """
+        rows = [row for row in NEEDS_RUN if row.name in values]
+        if not rows:
+            return {}
+        fewer = self.values(replace(run, response=_between_reversals(run.response)), drive)
+        return {row.name: row.halves[0] * abs(values[row.name] - fewer[row.name]) for row in rows}
+
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:
         """The Solution of a run; drive: where it is not the model's; more: other fields of it."""
         drive, window = drive or self.model.rig.drive, self.numerics.window
@@ -96,7 +105,8 @@ class Reader:
         return Solution(values=values, response=run.response, window=run.window,
                         amplitudes=window_amplitudes(run.amplitudes, window),
                         outcome=run.outcome or (Outcome.STUCK if stuck else None), book=run.ledger, seconds=seconds,
-                        contact=self.contact, held=self.held, own=own | self.own(run, drive, values),
+                        contact=self.contact, held=self.held,
+                        own=own | self.own(run, drive, values) | self.thinned(run, drive, values),
                         extremes=run.amplitudes, **more)
 
     def level(self, size: float, run, drive=None, left: float = 0.0) -> Level:
@@ -105,6 +115,21 @@ class Reader:
         found = self.values(run, drive)
         kept = {name: found[name] for name in KEPT if name in found}
         return Level(size, self.sticks(run), kept, {name: left * abs(v) for name, v in kept.items()} if left else {})
+
+
+def _between_reversals(histories):
+    """Return histories without every second sample; the ends and the reversals of the slide stay."""
+    step = np.diff(histories.slide)
+    kept = np.arange(histories.time.size) % 2 == 0
+    kept[1:-1] |= step[1:] * step[:-1] <= 0
+    kept[-1] = True
+    return histories.at(kept)
+
+
+def _from_the_start(run):
+    """Return the histories of a run, or of a mark of it, if they begin at t = 0, and None else."""
+    histories = getattr(run, "response", None)
+    return histories if histories is not None and histories.time.size and histories.time[0] == 0 else None
 
 
 def every_second(window):

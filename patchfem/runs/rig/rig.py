@@ -12,7 +12,7 @@ from ...response import reasons, run_events, stationary
 from ...response.coarser import estimate, left_open
 from ...response.errors import unseen, with_errors
 from ...response.outcome import settle, without_bars
-from ...response.rows import judged
+from ...response.rows import NEEDS_RUN, judged
 from ...response.settling import slip_period
 from ...structure.drive_sizes import decay_rate, is_periodic
 from ..patch import faces
@@ -209,7 +209,8 @@ def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -
 
     def solve(variant):
         meant = replace(model, rig=model.rig.richer) if variant.numerics.richer else model
-        how = replace(variant.numerics, whole=model.rig.kind == "free")  # the curve of a decay is of the whole run
+        # the curve of a decay, and some measures, are of the whole run
+        how = replace(variant.numerics, whole=model.rig.kind == "free" or bool(NEEDS_RUN))
         near = _at_the_top(meant, found, lambda narrow: go(narrow, how, variant.patch))
         return near or go(meant, how, variant.patch)
 
