@@ -281,6 +281,7 @@ class Row(NamedTuple):
     be off by where it is read off the samples of a motion that is exact: times its change by every second of them, and
     of a sample's share of the cycle. A reading of first order is off by its change, one of second order by a third.
     needs_run: it is read off the histories of the whole run, which the runs behind its error then keep too.
+    minimum: the smallest value that it can have.
     """
 
     name: str
@@ -293,6 +294,7 @@ class Row(NamedTuple):
     term: tuple[str, Callable] | None = None
     halves: tuple[float, float] = (1.5, 0.0)
     needs_run: bool = False
+    minimum: float = -np.inf
 
 
 @dataclass(frozen=True, eq=False, slots=True)

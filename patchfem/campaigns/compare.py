@@ -8,6 +8,7 @@ import numpy as np
 from ..core import Measure, NotConverged, PatchfemError
 from ..model.model import Model
 from ..runs.plan import plan
+from ..runs.results.result import surface_of
 from ..runs.run import run
 
 SHOWN = {  # measure: (in words, what a scene needs for it)
@@ -78,7 +79,7 @@ def pressed(before: Model, after: Model, title: str, say: Callable | None = None
 def _side(model: Model, say) -> Side:
     result = run(plan(model), say)
     outcome = result.outcome
-    return Side(dict(result.measures), str(outcome), outcome.sentence, np.array(result.patch.x),
+    return Side(dict(result.measures), str(outcome), outcome.sentence, np.array(surface_of(result.patch, result.fields).x),
                 np.array(result.fields["normal_stress"][0]), [*result.warnings, *result.extra["notes"]])
 
 

@@ -6,7 +6,7 @@ from ..model import structure
 from ..response.events import MEANINGS
 from ..response.levels import KEPT
 from ..response.rows import TABLE
-from ..runs.results.result import Result
+from ..runs.results.result import Result, surface_of
 from . import netcdf
 from .summary import summary_of, versions
 
@@ -17,7 +17,8 @@ def contents(result: Result) -> netcdf.Contents:
     """What result.nc holds, in SI: histories, interface frames, levels, events, curve, provenance."""
     found, modal = histories(result)
     patch, extra = result.patch, result.extra
-    x, weight = (patch.x, patch.pieces.interface.weight) if patch is not None else (None, None)
+    surface = surface_of(patch, result.fields)
+    x, weight = (surface.x, surface.weight) if surface is not None else (None, None)
     fields = {k: v for k, v in result.fields.items() if not k.startswith("holder_")}
     strips = None if patch is None or patch.strips is None else (patch.strips.offsets, patch.strips.pressure)
     levels = _levels(extra["levels"]) if "levels" in extra else None
@@ -25,7 +26,7 @@ def contents(result: Result) -> netcdf.Contents:
     names = list(rig.names) if found and rig is not None else []
     data = netcdf.of_run(found, modal, fields, x, weight, strips, levels, names, _coordinate(rig))
     if patch is not None:
-        data = netcdf.with_surfaces(data, patch.gap)
+        data = netcdf.with_surfaces(data, surface.unloaded_gap)
     if "faces" in extra:
         data = netcdf.with_faces(data, extra["faces"])
     if "events" in extra:

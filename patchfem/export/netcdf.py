@@ -231,8 +231,8 @@ def with_faces(data: Contents, faces) -> Contents:
     the number behind a name is that of the interface from 1."""
     out, places = {}, {}
     for face in faces:
-        number, patch = face.number + 1, face.patch
-        one = of_run({}, None, face.fields, patch.x, patch.pieces.interface.weight)
+        number, surface = face.number + 1, face.surface
+        one = of_run({}, None, face.fields, surface.x, surface.weight)
         frame = "frame" if face.fields["time"].size > 1 else "frame_at_rest"
         over = {"x": f"x_{number}", "frame": frame}
         for part, found, ending in ((one.variables, out, f"_{number}"), (one.coordinates, places, "")):

@@ -8,7 +8,7 @@ import numpy as np
 from ..core import BaseSine, PatchfemError
 from ..inputs import loops, measured
 from ..response import spectrum
-from ..runs.results.result import Result
+from ..runs.results.result import Result, surface_of
 from ..structure.drive_sizes import largest
 from .drawing import pictures
 from .histories import largest_multiplier
@@ -30,12 +30,12 @@ def report_data(result: Result) -> dict:
             "sentence": verdict(summary), "released": released(result),
             "cycles": cycles_of(result), "engine": result.extra.get("engine", ""),
             "fields": result.fields,
-            "x": None if result.patch is None else result.patch.x,
+            "x": None if result.patch is None else surface_of(result.patch, result.fields).x,
             "width": None if result.patch is None else result.plan.model.patch.width, "versions": versions(),
             "means": {name: one.text for name, one in result.measures.items()}}
     data |= {name: result.extra[name] for name in ("curve", "decay", "spectra") if name in result.extra}
     if "faces" in result.extra:
-        data["faces"] = [(one.patch.x, one.fields, f"interface {one.name}") for one in result.extra["faces"]]
+        data["faces"] = [(one.surface.x, one.fields, f"interface {one.name}") for one in result.extra["faces"]]
     if "wear" in result.extra:
         count, period = result.extra["wear_shown"]["states"], result.extra["wear_shown"]["period"]
         data["wear"] = {"history": result.extra["wear"], "period": period,

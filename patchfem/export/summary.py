@@ -136,7 +136,9 @@ def contact_of(result: Result) -> dict:
     patch = result.patch
     if patch is None or patch.strips is not None or not patch.active.any():
         return {}
-    found = values.stretches_of(patch, values.contact_ends(patch))
+    found = patch.stretches
+    if found is None:
+        found = values.stretches_of(patch, values.contact_ends(patch))
     return {"contact": {"from": float(patch.x[0]), "to": float(patch.x[-1]), "stretches": found.tolist()}}
 
 

@@ -16,10 +16,11 @@ from ..dynamics import resume
 from ..model.model import Model
 from ..model.source import placed
 from . import joint, memory
-from .patch import faces
+from .patch import faces, strength
 from .patch import result as patch_result
 from .plan import Plan, plan, refuse_size
 from .remedies import Finding, beyond_tolerance
+from .results.patch_rows import unknown_measures
 from .results.result import Result, with_meanings, without_folders
 from .rig import engines
 from .wear import evolve, measures
@@ -128,8 +129,21 @@ def _whole(result: Result, notes: list, begin: float, coarse=(), climbed=()) -> 
     wide = beyond_tolerance(Finding(model, result.measures, result.patch, result.extra, climbed), coarse)
     warned, noted = result.warnings + wide, [*notes, *result.extra.get("notes", [])]
     warned, noted = (without_folders(texts, model.source.path) for texts in (warned, noted))
-    return replace(result, measures=with_meanings(result.measures, apart), warnings=warned,
-                   extra=result.extra | {"notes": noted})
+    faces = _yielding_faces(result)
+    noted += faces.values()
+    outcome = result.outcome
+    if outcome is Outcome.DONE and unknown_measures(result.measures):
+        outcome = Outcome.NOT_CONVERGED
+    return replace(result, outcome=outcome, measures=with_meanings(result.measures, apart), warnings=warned,
+                   extra=result.extra | {"notes": noted, "yielding_faces": faces})
+
+
+def _yielding_faces(result: Result) -> dict:
+    """Notes by Strength on faces that yield under the smallest pressure peak within its error."""
+    peak, asked = result.measures.get("pressure_peak"), result.plan.model.patch
+    if asked is None or result.patch is None or peak is None or peak.value is None:
+        return {}
+    return strength.yielding_faces(asked, peak.value - (peak.error or 0.0))
 
 
 def _keeping(kept: KeptState | None, what: Plan, patch):

@@ -110,8 +110,8 @@ def _kind(table: Table, name: str) -> str | None:
 
 def _value(value: Any, kind: str | None) -> str:
     if isinstance(value, Material):
-        pairs = ((name, getattr(value, name)) for name in Material.model_fields)
-        written = (f"{name} = {_value(one, kind_of(Material, name))}" for name, one in pairs if one is not None)
+        given = ((key, name, getattr(value, name)) for key, name in keys(Material).items())
+        written = (f"{key} = {_value(one, kind_of(Material, name))}" for key, name, one in given if one is not None)
         return "{" + ", ".join(written) + "}"
     if isinstance(value, tuple):
         return "[" + ", ".join(_value(one, kind) for one in value) + "]"

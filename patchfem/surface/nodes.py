@@ -7,7 +7,16 @@ import numpy as np
 from ..core import PatchfemError, frozen_array, say
 from .profile import Profile
 
-FITS = "the trace is as long as the patch"  # what is said of such a trace is a note, no warning
+FITS = "the trace is as long as the patch"
+CENTRED = "the trace is centred on the patch"
+ROUNDED = "is rounded to"
+NOTES = (FITS, CENTRED, ROUNDED)  # a sentence with these words says how a trace was read and doubts no number
+ROUND_OFF = 1e-3  # spacings of samples; a shorter length is round-off of the file's x and is not printed
+
+
+def is_note(text: str) -> bool:
+    """Whether a sentence on a trace is a note, not a warning."""
+    return any(words in text for words in NOTES)
 
 
 def placed(profile: Profile, x: np.ndarray, how: str = "auto") -> Profile:
@@ -31,9 +40,10 @@ def placed(profile: Profile, x: np.ndarray, how: str = "auto") -> Profile:
             notes += (f"{profile.source}: {FITS}, {say(np.ptp(x))}, and is centred on it, which adds {say(shift)} to "
                       "x",)
         elif how == "auto":
-            notes += (f"{profile.source}: the trace, from x = {say(there[0])} to {say(there[-1])} in the file, does "
-                      f"not cover the patch, from {say(x[0])} to {say(x[-1])}; the trace is centred on the patch, "
-                      f"which adds {say(shift)} to x",)
+            digit = 10.0 ** np.floor(np.log10(ROUND_OFF * np.median(np.diff(there))))
+            first, last, added = (say(digit * round(length / digit)) for length in (there[0], there[-1], shift))
+            notes += (f"{profile.source}: x runs from {first} to {last} in the file and does not cover the patch, from "
+                      f"{say(x[0])} to {say(x[-1])}; {CENTRED}, which adds {added} to x",)
     there = there + shift
     _demand(profile.source, there, x)
     first = max(int(np.searchsorted(there, x[0], "right")) - 1, 0)

@@ -89,12 +89,13 @@ def test_exact_the_corners_of_the_held_face_do_not_count(tmp_path, load, told):
 
 def test_exact_a_coating_of_the_same_metal_is_not_the_other_piece():
     """Both cells of the upper piece flow, alike: it was called two pieces, and alike places could not be compared."""
-    steel = SimpleNamespace(name="steel", young=MATERIALS["steel"].young, poisson=MATERIALS["steel"].poisson)
+    steel = SimpleNamespace(name="steel", young=MATERIALS["steel"].young, poisson=MATERIALS["steel"].poisson,
+                            yield_=None)
     piece = SimpleNamespace(substrate=steel, coating=SimpleNamespace(material=steel))
     points = np.array([[x, y] for x in (0.0, 1.0, 2.0) for y in (0.0, 1.0)])
     bodies = {side: {"points": points, "blocks": [np.array([[0, 2, 3, 1], [2, 4, 5, 3]])], "material": [False, True],
                      "mises": np.full((1, 2), stress)} for side, stress in (("lower", 100e6), ("upper", 300e6))}
-    (told,) = beyond_yield(SimpleNamespace(lower=piece, upper=piece), bodies)
+    (told,) = beyond_yield(SimpleNamespace(lower=piece, upper=piece), bodies).values()
     assert "300 MPa in the steel of the upper piece" in told and "other piece" not in told
 
 

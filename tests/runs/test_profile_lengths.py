@@ -67,7 +67,7 @@ def on_points(tmp_path, x, z, text, *settings):
     (tmp_path / "trace.csv").write_text(f"x [m],z [m]\n{rows}\n", "utf-8")
     asked = build(loads(text + '[contact.profile]\nfile = "trace.csv"\n', tmp_path / "scene.toml", sets=settings)).patch
     assert trace.takes_points(asked)
-    return trace.sharper_by_points(asked, lambda found: True)[0]
+    return trace.solve_on_points(asked, lambda found: True).measures
 
 
 def test_points_as_fine_as_a_file_hold_an_independent_program(tmp_path):

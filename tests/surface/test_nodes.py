@@ -114,7 +114,7 @@ def test_exact_centred_where_it_does_not_and_said():
     x = np.linspace(0, 15e-3, 5000)
     profile = placed(trace(x, x), EVEN)
     assert on_nodes(profile, EVEN) == pytest.approx(EVEN + 7.5e-3, abs=2e-15)
-    assert profile.notes == ("before.csv: the trace, from x = 0 um to 15 mm in the file, does not cover the patch, "
+    assert profile.notes == ("before.csv: x runs from 0 um to 15 mm in the file and does not cover the patch, "
                              "from -6.35 mm to 6.35 mm; the trace is centred on the patch, which adds -7.5 mm to x",)
 
 

@@ -3,6 +3,7 @@
 import numpy as np
 
 from ...core import PatchfemError
+from ...runs.results.patch_rows import minimum_of
 from ...scales import LADDERS, axis_unit, plain, short
 from ..missed import over
 from ..written import label
@@ -33,7 +34,9 @@ def draw(dataset, measure: str, onto=None):
     places = list(np.ndindex(*(dataset[one].size for one in others)))
     for k, place in enumerate(places):
         name = ", ".join(f"{label(one)} {_said(dataset[one], at)}" for one, at in zip(others, place))
-        _line(axis, along.values * across, (table["values"][k] * scale, table["errors"][k] * scale), hollow[k],
+        values, errors = table["values"][k], np.nan_to_num(table["errors"][k])
+        bars = scale * np.stack([np.fmin(errors, np.fmax(values - minimum_of(measure), 0.0)), errors])
+        _line(axis, along.values * across, (scale * values, bars), hollow[k],
               {"color": f"C{k % 10}", "label": name or None, "linestyle": "" if dim == "case" else "-"})
     shown = table["values"][np.isfinite(table["values"])]
     axis.set(xlabel=_named(key, along_unit), ylabel=_named(measure, unit))
@@ -45,9 +48,9 @@ def draw(dataset, measure: str, onto=None):
 
 
 def _line(axis, x, measured: tuple, hollow, style: dict) -> None:
-    """Values (n,) with their errors over x; the points for which `hollow` (n,) holds are not filled."""
+    """Values (n,) with their errors (2, n), below and above, over x; the points for which `hollow` (n,) holds are not filled."""
     values, errors = measured
-    axis.errorbar(x, values, np.nan_to_num(errors), marker="o", markerfacecolor="white", capsize=2, **style)
+    axis.errorbar(x, values, errors, marker="o", markerfacecolor="white", capsize=2, **style)
     axis.plot(x[~hollow], values[~hollow], "o", color=style["color"], zorder=3)
 
 

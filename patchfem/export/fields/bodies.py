@@ -19,6 +19,7 @@ from ...elasticity.recovery import (
     quadratures,
     recovery,
 )
+from ...runs.results.result import surface_of
 from .blocks import blocks_of
 from .strength import beyond_yield
 from .vtkhdf import write_series
@@ -46,17 +47,22 @@ def write_fields(result, path: Path) -> dict:
     motions = _motions(patch, loads)
     insides = [_inside(patch.pair.piece, patch.pair.grid)]
     insides += insides if patch.pair.upper is patch.pair.piece else [_inside(patch.pair.upper, patch.pair.upper_grid)]
-    low, high = (_body(patch, fields, *of) for of in zip(("lower", "upper"), insides, motions))
+    x = surface_of(patch, fields).x
+    low, high = (_body(patch, fields, x, *of) for of in zip(("lower", "upper"), insides, motions))
     for one, other in ((low, high), (high, low)):
         one["stress_error"] = one["error"].shares(other["error"])[0]
     notes = result.extra.setdefault("notes", [])
-    notes += [one for one in beyond_yield(result.plan.model.patch, {"lower": low, "upper": high}) if one not in notes]
+    inside = beyond_yield(result.plan.model.patch, {"lower": low, "upper": high})
+    faces = result.extra.get("yielding_faces", {})
+    notes[:] = [text for text in notes if text not in faces.values()]
+    notes += [text for text in (faces | inside).values() if text not in notes]
     steps = {"lower": low["steps"], "upper": high["steps"]}
-    write_series(path, blocks_of(low, high, patch.x, interface, result.plan.model.patch.width), times, UNITS, steps)
+    write_series(path, blocks_of(low, high, x, interface, result.plan.model.patch.width), times, UNITS, steps)
     if not isinstance(patch.pair.piece, Piece):
         return {}
     shape, shown = (patch.x.size - 1, -1), result.extra.get("wear_shown", {"states": 0})["states"]
-    return {"depth": (patch.pair.grid.depth, patch.pair.upper_grid.depth),
+    return {"x": patch.x, "pressure": patch.pressure.sigma_n,
+            "depth": (patch.pair.grid.depth, patch.pair.upper_grid.depth),
             "coating": (patch.pair.grid.coating, patch.pair.upper_grid.coating),
             "mises": [body["mises"][shown].reshape(shape) for body in (low, high)]}
 
@@ -119,9 +125,9 @@ def _inside(piece, grid) -> _Inside:
                    recovery(cells))
 
 
-def _body(patch, fields: dict, side: str, inside: _Inside, u) -> dict:
+def _body(patch, fields: dict, x, side: str, inside: _Inside, u) -> dict:
     """One piece for the fields file: its mesh, displacement and stress in every frame, y away from the interface;
-    u: of `_motions`, whose pressed state is that of the first frame."""
+    x: (k,) [m] of the interface; u: of `_motions`, whose pressed state is that of the first frame."""
     lower, cells, frames = side == "lower", inside.cells, len(u) - 1
     sign = -1.0 if lower else 1.0
     out = {name: np.empty((frames, *shape), np.float32) for name, shape in {
@@ -139,7 +145,7 @@ def _body(patch, fields: dict, side: str, inside: _Inside, u) -> dict:
         out["displacement"][some] = motion * [1.0, sign] if lower else motion + _rigid(patch, fields, inside.points,
                                                                                        some)
     error = Indicator(*(np.concatenate([getattr(one, name) for one in errors]) for name in ("error", "energy")))
-    bond = coating_bond.at(cells, coating_bond.bond_line(cells, u, inside.rules), patch.x)
+    bond = coating_bond.at(cells, coating_bond.bond_line(cells, u, inside.rules), x)
     bond = {name: rows[:1] + rows[1:] for name, rows in bond.items()}
     if bond:
         bond["shear_bond"] *= -sign  # on the lower piece along +x, as the interface shear

@@ -112,7 +112,7 @@
 
   function spread(cases, m) {                    // ends of the bars; on a logarithmic axis none goes below all values
     const least = Math.min(...m.values.filter((v) => v > 0)) / 10;
-    const end = (i, sign) => m.values[i] === null ? NaN : m.values[i] + sign * (m.errors[i] ?? 0);
+    const end = (i, sign) => m.values[i] === null ? NaN : Math.max(m.values[i] + sign * (m.errors[i] ?? 0), m.minimum ?? -Infinity);
     const low = cases.map((i) => log() ? Math.max(end(i, -1), Math.min(least, m.values[i])) : end(i, -1));
     return {low, high: cases.map((i) => end(i, 1))};
   }

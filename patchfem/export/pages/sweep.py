@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core import Outcome
+from ...runs.results.patch_rows import minimum_of
 from ...scales import LADDERS, axis_unit, rounded
 from ..missed import over
 from ..written import NUMBER, brief, label
@@ -87,6 +88,7 @@ def _measure(name: str, one: dict, cases, tolerance=np.nan) -> dict:
     missed = over(some, tolerance[cases] if np.ndim(tolerance) else tolerance)
     return {"name": name, "label": label(name), "unit": "" if unit == "1" else unit, "means": one.get("means", ""),
             "values": some["values"] * scale, "errors": some["errors"] * scale, "least": zero_below(name) * scale,
+            "minimum": minimum_of(name) * scale,
             "over": missed.astype(int)}
 
 

@@ -7,12 +7,13 @@ from math import ceil, floor, inf, isfinite, log10, pi
 from types import MappingProxyType
 
 from ... import scales
-from ...core import Outcome, allowed
+from ...core import Measure, Outcome, allowed
 from ...response.outcome import UNSETTLED
 from ...response.rows import TABLE as MOTION
 from ...response.rows import of_first, of_number
 from ...runs.bench.result import OPENED
 from ...runs.results.patch_rows import TABLE as STATIC
+from ...runs.results.patch_rows import minimum_of, unknown_measures
 from ...runs.results.result import Result
 from ..summary import measure_object
 from .document import prose
@@ -106,8 +107,16 @@ def pair(name: str, measure: dict) -> str:
     value, error = texts(name, measure)
     if value == "-":
         return value
-    unit = units(name, measure["value"], measure["unit"], measure["error"])[0][0]
+    unit, scale = units(name, measure["value"], measure["unit"], measure["error"])[0]
+    if below_minimum(name, measure):
+        return f"0 to {scales.plain((measure['value'] + measure['error']) * scale, 2)} {unit}".rstrip()
     return scales.paired(value, error, unit)
+
+
+def below_minimum(name: str, measure: dict) -> bool:
+    """Whether the error of a measure reaches below the smallest value that it can have, 0."""
+    value, error = measure["value"], measure["error"]
+    return minimum_of(name) == 0 and value is not None and bool(error) and error >= value > 0
 
 
 def zero_below(name: str, measure: dict = NONE) -> float:
@@ -128,6 +137,12 @@ def others(name: str, measure: dict) -> str:
     return " = ".join(f"{texts(name, measure, scale)[0]} {unit}" for unit, scale in found if abs(value) * scale >= 1e-3)
 
 
+def _unknown(measures: dict) -> str:
+    """Names of the static measures that are not known within their own size; "" without any."""
+    found = {name: Measure(**{key: one[key] for key in ("value", "unit", "error")}) for name, one in measures.items()}
+    return " and of ".join(unknown_measures(found))
+
+
 def verdict(summary: dict) -> str:
     """The sentence on how a run ended, from its summary as summary.json holds it; of a bench also whether it slipped.
 
@@ -135,6 +150,9 @@ def verdict(summary: dict) -> str:
     it slips, and the sentence says how much.
     """
     outcome, measures = Outcome(summary["outcome"]), summary["measures"]
+    if outcome is Outcome.NOT_CONVERGED and (unknown := _unknown(measures)):
+        known = "use the other measures with their stated errors"
+        return f"The numerical error of {unknown} is as large as the value, so it is not known; {known}."
     if summary["kind"] == "bench" and outcome is Outcome.DONE:
         found = _looped(summary["loop"], measures["equivalent_stiffness"]) if "loop" in summary else outcome.sentence
         return _slid(measures.get("slip_amplitude"), found, "contact_fraction" in measures)
@@ -279,7 +297,8 @@ def placed(contact: dict | None, fraction: float | None = None) -> str:
     if count == 1 and parts[0][0] == parts[0][1]:
         return f", at x = {number(parts[0][0])} {unit}"
     share = sum(end - begin for begin, end in stretches) / (last - first)
-    here = "" if fraction is None or abs(share - fraction) <= SAME * fraction else \
+    alike = fraction is None or abs(share - fraction) <= SAME * fraction or f"{share:.3g}" == f"{fraction:.3g}"
+    here = "" if alike else \
         f" on the finest mesh ({100 * share:.3g} %; the fraction before is extrapolated from all meshes)"
     told = " and from ".join(
         f"{number(begin)} to {number(end)} {unit}{' (left end)' * (begin <= first)}{' (right end)' * (end >= last)}"

@@ -16,8 +16,9 @@ from ...model.model import Model
 from ..patch import kept, static
 from ..patch import result as of_patch
 from ..patch.meshes import geometry_of
+from ..patch.strength import yielding_faces
 from ..remedies import Finding, beyond_tolerance
-from ..results.patch_rows import TABLE
+from ..results.patch_rows import POSITIVE, TABLE
 from ..results.result import without_folders, without_folders_of
 from . import one_by_one
 from .answers import Answers
@@ -90,6 +91,7 @@ def _solved(models: Sequence[Model], say: Callable | None) -> Answers:
         static.asked_of([model.patch for model in models])
     found, out = static.pressed_together(asked, first.accuracy.tolerance), Answers.blank(len(models))
     good, wide, tolerance = found.good, ~found.good, first.accuracy.tolerance
+    unknown = np.any([found.errors[name] >= found.values[name] for name in POSITIVE], axis=0)
     floors = {name: np.broadcast_to(least, good.shape) for name, least in
               of_patch.floors(first.patch, tolerance, found.values).items()}
     for name, values in found.values.items():
@@ -98,10 +100,12 @@ def _solved(models: Sequence[Model], say: Callable | None) -> Answers:
             columns[name][:] = np.where(good, given, np.nan)
         wide = wide | (found.errors[name] > np.maximum(allowed(tolerance, values, floors[name]), TINY))
     out.outcome[good] = str(Outcome.DONE)
+    out.outcome[good & unknown] = str(Outcome.NOT_CONVERGED)
     nodes = {"interface_nodes": found.levels[0].x.size}
     out.numerics.update(dict.fromkeys(np.flatnonzero(good).tolist(), nodes))
     strained = of_patch.beyond_small_strains(first.patch, found.top, found.approach)
     mean = found.values["normal_load"] / (first.patch.length * first.patch.width * first.patch.pairs)
+    least_peak = found.values["pressure_peak"] - found.errors["pressure_peak"]
     always, told = bool(first.source.remarks) or not alike, without_folders_of(first.source.path)
     for case in np.flatnonzero(good & (wide | strained | always)).tolist():
         model, measures = models[case], found.measures(case, floors)
@@ -111,7 +115,8 @@ def _solved(models: Sequence[Model], say: Callable | None) -> Answers:
         if warned:
             out.warnings[case] = without_folders(warned, model.source.path)
     for case in np.flatnonzero(good).tolist():
-        notes = [*of_patch.slender(first.patch, mean[case]), *found.band(first.patch, case)]
+        notes = [*of_patch.slender(first.patch, mean[case]), *found.band(first.patch, case),
+                 *yielding_faces(first.patch, least_peak[case]).values()]
         if notes:
             out.notes[case] = told(notes)
     single = np.flatnonzero(~good)

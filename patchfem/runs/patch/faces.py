@@ -13,7 +13,7 @@ from ...friction import record
 from ...model.source import placed
 from ...response.rows import of_number
 from ...slip.fields import element_fields
-from ..results.result import at_rest, frames_of
+from ..results.result import at_rest, frames_of, surface_of
 from . import kept, result
 from .condensed import Keyed
 from .press import Patch
@@ -40,6 +40,11 @@ class Face(NamedTuple):
     def patch(self) -> Patch:
         """The pressed Patch."""
         return self.patches[0]
+
+    @property
+    def surface(self):
+        """The press.Surface on whose points its fields are given."""
+        return surface_of(self.patch, self.fields or {})
 
     @property
     def folder(self) -> str:

@@ -20,6 +20,7 @@ from ...mesh.grading import Layout, columns, rows
 from ...model import profile
 from ...model.pieces import layers_of
 from .measures import OFFSET, Hidden, combined, least_of
+from .press import Surface
 from .values import peak_pressure
 
 LEAST_LEVELS, MOST_POINTS, MOST_WORK = 3, 60_000, 2.5e7  # of a level; its iterations times its points
@@ -30,13 +31,32 @@ NEAR, CORNERED = 1e-3, 0.2  # of the length: what counts as a corner; its share 
 OVERLAP = 1e-6  # of what the pressure moves: the largest overlap of a solved contact
 
 
+class PointSolution(NamedTuple):
+    """Static measures from points of a trace, and the finest level that was solved.
+
+    measures: name -> (value, error), {} where a level is not solved; surface, stretches: as `Patch` has them, None then.
+    """
+
+    measures: dict
+    surface: Surface | None = None
+    stretches: np.ndarray | None = None
+
+    @property
+    def spacing(self) -> float | None:
+        """Distance [m] between the points; None without a solution."""
+        return None if self.surface is None else float(self.surface.x[1] - self.surface.x[0])
+
+
 class PointLevel(NamedTuple):
-    """A solved level: forces (n,) [N], values by name, what its meshes may hide, iterations.
+    """A solved level: forces (n,) [N], its Surface, parts in contact (k, 2) [m], values by name, what its meshes may
+    hide, iterations.
 
     cornered: the pressure at a free corner may be the largest, which a few cells at the ends do not tell.
     """
 
     force: np.ndarray
+    surface: Surface
+    stretches: np.ndarray
     values: dict
     hidden: Hidden
     work: int
@@ -50,10 +70,10 @@ def takes_points(asked) -> bool:
         and not asked.outlined and asked.sweeps != "wear" and held
 
 
-def sharper_by_points(asked, enough) -> tuple:
-    """(static measures by name as (value, error), spacing [m] of the finest points) of a `PatchModel`.
+def solve_on_points(asked, enough) -> PointSolution:
+    """Solve a `PatchModel` on ever more points.
 
-    enough(measures) -> bool ends the climb, as do MOST_POINTS and MOST_WORK. ({}, None) where a level is not solved.
+    enough(measures) -> bool ends the climb, as do MOST_POINTS and MOST_WORK.
     """
     count, series, found = _first(asked), [], {}
     with one_thread():
@@ -66,7 +86,7 @@ def sharper_by_points(asked, enough) -> tuple:
                 found = _summed(coarse, series) if len(series) >= LEAST_LEVELS else {}
         except (NotConverged, np.linalg.LinAlgError):
             pass
-    return found, asked.length / series[-1].force.size if found else None
+    return PointSolution(found, series[-1].surface, series[-1].stretches) if found else PointSolution({})
 
 
 def _first(asked) -> int:
@@ -139,14 +159,16 @@ def _level(asked, ends: tuple, count: int, start) -> PointLevel:
     opening, touches = gap + theta * x - closing + moved, force > 0
     if not opening.min() >= -OVERLAP * np.abs(moved).max():
         raise NotConverged(f"contact: at {count} points the pieces still overlap by up to {-opening.min():.1e} m")
-    values, found = _values(asked, (normal, shear), force, np.where(touches, 0.0, opening))
+    opening = np.where(touches, 0.0, np.maximum(opening, 0.0))
+    surface = Surface(x, np.full(count, normal.area), force / normal.area, opening, gap)
+    values, found, stretches = _values(asked, (normal, shear), force, opening)
     values |= {"approach": closing, "rotation": asked.gap.angle + theta}
     cell = asked.length / count
     hidden = Hidden(asked.length, int(touches.sum()), cell * bool(found), cell * len(found), OFFSET,
                     asked.moment is not None, float(np.ptp(gap) + np.abs(moved).max()), 0.0, 0.0)
     near = max(1, round(NEAR * count))
     cornered = max(force[:near].max(), force[-near:].max()) > CORNERED * force.max()
-    return PointLevel(force, values, hidden, work, bool(cornered))
+    return PointLevel(force, surface, stretches, values, hidden, work, bool(cornered))
 
 
 def _pressed(asked, normal: Products, gap, start) -> tuple:
@@ -169,7 +191,7 @@ def _pressed(asked, normal: Products, gap, start) -> tuple:
 
 
 def _values(asked, both: tuple, force, gap) -> tuple:
-    """The measures but approach and rotation, and the ends of the contact."""
+    """The measures but approach and rotation, the ends of the contact, and its parts (k, 2) [m]."""
     (normal, shear), x, load = both, both[0].x, float(force.sum())
     touches, sigma = force > 0, force / normal.area
     if not touches.any():
@@ -191,4 +213,4 @@ def _values(asked, both: tuple, force, gap) -> tuple:
            "rotational_stiffness": stiffness_of(normal, touches, x, found)[0]}
     if asked.alike:
         out["tangential_stiffness"] = stiffness_of(shear, touches, one, found)[0]
-    return out, found
+    return out, found, stretches

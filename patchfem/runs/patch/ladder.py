@@ -38,7 +38,8 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
     """A patch on its mesh and on coarser ones, fine to coarse; two of them at least, None where one is not wanted.
 
     A patch whose element size is not pinned climbs a ladder of nested meshes to its `tolerance`. A mesh of any cells
-    has no coarser one: its second patch is on the mesh with every edge halved. Where it shares meshes they are those.
+    has no coarser one: its second patch is on the mesh with every edge halved. Where it shares meshes they are those;
+    but a patch under a trace that these do not resolve to its tolerance climbs its own ladder, as its single run does.
     fresh: condense anew, whatever is kept on disk.
     """
     if asked.solved is not None and not fresh:
@@ -46,10 +47,22 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
     if asked.meshes is not None:
         if fresh:
             return on_pairs(asked, [condensed(asked, *level, fresh=True) for level in asked.meshes.levels], estimate)
-        return _kept(by_content(asked), estimate) if shares(asked) else on_pairs(asked, shared_pairs(asked), estimate)
+        if shares(asked):
+            return _kept(by_content(asked), estimate)
+        found = on_pairs(asked, shared_pairs(asked), estimate)
+        if estimate and _misses_trace(asked, found, asked.mesh_tolerance or tolerance):
+            return climb(replace(asked, meshes=None), asked.mesh_tolerance or tolerance)
+        return found
     if asked.chosen:
         return climb(asked, asked.mesh_tolerance or tolerance, estimate, fresh)
     return _with_coarser(asked, *bodies_of(asked), estimate, fresh)
+
+
+def _misses_trace(asked, patches: tuple, tolerance: float) -> bool:
+    """Whether a patch under a trace misses its tolerance on meshes that it shares."""
+    if not asked.chosen or asked.gap.profile is None or patches[1] is None:
+        return False
+    return not met(measures(*patches, tolerance=tolerance), tolerance)
 
 
 @lru_cache(maxsize=KEPT)
@@ -120,10 +133,10 @@ def climb(asked, tolerance: float, estimate: bool = True, fresh: bool = False, s
         out[0], dear = replace(out[0], sharper=sharp or {}), seconds_of(grids)
         found = measures(*out, tolerance=tolerance)
         if dear > SPENT[False] and not met(found, tolerance) and _finer(asked):
-            sharp, out[0] = _on_points(asked, out, tolerance)
-            found = measures(*out, tolerance=tolerance)
-            if sharp:
+            out[0] = _on_points(asked, out, tolerance)
+            if out[0].sharper:
                 return tuple(out)
+            sharp = {}
         if sharp is None and not met(found, tolerance) and high_order.takes_cells(asked) and \
                 (dear > SPENT[False] or (asked.still and met(found, FINE))):
             before = missed(found, tolerance)
@@ -144,11 +157,11 @@ def _finer(asked) -> bool:
     return fine.takes_points(asked)
 
 
-def _on_points(asked, patches: list, tolerance: float) -> tuple:
-    """Sharper measures of patches, fine to coarse, from points as fine as a trace, and the finest patch with them."""
-    found, apart = fine.sharper_by_points(asked, partial(_enough, patches, tolerance))
-    first = patches[0]
-    return found, replace(first, sharper=found, averaging=apart or first.averaging)
+def _on_points(asked, patches: list, tolerance: float):
+    """The finest of patches, fine to coarse, with what points as fine as a trace add to it."""
+    found, first = fine.solve_on_points(asked, partial(_enough, patches, tolerance)), patches[0]
+    return replace(first, sharper=found.measures, averaging=found.spacing or first.averaging, fine=found.surface,
+                   stretches=found.stretches)
 
 
 def climbs_at(asked, patches, tolerance: float) -> float | None:

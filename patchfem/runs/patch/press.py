@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field, replace
 from functools import partial
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,20 @@ from .approach import closed_by
 from .condensed import Pair, condensed
 
 RIPPLE = 1e-2  # of the pressure on pieces whose nodes do not match, expected and found, from which it is said
+
+
+class Surface(NamedTuple):
+    """Pressed interface on the points on which it was solved.
+
+    x: (n,) places [m]; weight: (n,) areas [m2]; sigma_n: (n,) normal stress [Pa]; gap: (n,) gap [m] that remains under
+    load; unloaded_gap: (n,) gap [m] without load, or (s, n) of strips.
+    """
+
+    x: np.ndarray
+    weight: np.ndarray
+    sigma_n: np.ndarray
+    gap: np.ndarray
+    unloaded_gap: np.ndarray
 
 
 @dataclass(frozen=True, eq=False, slots=True, weakref_slot=True)
@@ -31,7 +46,8 @@ class Patch:
     sharper: static measures by name as (value, error) that cells of order 4 or points of a trace gave in addition, {}
     without any; averaging [m]: the length that a profile is averaged over where it bears, None without one; either: a
     step of the gap ends at a node, half of which lies below it and half above: (weight, Patch) with the whole node
-    below, and the same with it above; () without such a node.
+    below, and the same with it above; () without such a node. fine: the Surface on the points of a trace, None where
+    the mesh is the finest solution; stretches: (k, 2) [m] parts in contact on these points.
     """
 
     pair: Pair
@@ -50,6 +66,13 @@ class Patch:
     sharper: dict = field(default_factory=dict)
     averaging: float | None = None
     either: tuple = ()
+    fine: Surface | None = None
+    stretches: np.ndarray | None = None
+
+    @property
+    def on_mesh(self) -> Surface:
+        """Interface on the nodes of the mesh."""
+        return Surface(self.x, self.pieces.interface.weight, self.pressure.sigma_n, self.pressure.gap, self.gap)
 
     @property
     def x(self) -> np.ndarray:

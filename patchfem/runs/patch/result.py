@@ -11,6 +11,7 @@ from ...mesh.nested import plan_of
 from ...mesh.tensor import TensorGrid
 from ...model.pieces import bodies_of
 from ...model.source import placed
+from ...scales import short
 from ...surface import nodes
 from ..results.patch_rows import TABLE
 from ..results.result import Result, at_rest
@@ -85,7 +86,7 @@ def strained(asked, patch) -> list:
     beyond = ["on a rounded end the contact reaches the point where the slope is 0.097, and beyond this point no "
               "contact is computed; lower the tilt or the load"] if beyond_gentle(patch) else []
     return [*strained_by(asked, patch.pressure.sigma_n.max(initial=0.0), patch.pressure.approach, beyond),
-            *(text for text in patch.notes if nodes.FITS not in text)]
+            *(text for text in patch.notes if not nodes.is_note(text))]
 
 
 def strained_by(asked, top: float, approach: float, beyond=()) -> list:
@@ -130,13 +131,13 @@ def left_out(model, patch, coarse) -> list:
     asked = model.patch
     by_forms = [side for side, body in (("lower", patch.pair.grid), ("upper", patch.pair.upper_grid))
                 if not isinstance(body, TensorGrid)]
-    out = [text for text in patch.notes if nodes.FITS in text]
+    out = [text for text in patch.notes if nodes.is_note(text)]
     out += [f"scikit-fem assembles the stiffness of the {' and the '.join(by_forms)} piece"] if by_forms else []
     out += [*drawn_otherwise(patch.pair), *slender(asked, patch.pressure.load / patch.pieces.interface.weight.sum())]
     if patch.sharper and patch.averaging is not None:
         out.append(f"each static measure is computed on the mesh and on points {say(patch.averaging, 3)} apart, and "
                    "the value with the smaller error is given; on these points short waves are treated as in infinite "
-                   f"layers; fields and motion are computed on the mesh of {patch.x.size} interface points")
+                   f"layers; {_of_mesh(model, patch)}")
     elif patch.sharper:
         out.append("each static measure is computed on the mesh and on Gauss-Lobatto cells of order 4, and the value "
                    "with the smaller error is given; "
@@ -159,6 +160,16 @@ def left_out(model, patch, coarse) -> list:
         # a mesh of any cells has no coarser one: its second patch is finer than its first
         out += band(asked, patch if coarse[-1] is None else coarse[0])
     return out
+
+
+def _of_mesh(model, patch) -> str:
+    """What a run under a trace computes on the mesh and not on the points of the trace, as a clause."""
+    peak = f"whose largest pressure is {short(float(patch.pressure.sigma_n.max()), 'Pa', 3)}"
+    where = f"the mesh of {patch.x.size} interface points, {peak}"
+    if model.kind == "patch":
+        return (f"pressure and gap of the interface are given on these points, but the stress inside the pieces is "
+                f"computed on {where}")
+    return f"fields and motion are computed on {where}"
 
 
 def frictionless(asked, patch) -> list:

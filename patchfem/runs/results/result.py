@@ -65,9 +65,27 @@ def meaning(name: str, apart: str = "interface") -> str:
 
 
 def at_rest(patch) -> dict:
-    """Fields of the pressed patch before any motion: normal_stress [Pa], gap [m] and status, (1, m) each."""
-    return {"time": np.zeros(1), "normal_stress": patch.pressure.sigma_n[None], "gap": patch.pressure.gap[None],
-            "status": patch.active.astype(np.int8)[None]}
+    """Fields of the pressed patch without motion: normal_stress [Pa], gap [m] and status, (1, n) each.
+
+    They are those of its finest solution, on the points of a trace where it has these.
+    """
+    return _pressed_frame(patch.fine or patch.on_mesh)
+
+
+def _pressed_frame(surface) -> dict:
+    """Fields of a pressed Surface, (1, n) each."""
+    return {"time": np.zeros(1), "normal_stress": surface.sigma_n[None], "gap": surface.gap[None],
+            "status": (surface.sigma_n > 0).astype(np.int8)[None]}
+
+
+def surface_of(patch, fields: dict):
+    """The Surface of a pressed patch on whose points its fields are given; None without a patch.
+
+    A motion moves the nodes of the mesh. Without one the fields are those of `at_rest`.
+    """
+    if patch is None or patch.fine is None or "shear_stress" in fields:
+        return patch and patch.on_mesh
+    return patch.fine
 
 
 def frames_of(patch, time, tau, local, slide) -> dict:
@@ -75,7 +93,7 @@ def frames_of(patch, time, tau, local, slide) -> dict:
 
     slide (f,): motion of the upper holder [m] in the given frames.
     """
-    first = at_rest(patch)
+    first = _pressed_frame(patch.on_mesh)
     count = len(time) + 1
     tau = np.concatenate([np.zeros((1, tau.shape[1])), tau])
     slip = np.concatenate([np.zeros((1, tau.shape[1])), local])

@@ -22,6 +22,9 @@ class Material(Table):
     young: key(quantity("pressure", gt=0), "Young's modulus")
     poisson: key(number(gt=-1, lt=0.5), "Poisson's ratio")
     density: key(quantity("density", gt=0), "mass per volume")
+    yield_: key(quantity("pressure", gt=0) | None, "yield strength in tension; a note appears where the von Mises "
+                "stress exceeds it; default: that of the named material in MATERIALS.md, if it has "
+                "one") = Field(None, alias="yield")
 
 
 def material(value: object) -> object:
@@ -210,7 +213,8 @@ class Contact(Table):
     plane: key(Literal["strain", "stress"], "plane strain or plane stress in the pieces") = "strain"
     element_size: key(Length | None, "length of the elements along the interface in a uniform mesh; default: a graded "
                       "mesh that meets the tolerance") = None
-    substrate: key(Substance, "material of the pieces: a name from MATERIALS.md, or a table of young, poisson, density")
+    substrate: key(Substance, "material of the pieces: a name from MATERIALS.md, or a table of young, poisson, "
+                   "density and, if known, yield")
     mesh: key(Text | None, "file with a mesh of both pieces, which needs the tags listed in GUIDE.md; default: a mesh "
               "is made from the dimensions") = None
     coating: Coating | None = None

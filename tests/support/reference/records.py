@@ -63,7 +63,8 @@ class Materials:
 {MADE}
 
 The value of `contact.substrate`, or of `material` in a coating, is one of these names or a table of your own values:
-`{{young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"}}`. For one alloy, the elastic constants differ by a few
+`{{young = "121 GPa", poisson = 0.32, density = "4370 kg/m^3"}}`, with `yield = "880 MPa"` for its yield strength if you
+know it. For one alloy, the elastic constants differ by a few
 per cent between handbooks; for a sprayed coating they differ by far more. If your result depends on one of these
 constants, measure it on your material.
 """
@@ -83,7 +84,9 @@ constants, measure it on your material.
                             "warning of the run gives the temperature rise of the faces due to friction, estimated "
                             "from these values.",
                             grid(heads[1], warm), "## Strength",
-                            "The pieces are assumed to be elastic. A note appears if the stress in a piece exceeds the "
-                            "yield strength; the fifth of the height of the piece next to its fixed far face is not "
-                            "checked.",
+                            "The pieces are assumed to be elastic. A note appears if the von Mises stress in a piece "
+                            "exceeds the yield strength, that of the key `yield` or of this table. The stress is "
+                            "that of the mesh, without the fifth of the height of the piece next to its fixed far "
+                            "face, or its lower bound that follows from the pressure peak. Coatings of WC-Co and "
+                            "alumina break before they yield, so they have no strength here.",
                             grid(heads[2], firm)]) + "\n"
