@@ -12,7 +12,8 @@ record names: "shear" of pieces that give way, "joints" (several interfaces, spr
 climbs, a "plane" in which an interface of a rig slides. Traits: "set-valued" (it holds without a stretch), "bonds" (the
 sum 2.17 with its readings and orders), "averaged" (over the pressure behind a point), "timeless" (no rate of the slide
 changes its force), "memoryless" (of the last motion alone), "creeps" (it never holds), "cells" (a density cut into
-elements).
+elements), "overshoots" (its force exceeds that of a steady slide, while the slide turns, for less than a step of a
+march).
 
 A shape of the gap is an effect, its table in `scene.keys.contact` and a function of `contact.gaps`. A waveform of the
 drive is an effect with its keys and a row of `MADE` in its module, `structure.drives` unless the effect names another.
@@ -180,7 +181,7 @@ EFFECTS = {
     "friction.law=lugre": _law("laws.lugre", "F = k z + s_1 z' + s_2 v, z' = v - k |v| z/g(v), g = mu_k N + "
                                "(mu_s - mu_k) N exp(-(v/v_s)^2) (Canudas de Wit; Dahl: mu_k = mu_s, no damping)",
                                ("stiffness stribeck_speed", "kinetic micro_damping viscous"),
-                               "joints harmonic grooves"),
+                               "joints harmonic grooves", "overshoots"),
     "friction.reading=stretch": Effect("patchfem.friction.bonds.recursion",
                                        "phi: (|u|/eps)^p exp(-int dR/eps)/Gamma(p+1)"),
     "friction.reading=report": Effect("patchfem.friction.bonds.quadrature",

@@ -16,6 +16,7 @@ tests/README.md.
 
 from dataclasses import replace
 from statistics import median
+from typing import NamedTuple
 
 import numpy as np
 
@@ -58,6 +59,21 @@ OF_STIFFNESS = ("relative_displacement_amplitude", "absolute_acceleration_peak",
 MAIN = ("relative_displacement_amplitude", "absolute_acceleration_peak", "slip_amplitude", "loop_area", "friction_work")
 
 
+class StepScales(NamedTuple):
+    """What the errors of a time step are judged by.
+
+    size [m]: as `floor_of` takes it; turn [m]: slide over which the law holds after a reversal, 0 for none; overshoots:
+    names of the friction force peaks that no limit of their law holds.
+    """
+
+    size: float = np.inf
+    turn: float = 0.0
+    overshoots: frozenset = frozenset()
+
+
+PLAIN = StepScales()  # of a motion of which nothing is known
+
+
 def signed(fine: dict, coarse: dict) -> dict:
     """Difference fine - coarse by name of the measures that both runs have; that of a phase lies in +-pi/2."""
     out = {name: fine[name] - coarse[name] for name in fine.keys() & coarse.keys()}
@@ -71,14 +87,15 @@ def change(fine: dict, coarse: dict) -> dict:
     return {name: abs(gap) for name, gap in signed(fine, coarse).items()}
 
 
-def step_error(fine: dict, half: dict, quarter: dict, steps: int, size: float = np.inf, turn: float = 0.0) -> dict:
+def step_error(fine: dict, half: dict, quarter: dict, steps: int, scales: StepScales = PLAIN) -> dict:
     """Error of the time step by name from the measures of runs at `steps`, half and a quarter of them per cycle.
 
     By the order where the changes show it, else by their size and that of the main measures, as the head of the file
-    says. What counts samples has at least their resolution. size [m]: as `floor_of` takes it; turn [m]: slide over
-    which the law holds after a reversal, 0 for none. A slide of x from its turn takes the phase sqrt(2 x/A): where that
-    is below a step no order is believed, and a stick may be there that no sample shows.
+    says. What counts samples has at least their resolution, and as it can jump, no less than it changed. A slide of x
+    from its turn takes the phase sqrt(2 x/A): where that is below a step no order is believed, and a stick may be there
+    that no sample shows.
     """
+    size, turn = scales.size, scales.turn
     last, before = signed(fine, half), signed(half, quarter)
     reach = fine.get("slip_amplitude", 0.0)
     stick = np.sqrt(2 * turn / reach) / np.pi if turn and reach > turn else 0.0  # of the cycle: that phase, twice
@@ -89,18 +106,20 @@ def step_error(fine: dict, half: dict, quarter: dict, steps: int, size: float = 
     out = {}
     for name, gap in last.items():
         earlier, value = before.get(name, 0.0), _size(fine, name)
-        if sizes[name] <= ROUND * value:  # a limit or a given load: it does not hang on the step
+        is_same = sizes[name] <= ROUND * value
+        if is_same and name not in scales.overshoots:  # a limit or a given load: it does not hang on the step
             out[name] = sizes[name]
         else:
             kind, shown = of_first(name), _by_order(gap, earlier) if orderly else None
-            least = 0.0 if kind in APART else (1.0 if missed else SHARE) * typical * value
+            is_apart = kind in APART and not is_same
+            least = 0.0 if is_apart else (1.0 if missed else SHARE) * typical * value
             if shown is None:
                 out[name] = _without_order(kind, gap, earlier, least, missed)
             else:
                 out[name] = max(SURE * shown[0], LEAST * typical * value if shown[1] else LOOSE * least)
-        if sizes[name] > ROUND * value and name not in GAPS:
+        if not is_same and name not in GAPS:
             out[name] = max(out[name], OF_FLOOR * float(floor_of(name, size)))
-        out[name] += row_of(name).grain / steps
+        out[name] = max(out[name], jump_of(name, gap)) + row_of(name).grain / steps
     if stick and "stick_fraction" in out and fine["stick_fraction"] < 2 / steps:
         out["stick_fraction"] = max(out["stick_fraction"], min(stick, 2 / steps))
     if "slip_start_phase" in out and "slip_start_phase" not in quarter:  # one change alone tells nothing; a stick of a
@@ -109,6 +128,14 @@ def step_error(fine: dict, half: dict, quarter: dict, steps: int, size: float = 
     if fine.get("open_fraction") == 0 and fine.get("normal_load_least", 0.0) > out.get("normal_load_least", np.inf):
         out["open_fraction"] = 0.0  # the load stays above 0 between the samples as well
     return out
+
+
+def jump_of(name: str, gap):
+    """Least error [unit of the measure] from its change between two runs: of what can jump the whole change, else 0.
+
+    A short stick comes or goes between two runs, and which of them is right is not known.
+    """
+    return np.abs(gap) * (row_of(name).grain > 0)
 
 
 def _by_order(gap: float, earlier: float) -> tuple | None:
@@ -174,7 +201,8 @@ def tolerance_error(fine: dict, coarse: dict, moved: float = np.inf) -> dict:
     size = abs(fine.get("relative_displacement_amplitude", 0.0))
     least = {name: OF_TYPICAL * typical * (size if name == "drift_per_cycle" else abs(fine[name])) for name in gaps}
     least |= {name: 0.0 for name in gaps if of_first(name) == GIVEN}
-    return {name: max(OF_CHANGE * gap, least[name], 0.0 if name in GAPS else OF_FLOOR**2 * float(floor_of(name, moved)))
+    return {name: max(OF_CHANGE * gap, jump_of(name, gap), least[name],
+                      0.0 if name in GAPS else OF_FLOOR**2 * float(floor_of(name, moved)))
             for name, gap in gaps.items()}
 
 

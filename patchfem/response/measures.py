@@ -76,9 +76,9 @@ def moved(x, y=None) -> np.ndarray:
 def slip_measures(window: Response, drive, steps_per_cycle: int, second=(None, None)) -> dict:
     """Slip amplitude [m], stick fraction [1] and phase of the first slip after a stick [rad, modulo pi].
 
-    From uniform samples. The interface sticks while less than SHARE of its slide is irreversible, or it does not slide
-    at all; where that share passes SHARE is found between the middles of the steps. second: slide and slip (k,) [m]
-    in a second direction, None without one.
+    From as many samples in every cycle. The interface sticks while less than SHARE of its slide is irreversible, or it
+    does not slide at all; where that share passes SHARE is found between the middles of the steps. second: slide and
+    slip (k,) [m] in a second direction, None without one.
     """
     across, beside = second
     if widest(window.slide, across) <= REST:
@@ -99,10 +99,10 @@ def slip_measures(window: Response, drive, steps_per_cycle: int, second=(None, N
     # share of each stretch between two middles that lies below, along the line between them
     low, high = np.minimum(before, after), np.maximum(before, after)
     below = np.where(high < 0, 1.0, np.where(low >= 0, 0.0, -low / np.where(rise > 0, rise, 1.0)))
-    out["stick_fraction"] = float(below.mean()) if below.size else float(above[0] < 0)
+    middles = (time[1:] + time[:-1]) / 2
+    out["stick_fraction"] = float(np.average(below, weights=np.diff(middles))) if below.size else float(above[0] < 0)
     rises = np.flatnonzero((before < 0) & (after >= 0))
     if rises.size:
-        middles = (time[1:] + time[:-1]) / 2
         at = middles[rises] - before[rises] / rise[rises] * np.diff(middles)[rises]
         out |= slip_start(2 * np.pi / drive.period * at)
     return out
@@ -189,15 +189,26 @@ def peaks_between(window: Response, climbs: bool = False) -> dict:
     return out
 
 
-def half_swing(time, place, rate) -> float:
-    """Half peak-to-peak [m] of the cubics through samples of a place (k,) [m] and its rate [m/s] at times (k,) [s]."""
-    h = np.diff(time)
+def turn_shares(time, place, rate) -> tuple:
+    """(numbers of the steps in which the rate changes its sign, share of the step at which the cubic turns there).
+
+    time (k,) [s]; place (k,) [m] and rate (k,) [m/s] of samples.
+    """
+    step = np.diff(time)
     k = np.flatnonzero(rate[:-1] * rate[1:] < 0)
-    p, q, rise = rate[k] * h[k], rate[k + 1] * h[k], place[k + 1] - place[k]
+    p, q, rise = rate[k] * step[k], rate[k + 1] * step[k], place[k + 1] - place[k]
     two, three = 3 * rise - 2 * p - q, p + q - 2 * rise
     # p + 2 two s + 3 three s^2 = 0, by the root that keeps its digits where the cubic is nearly a parabola
     root = np.sqrt(np.maximum(two**2 - 3 * three * p, 0.0))
-    s = np.clip(-p / (two - np.sign(p) * root), 0.0, 1.0)
+    return k, np.clip(-p / (two - np.sign(p) * root), 0.0, 1.0)
+
+
+def half_swing(time, place, rate) -> float:
+    """Half peak-to-peak [m] of the cubics through samples of a place (k,) [m] and its rate [m/s] at times (k,) [s]."""
+    h = np.diff(time)
+    k, s = turn_shares(time, place, rate)
+    p, q, rise = rate[k] * h[k], rate[k + 1] * h[k], place[k + 1] - place[k]
+    two, three = 3 * rise - 2 * p - q, p + q - 2 * rise
     every = np.concatenate([place, place[k] + s * (p + s * (two + s * three))])
     return float(every.max() - every.min()) / 2
 

@@ -41,8 +41,9 @@ class Seen:
     window holds no whole cycle; ledger (4, k) [J] or None; known: name -> value that the engine has itself, None where
     it has none. by: how the force is read where the slide turns, as `loops.turns_of` takes it; still: half range of the
     slide [m] up to which it is round-off; even: equally spaced samples of the window, None where they are its own;
-    together: the interfaces are parts of one, which has no others beside it; number: of the interface, from 0. run:
-    histories of the whole run from t = 0 on, thinned before the last cycles but with every reversal and stop; None
+    inside(window, number): the window of an interface with samples inside the steps, None where those at their ends are
+    enough; together: the interfaces are parts of one, which has no others beside it; number: of the interface, from 0.
+    run: histories of the whole run from t = 0 on, thinned before the last cycles but with every reversal and stop; None
     where they are not kept.
     """
 
@@ -60,6 +61,7 @@ class Seen:
     by: str = "rate"
     still: float = 0.0
     even: Response | None = None
+    inside: Callable | None = None
     together: bool = False
     number: int = 0
     run: Response | None = None
@@ -68,6 +70,11 @@ class Seen:
     def span(self) -> float:
         """Time [s] of the window."""
         return self.window.time[-1] - self.window.time[0]
+
+    @cached_property
+    def samples(self) -> Response:
+        """The window with the samples of the interface inside the steps, where the engine has them."""
+        return self.window if self.inside is None else self.inside(self.window, self.number)
 
     @cached_property
     def whole(self) -> bool:
@@ -81,7 +88,7 @@ class Seen:
             return {}
         first = self.own.loops[0] if self.own.loops else None
         if first is None or first.stuck is None:
-            window = self.even or self.window
+            window = self.even or self.samples
             steps = max(1, round((window.time.size - 1) * self.drive.period / self.span))
             found = slip_measures(window, self.drive, steps, [lateral(window, one, self.number) for one in (
                 "slides", "slips")])
@@ -97,7 +104,7 @@ class Seen:
         """(smallest, largest) Turn of the interface's slide in every whole cycle of the window."""
         if self.own.turns:
             return [tuple(Turn(*one) for one in pair) for pair in self.own.turns]
-        w = self.window
+        w = self.samples
         return turns_of(w.time, w.slide, w.slide_rate, w.force, self.drive.period, self.by)
 
     @cached_property
@@ -239,7 +246,7 @@ ROWS = (
     Row("friction_force_peak", "N", 1e-6, "largest friction force on the whole interface, of a bench during the whole "
         "run; if the interface slides in a plane, the largest resultant of both directions",
         lambda s: None if s.load is None else s.own.loops[0].force if s.own.loops else
-        resultant_peak(s.window.force, s.lateral("forces")), group="friction"),
+        resultant_peak(s.samples.force, s.lateral("forces")), group="friction"),
     Row("energy_balance", "1", 1e-8,
         "error of the energy balance over the run: work minus stored energy minus dissipated energy, divided by the "
         "sum of the exchanged energy and the largest stored energy",

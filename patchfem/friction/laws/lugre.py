@@ -35,10 +35,11 @@ class LuGre:
         return Element("friction.laws.lugre_kernels", numbers, np.zeros(1), self.static * load,
                        self.static / self.stiffness, False, "flow", (self.static / self.stiffness,))
 
-    def limit(self, speed: float) -> float:
+    def limit(self, speed):
         """g/N [1] at a speed [m/s]: the steady friction force per newton of load, at least 1e-9 mu_s, as z divides by
         it."""
-        return max(self.kinetic + (self.static - self.kinetic) * np.exp(-(speed / self.speed)**2), 1e-9 * self.static)
+        rise = (self.static - self.kinetic) * np.exp(-(speed / self.speed)**2)
+        return np.maximum(self.kinetic + rise, 1e-9 * self.static)
 
     def start(self, sigma):
         """State (z [m], z' [m/s], speed [m/s], pressure (m,) [Pa]) at rest and unstretched, under sigma (m,) [Pa]."""

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ...effects import has, listed
+from ...friction.record import can_overshoot
 from ...response.coarser import Coarser, coarser_space, estimate, left_open
-from ...response.errors import change, step_error
+from ...response.errors import StepScales, change, step_error
 from ...slip import shear_modes
 from . import bench, rigid, shear
 from .engine import ELEMENTS, LIST, LISTS, PLANE, STEPPED, slips_by_elements
@@ -54,9 +55,11 @@ def ladder_of(model, patch, coarse, fine, steps: int) -> list:
     choice = fine.engine.choice
     half, few = Pass(max(4, steps // 8 * 4), False, choice), Pass(max(4, steps // 16 * 4), False, choice)
     times = 2.0 if model.load_varies else 1.0  # first order
+    scales = StepScales(overshoots=frozenset(["friction_force_peak", "friction_ratio_peak"] * can_overshoot(
+        model.friction)))
 
     def rule(*values) -> dict:
-        return {name: times * error for name, error in step_error(*values, steps).items()}
+        return {name: times * error for name, error in step_error(*values, steps, scales).items()}
 
     out, meshed = [Coarser((half, few), rule, of="steps")], coarse is not None
     if meshed and slips_by_elements(model):

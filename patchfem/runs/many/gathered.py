@@ -24,7 +24,7 @@ from ...model.model import Model
 from ...model.source import placed
 from ...response import run_events
 from ...response.coarser import left_open
-from ...response.errors import change, step_error
+from ...response.errors import StepScales, change, step_error
 from ...response.measures import energy_balance
 from ...response.reasons import SHARED
 from ...response.ringing import LEAST_PERIODS, SHORT
@@ -252,8 +252,8 @@ def _with_errors(models: list, held: list, reads: tuple, counts: tuple) -> tuple
                       for one in whole)
         few = _left_out(a, TWICE * held[case].error, held[case].fine, fine.book["passed"][case])
         own = fine.own[case]
-        parts.append((step_error(a, b, c, steps, model.rig.displacement, model.friction.bond_length), change(c, d), few,
-                      own))
+        scales = StepScales(model.rig.displacement, model.friction.bond_length)
+        parts.append((step_error(a, b, c, steps, scales), change(c, d), few, own))
         for name, value in a.items():
             errors[name][case] = sum(part.get(name, abs(value)) for part in parts[-1][:3]) + own.get(name, 0.0)
     ends = np.arange(cycles - 1, -1, -window)[::-1]

@@ -16,9 +16,19 @@ import numpy as np
 
 from ...dynamics.events.elements import JOINED
 from ...effects import NO_WAVEFORM, has
+from ...friction.record import can_overshoot
 from ...model.model import Model
 from ...response.coarser import Coarser, coarser_space
-from ...response.errors import cells_error, change, modes_error, pieces_error, step_error, tolerance_error
+from ...response.errors import (
+    StepScales,
+    cells_error,
+    change,
+    modes_error,
+    pieces_error,
+    step_error,
+    tolerance_error,
+)
+from ...response.rows import of_number
 from ...scene.rules import methods
 from ...scene.rules.draft import acts, pinned
 from ...slip import shear_modes
@@ -205,10 +215,12 @@ def _fewer(numerics, share: int):
 
 def _march_in_time(model: Model, numerics, patch) -> list:
     """The coarser runs of the march in time: half and a quarter of the steps."""
-    size, f = model.rig.displacement, model.friction
+    f = model.friction
     turn = f.bond_length if f is not None and has(f.law, "bonds") else 0.0
-    return [Coarser(_halves(numerics, patch), lambda *values: step_error(*values, numerics.steps, size, turn),
-                    of="steps")]
+    overshoots = frozenset(of_number("friction_force_peak", number) for number, one in enumerate(model.rig.interfaces)
+                           if can_overshoot(one.numbers))
+    scales = StepScales(model.rig.displacement, turn, overshoots)
+    return [Coarser(_halves(numerics, patch), lambda *values: step_error(*values, numerics.steps, scales), of="steps")]
 
 
 def _halves(numerics, patch) -> tuple:

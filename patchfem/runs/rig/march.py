@@ -7,7 +7,9 @@ import numpy as np
 from ...dynamics.integrated import Integrated
 from ...dynamics.march import march as engine
 from ...effects import has
+from ...friction.record import law_from
 from ...response.ends import end_error
+from ...response.inside_steps import motion_inside_steps
 from ...response.measures import peaks_between, step_harmonic
 from ...response.rows import lateral_work
 from ...response.spectrum import friction_harmonic, motion_harmonic
@@ -17,7 +19,7 @@ from . import strips
 from .interface import contact_of
 from .lists import quadrature_of
 from .reading import Reader
-from .solution import Solution, sampled_loop
+from .solution import Solution, borne, sampled_loop
 
 LATE = 1.5  # times what an end beside the asked one changes to first order
 
@@ -93,12 +95,20 @@ class MarchReader(Reader):
             return {}
         rig, jumps = self.model.rig, self.contact.set_valued
         out = {"loop": self._loop(run, drive), "still": self.held if jumps else 0.0,
-               "together": rig.strips_slide_apart}
+               "together": rig.strips_slide_apart, "inside": self.inside_steps}
         if not (stuck and jumps):
             return out
         moving = rig.modes.mass * peak_speed(drive, rig.start)**2  # its energies are round-off of such a one
         return out | {"book": run.ledger | {"power": run.ledger["power"] + moving},
                       "known": {"slip_start_phase": None, "stick_fraction": 1.0}}  # what moves in it does not slide
+
+    def inside_steps(self, window, number: int):
+        """Return the window of an interface with samples inside the steps, if the force of its law changes there."""
+        model, one = self.model, self.model.rig.interfaces[number]
+        if not has(one.numbers.law, "overshoots") or model.grooves is not None or model.rig.strips_slide_apart:
+            return window
+        load = borne(model, self.patch) if one.load is None else one.load
+        return motion_inside_steps(window, law_from(one.numbers, load), load)
 
     def _loop(self, part, drive) -> tuple | None:
         """(first harmonics of slide and force, work per cycle) of the first interface, or of all strips.
