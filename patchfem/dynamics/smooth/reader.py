@@ -118,14 +118,18 @@ class Parts:
     def holds(self) -> tuple:
         """(time [s] in which less than SHARE of the slide is irreversible, times [s] at which more of it begins to be).
 
-        Where the slide turns neither moves; there the next place of the step decides.
+        Where the slide turns neither moves, and what is computed of them is round-off: there the place beside it in the
+        step decides. A step that lies in such a place as a whole shows nothing.
         """
         slip, slide = (places_of(self.of(name), SLOPES) for name in ("slip", "slide"))
         moves, slides = (np.abs(places_of(rates, CLOSE)) for rates in (slip, slide))
         rest = STILL * slides.max(axis=1, keepdims=True) + ROUND * np.abs(self.response.slide).max(initial=0.0)
-        seen, still = moves - SHARE * slides, slides <= rest
-        for side, inner in ((0, 1), (-1, -2)):
-            seen[:, side] = np.where(still[:, side], seen[:, inner], seen[:, side])
+        still = slides <= rest
+        shows = ~still.all(axis=1)
+        still, slip, slide, begin, length = (one[shows] for one in (still, slip, slide, self.begin, self.length))
+        last_moving = np.maximum.accumulate(np.where(still, 0, np.arange(FINER.size)), axis=1)
+        beside = np.maximum(last_moving, np.argmin(still, axis=1)[:, None])
+        seen = np.take_along_axis((moves - SHARE * slides)[shows], beside, axis=1)
         before, after = seen[:, :-1], seen[:, 1:]
         turns = (before < 0) != (after < 0)
         steps, at = np.nonzero(turns)
@@ -137,9 +141,9 @@ class Parts:
             low, high = np.where(same, middle, low), np.where(same, high, middle)
         part = (before < 0) * np.diff(FINER) * ~turns
         part[steps, at] = np.where(below, low - FINER[at], FINER[at + 1] - low)
-        times = self.begin[steps] + low * self.length[steps]
+        times = begin[steps] + low * length[steps]
         between = np.flatnonzero((seen[:-1, -1] < 0) & (seen[1:, 0] >= 0))
-        return float((part.sum(axis=1) * self.length).sum()), np.append(times[below], self.begin[between + 1])
+        return float((part.sum(axis=1) * length).sum()), np.append(times[below], begin[between + 1])
 
 
 def integrated(response, drive, ends) -> tuple:
