@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
+from chromium import Chromium, program
 
 import patchfem as pf
 from patchfem.effects import EFFECTS
@@ -125,10 +126,24 @@ def test_always_a_dead_link_a_mute_picture_and_a_failing_command_are_found(tmp_p
 
 @pytest.mark.slow
 @pytest.mark.skipif(find_spec("myst_nb") is None, reason="the site is built where patchfem[docs] is installed")
-def test_always_the_site_is_built_without_a_warning_and_without_a_dead_link(tmp_path):
+def test_always_the_site_is_built_without_a_warning_and_without_a_dead_link(tmp_path, tmp_path_factory):
     words = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-c", str(SITE), str(ROOT), str(tmp_path)]
     done = subprocess.run(words, capture_output=True, text=True, env=os.environ)
     assert done.returncode == 0, done.stderr[-2000:]
     tried, dead = check.links(tmp_path)
     assert dead == check.mute(tmp_path) == [] and tried > 1000
     assert [text for page in check.PAGES for text in check.faults(page)] == []
+    if program() is not None:
+        assert console_errors(tmp_path, tmp_path_factory.mktemp("chromium")) == []
+
+
+def console_errors(site: Path, home: Path) -> list:
+    """Return what the console says on the first page of a visit, and the words that are broken at 390 px."""
+    browser = Chromium(home)
+    wrong = []
+    for name in ("README", "studies/README", "studies/site/start", "patchfem/scene/MEASURES"):
+        page = browser.visit(site / f"{name}.html", 390)
+        wrong += [f"{name}: {fault}" for fault in page.faults]
+        wrong += [f"{name}: the word {word} is broken" for word in page.broken_words()]
+    browser.close()
+    return wrong

@@ -58,6 +58,8 @@ class Chromium:
         if said.get("method") == "Runtime.exceptionThrown":
             what = said["params"]["exceptionDetails"]
             self.faults.append(what.get("exception", {}).get("description") or what["text"])
+        if said.get("method") == "Runtime.consoleAPICalled" and said["params"]["type"] == "error":
+            self.faults.append(" ".join(str(part.get("value", "")) for part in said["params"]["args"]))
         if "method" in said:
             self.events.append(said["method"])
         return said
@@ -79,6 +81,14 @@ class Chromium:
         self.ask(method, **params)
         while event not in self.events:
             self._next()
+
+    def visit(self, path: Path, width: int = 1200, height: int = 900) -> "Chromium":
+        """Show a page of a folder, whose scripts and styles lie beside it."""
+        self._fresh()
+        self.sized(width, height)
+        self.faults = []
+        self.asked("Page.loadEventFired", "Page.navigate", url=path.as_uri())
+        return self
 
     def opened(self, text: str, width: int = 1200, height: int = 900, dark: bool = False) -> "Chromium":
         """Show a page and wait until its pictures stand."""
@@ -118,6 +128,25 @@ class Chromium:
                 [...document.querySelectorAll('.chart')].every((one) => one.firstElementChild?.shadowRoot);
            const look = () => stands() ? requestAnimationFrame(() => requestAnimationFrame(done)) : setTimeout(look, 9);
             look(); setTimeout(done, 8000); })""")
+
+    def broken_words(self) -> list:
+        """Return the words outside code that a line break divides."""
+        return self.js("""(() => {
+            const words = [];
+            const walk = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+            while (walk.nextNode()) {
+                const node = walk.currentNode;
+                if (node.parentElement.closest('pre, code, script, style, math')) continue;
+                for (const found of node.data.matchAll(/[A-Za-z]{4,}/g)) {
+                    const range = document.createRange();
+                    range.setStart(node, found.index);
+                    range.setEnd(node, found.index + found[0].length);
+                    const lines = new Set([...range.getClientRects()].filter((box) => box.width).map((box) => box.top));
+                    if (lines.size > 1) words.push(found[0]);
+                }
+            }
+            return words;
+        })()""")
 
     def sized(self, width: int, height: int) -> None:
         self.ask("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=False)
