@@ -78,9 +78,8 @@ def pressed(before: Model, after: Model, title: str, say: Callable | None = None
 
 def _side(model: Model, say) -> Side:
     result = run(plan(model), say)
-    outcome = result.outcome
-    x = np.array(surface_of(result.patch, result.fields).x)
-    return Side(dict(result.measures), str(outcome), outcome.sentence, x,
+    outcome, surface = result.outcome, surface_of(result.patch, result.fields)
+    return Side(dict(result.measures), str(outcome), outcome.sentence, np.array(surface.x),
                 np.array(result.fields["normal_stress"][0]), [*result.warnings, *result.extra["notes"]])
 
 

@@ -223,8 +223,9 @@ def _of_mesh(data: dict) -> str:
     if sigma.size == mine.size:
         return ""
     unit, scale = scales.axis_unit([sigma.max()], "Pa")
-    return (f" The stress is computed on a mesh, on which the largest pressure is {mine.max() * scale:.3g} {unit}; "
-            f"near the narrow pressure peaks of up to {sigma.max() * scale:.3g} {unit} it is larger.")
+    return (f" The stress is computed on a mesh, on which the largest pressure is "
+            f"{mine.max() * scale:.3g} {unit}; near the narrow pressure peaks of up to "
+            f"{sigma.max() * scale:.3g} {unit} it is larger.")
 
 
 def _at_corner(bodies: dict) -> str:

@@ -48,7 +48,10 @@ def draw(dataset, measure: str, onto=None):
 
 
 def _line(axis, x, measured: tuple, hollow, style: dict) -> None:
-    """Draw values (n,) over x with errors (2, n) below and above; points where `hollow` (n,) holds are not filled."""
+    """Values (n,) with their errors (2, n), below and above, over x.
+
+    The points for which `hollow` (n,) holds are not filled.
+    """
     values, errors = measured
     axis.errorbar(x, values, errors, marker="o", markerfacecolor="white", capsize=2, **style)
     axis.plot(x[~hollow], values[~hollow], "o", color=style["color"], zorder=3)

@@ -34,7 +34,8 @@ OVERLAP = 1e-6  # of what the pressure moves: the largest overlap of a solved co
 class PointSolution(NamedTuple):
     """Static measures from points of a trace, and the finest level that was solved.
 
-    measures: name -> (value, error), {} where a level is not solved; surface, stretches: those of `Patch`, then None.
+    measures: name -> (value, error), {} where a level is not solved; surface, stretches: as `Patch` has
+    them, None where a level is not solved.
     """
 
     measures: dict

@@ -1,0 +1,104 @@
+"""A rough measured trace has one answer: by run and by sweep, in the measures and in the fields."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+from command_line import cli
+
+import patchfem as pf
+
+LENGTH, SAMPLES = 2e-3, 401
+SCENE = """\
+[contact]
+length = "2 mm"
+width = "4 mm"
+height = "1 mm"
+load = "20 N"
+substrate = "steel"
+[contact.tilt]
+angle = "50 urad"
+[contact.profile]
+file = "trace.csv"
+[accuracy]
+tolerance = 1e-1
+"""
+
+
+@pytest.fixture(scope="module")
+def scene(tmp_path_factory):
+    """A scene under waves with noise of 50 nm, which no mesh that is worth its time resolves."""
+    folder = tmp_path_factory.mktemp("rough")
+    x = np.linspace(-LENGTH / 2, LENGTH / 2, SAMPLES)
+    noise = np.random.default_rng(5).standard_normal(SAMPLES)
+    z = 0.2e-6 * np.sin(2 * np.pi * x / 0.7e-3) + 50e-9 * noise
+    rows = "\n".join(f"{a * 1e3:.5f},{b * 1e6:.6f}" for a, b in zip(x, z))
+    (folder / "trace.csv").write_text(f"x [mm],z [um]\n{rows}\n")
+    (folder / "scene.toml").write_text(SCENE)
+    return folder / "scene.toml"
+
+
+@pytest.fixture(scope="module")
+def result(scene):
+    return pf.run(scene)
+
+
+def test_a_sweep_has_the_numbers_of_the_run(scene, result):
+    """On the mesh that all cases share the peak was less than half of that of the run, outside both errors."""
+    sweep = pf.sweep(scene, {"contact.load": ["20 N", "30 N"]})
+    for name, one in result.measures.items():
+        assert float(sweep[name][0]) == pytest.approx(one.value, rel=1e-9, abs=one.floor), name
+        assert float(sweep[f"{name}_error"][0]) == pytest.approx(one.error, rel=1e-6, abs=one.floor), name
+
+
+def test_fields_pages_and_stretches_show_the_peak_and_the_contact_of_the_measures(result, tmp_path):
+    peak, fraction = result.measures["pressure_peak"], result.measures["contact_fraction"]
+    data = result.to_xarray()
+    assert abs(float(data.normal_stress.max()) - peak.value) <= peak.error
+    assert float((data.weight * data.normal_stress[0]).sum()) == pytest.approx(20.0, rel=1e-10)
+    assert not (data.normal_stress > 0)[0].values[data.gap[0] > 0].any()
+    result.save(tmp_path / "out")
+    with h5py.File(tmp_path / "out" / "fields.vtkhdf") as file:
+        found = []
+        file.visititems(lambda name, one: found.append(one[()]) if name.endswith("normal_stress") else None)
+    assert np.nanmax(np.concatenate([one.ravel() for one in found])) == pytest.approx(
+        float(data.normal_stress.max()), rel=1e-3)
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
+    assert np.diff(summary["contact"]["stretches"]).sum() / LENGTH == pytest.approx(
+        fraction.value, abs=fraction.error)
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert "near the narrow pressure peaks of up to" in page
+    assert any("whose largest pressure is" in note for note in result.notes)
+
+
+def test_how_a_trace_is_read_is_a_note_without_round_off(scene, tmp_path):
+    """A trace from 0 to 3 mm in steps of 1.7 um, printed to 10 nm, on pieces of 2 mm."""
+    x = np.arange(1765) * 1.70123e-6
+    rows = "\n".join(f"{a * 1e3:.5f},{0.01 * np.cos(2e4 * (a - x[-1] / 2)):.6f}" for a in x)
+    (tmp_path / "trace.csv").write_text(f"x [mm],z [um]\n{rows}\n")
+    (tmp_path / "scene.toml").write_text(SCENE)
+    found = pf.run(tmp_path / "scene.toml")
+    assert not any("trace.csv" in text for text in found.warnings)
+    told = [text for text in found.notes if "trace.csv" in text]
+    assert any("x is rounded to 10 nm" in text for text in told)
+    assert any("x runs from 0 um to 3.001 mm in the file" in text for text in told)
+
+
+def test_a_value_that_is_not_known_is_not_done(tmp_path):
+    """A contact far narrower than its elements."""
+    text = SCENE.split("[contact.tilt]")[0].replace("20 N", "1 N") + """\
+element_size = "0.2 mm"
+[contact.crown]
+radius = "2 mm"
+"""
+    (tmp_path / "scene.toml").write_text(text)
+    ended = cli("run", tmp_path / "scene.toml", "-o", tmp_path / "out", "--no-page")
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
+    assert (ended.code, summary["outcome"]) == (3, "not_converged")
+    assert "is as large as the value, so it is not known" in ended.out and "0 to" in ended.out
+    assert any("at least its value" in text for text in summary["warnings"])
+    sweep = pf.sweep(tmp_path / "scene.toml", {"contact.load": ["1 N", "1.1 N"]})
+    assert set(sweep.outcome.values.tolist()) == {"not_converged"}
+    bars = pf.plot.sweep(sweep, "pressure_peak").containers[0].lines[2][0]
+    assert min(segment[:, 1].min() for segment in bars.get_segments()) >= 0
