@@ -14,6 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from scipy.interpolate import CubicHermiteSpline
+from scipy.optimize import brentq
 
 from ..core import NotConverged, PatchfemError, Start, say
 from ..dynamics import limit_cycles
@@ -42,6 +43,7 @@ from ..runs.rig import decays, numerics
 from ..runs.rig.engines import ENGINES, PIECES, SMOOTH
 from ..runs.rig.plan import held_by
 from ..structure import drives
+from ..structure.drive_sizes import decay_rate
 
 WAYS = ("balance", "decay", "quasi-static")
 LADDER = (9, 19, 39)  # harmonics that are tried, each time with four times the samples of a cycle
@@ -72,6 +74,7 @@ BESIDE = 1.15  # the release over the largest amplitude: the first swings still 
 HIGHER, BELOW = 3, 0.8  # releases from higher up; share of the smallest amplitude down to which coarser runs come, too
 FARTHEST, SWINGS = 8.0, 3.0  # of a start, a higher one at most; free swings within which a decay shows itself
 FINER = 3  # doublings of the steps of a decay
+FLUTTER_TOL = 1e-8  # relative error of the amplitude at which the damping is zero, below the digits that are printed
 RINGS, HEARD = 0.1, 1e-3  # of a decay's amplitude, motion of other modes from which it is no more its own, is told
 HOLDS = 0.999  # of its stiffness without slip, that of a contact in whose motion no modes are coupled by slip
 TOLD, WITH_COARSER = 20.0, 2.0  # seconds, from which a decay is told beforehand; times its own, with its coarser runs
@@ -547,8 +550,12 @@ def _turned(joint: Joint, amplitudes) -> Curve:
     frequency, damping = np.array([(c.omega / (2 * np.pi), zeta) for _, c, zeta in kept]).T
     loss = 4 * kinetic * a * abs(row[joint.mode] / modes.output[joint.mode]) if modes.omega.size == 1 else \
         np.full(a.size, np.nan)
-    error = np.array([c.error / c.amplitude for _, c, _ in kept])
-    return Curve(a, frequency, (error + ROUND) * frequency, damping, (error + ROUND) * damping, loss)
+    relative_error = np.array([c.error / c.amplitude for _, c, _ in kept])
+    # the damping of the structure does not depend on the amplitude, so only that of friction takes its error
+    own_rate = modes.dampers[joint.mode, joint.mode]
+    friction_damping = damping - own_rate / (4 * np.pi * frequency)
+    damping_error = relative_error * np.abs(friction_damping) + ROUND * np.abs(damping)
+    return Curve(a, frequency, (relative_error + ROUND) * frequency, damping, damping_error, loss)
 
 
 def _static(joint: Joint, amplitudes) -> Curve:
@@ -658,7 +665,7 @@ def _loop(joint: Joint, slide: float, frequency: float, cycles: float) -> tuple:
 
 def _decayed(joint: Joint, amplitudes, progress=None) -> Curve:
     """Curve of a release from the largest amplitude, read from turn to turn, as far as it comes down."""
-    what, how, found = _come_down(joint, amplitudes, progress)
+    n_decaying, (what, how, found) = _come_down_from_largest_decaying(joint, amplitudes, progress)
     engine, tolerance = ENGINES[how.engine], joint.model.accuracy.tolerance
     for tried in range(FINER + 1):
         best, reading, error = _with_errors(joint, what, how, found, amplitudes)
@@ -686,6 +693,9 @@ def _decayed(joint: Joint, amplitudes, progress=None) -> Curve:
                          f"other modes is more than {100 * RINGS:.0f} % of its amplitude; from there on the values "
                          f"with slip are left out ({rings.sum()} amplitude{'s' * bool(rings.sum() > 1)}), because they "
                          "do not describe this mode alone"]
+    if n_decaying < amplitudes.size:
+        notes = [*notes, f"method decay: a release from {say(amplitudes[n_decaying], 3)} grows, because the negative "
+                         "damping supplies more energy than friction dissipates"]
     unknown = known & np.isnan(others)
     if unknown.any() and joint.modes.omega.size > 1:
         lacks = "with rigid friction it is not computed" if _rigid(joint.model) else \
@@ -743,6 +753,32 @@ def _holds(group: Group, one) -> np.ndarray:
     return np.real(force * np.conj(slide)) >= HOLDS * group.stiffness() * np.abs(slide)**2
 
 
+class _GrowingRelease(NotConverged):
+    """A release whose swings grow, because a negative damping supplies more than friction dissipates."""
+
+
+def _come_down_from_largest_decaying(joint: Joint, amplitudes, progress=None) -> tuple:
+    """Run `_come_down` from the largest of the rising amplitudes (k,) [m] whose release does not grow.
+
+    Returns the number of amplitudes up to that one, and what `_come_down` returns.
+    """
+    for count in range(amplitudes.size, 0, -1):
+        try:
+            return count, _come_down(joint, amplitudes[:count], progress)
+        except _GrowingRelease:
+            continue
+    raise NotConverged(f"a release from {say(amplitudes[0], 3)} grows, because the negative damping supplies more "
+                       "energy than friction dissipates; give smaller amplitudes with --amplitudes")
+
+
+def _grows(joint: Joint, found) -> bool:
+    """Whether the swings of a release in a Solution become larger along the held shape."""
+    motion, shape = found.response, joint.held[1]
+    _, places = turns(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
+    swings = np.abs(np.diff(places))
+    return decay_rate(joint.modes) < 0 and swings.size > 2 and swings[-1] > swings[0]
+
+
 def _come_down(joint: Joint, amplitudes, progress=None) -> tuple:
     """(Model, numerics, Solution) of a release that is long enough to come down from the largest amplitude to the
     smallest, as far as it swings on. It begins so high that its first reading lies above the largest. progress: told
@@ -762,6 +798,8 @@ def _come_down(joint: Joint, amplitudes, progress=None) -> tuple:
             progress(f"decay over {cycles} cycles: about {WITH_COARSER * each * cycles:.2g} s of computing time")
         found = ENGINES[how.engine].run(what, how, joint.patch, 0, None, None)
         each = found.seconds / cycles
+        if _grows(joint, found):
+            raise _GrowingRelease("the release grows")
         read = _read(joint, found)
         if not read.time.size and (cycles >= most or found.response.time[-1] >= swing):
             return what, how, found
@@ -884,8 +922,9 @@ def _put_together(joint: Joint, wanted, curves: dict, missing: dict) -> Backbone
     own, (stuck, off) = _free_frequency(joint), _stuck_frequency(joint)
     first = next((curves[way] for way in ("quasi-static", "balance") if way in curves), None)
     micro, gross = _exponents(joint, first) if first is not None and not joint.linear else (None, None)
-    edge = next((found for one in curves.values() if (found := _edge(one)) is not None), None)
-    return Backbone(name, own, stuck, curves, missing, micro, gross, edge,
+    flutter = next((found for way, curve in curves.items()
+                    if (found := _flutter_amplitude(joint, way, curve)) is not None), None)
+    return Backbone(name, own, stuck, curves, missing, micro, gross, flutter,
                     (*_unrubbed(joint), *_gaps(wanted, curves), *([] if joint.linear else _differences(curves)),
                      *_regimes(joint, wanted, micro), *_unmeshed(joint),
                      *(note for one in curves.values() for note in one.notes),
@@ -956,14 +995,32 @@ def _regimes(joint: Joint, wanted, micro: float | None) -> list:
             "or a smaller accuracy.tolerance"]
 
 
-def _edge(one: Curve) -> float | None:
-    """Largest amplitude [m] at which the damping falls through 0, straight between the points."""
-    falls = np.flatnonzero((one.damping[:-1] > 0) & (one.damping[1:] <= 0))
+def _flutter_amplitude(joint: Joint, way: str, curve: Curve) -> float | None:
+    """Find the largest amplitude [m] at which the damping falls through zero.
+
+    The curve gives the two amplitudes between which the root lies. Brent's method on damping × amplitude, which is
+    a straight line under Coulomb friction, computes further points of the same curve. None without such a root.
+    """
+    falls = np.flatnonzero((curve.damping[:-1] > 0) & (curve.damping[1:] <= 0))
     if not falls.size:
         return None
-    k = int(falls[-1])
-    share = one.damping[k] / (one.damping[k] - one.damping[k + 1])
-    return float(one.amplitude[k] * (one.amplitude[k + 1] / one.amplitude[k])**share)
+    bracket = slice(falls[-1], falls[-1] + 2)
+    low, high = np.log(curve.amplitude[bracket])
+    loss_low, loss_high = (curve.damping * curve.amplitude)[bracket]
+    known = {low: loss_low, high: loss_high}
+
+    def net_loss(log_amplitude: float) -> float:
+        if log_amplitude not in known:
+            amplitude = np.array([np.exp(log_amplitude)])
+            point = _curve(joint._replace(errors=False), amplitude, way)
+            known[log_amplitude] = float(point.damping[0] * amplitude[0])
+        return known[log_amplitude]
+
+    try:
+        return float(np.exp(brentq(net_loss, low, high, xtol=FLUTTER_TOL)))
+    except (NotConverged, PatchfemError):  # no further point is known: the chord between the two points
+        amplitudes = curve.amplitude[bracket]
+        return float(amplitudes[0] + loss_low / (loss_low - loss_high) * (amplitudes[1] - amplitudes[0]))
 
 
 def _unrubbed(joint: Joint) -> tuple:

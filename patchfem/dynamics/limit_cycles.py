@@ -31,6 +31,8 @@ LOST = ("limit cycles are looked for among free motions of rising amplitude, and
 ROUND = 1e-9  # of an amplitude, what round-off and the tolerances of the solves leave
 SHUT = 1e-8  # share of the swing in a half period, by which a slide at rest moves on
 SECANTS = 12  # steps to the rate that balances an amplitude
+MAX_FIRST_RATIO = 2.0  # damping ratio of friction by den Hartog's balance; where it is larger, friction is 3 times
+                       # the elastic force at the turn or more, and the slide sticks there
 FEW = 9  # harmonics of the first answer; the second, of twice as many, shows its error
 
 
@@ -91,7 +93,10 @@ def relay_backbone(modes: ModalBasis, row, forces: tuple, amplitudes, mode: int)
 
     own = float(modes.dampers[mode, mode])
     first = 4 * forces[0] * abs(row[mode] * modes.output[mode]) / (np.pi * modes.mass * modes.omega[mode])
-    return [_balanced_at(cycle, float(a), own, first / float(a)) if first else None for a in amplitudes]
+    rates = first / np.asarray(amplitudes, float)
+    max_rate = 2 * MAX_FIRST_RATIO * modes.omega[mode]
+    return [_balanced_at(cycle, float(a), own, float(rate)) if 0 < rate <= max_rate else None
+            for a, rate in zip(amplitudes, rates)]
 
 
 def _balanced_at(cycle, amplitude: float, own: float, more: float) -> tuple | None:

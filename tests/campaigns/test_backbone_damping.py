@@ -1,0 +1,119 @@
+"""Backbones of modes whose damping is negative, zero or positive: each law, each method, with picture and page."""
+
+import numpy as np
+import pytest
+
+import patchfem as pf
+from patchfem.campaigns.backbone import WAYS, backbone
+from patchfem.export import backbone as backbone_files
+from patchfem.export.drawing import pictures
+from patchfem.runs import joint
+
+LAWS = {
+    "coulomb": 'law = "coulomb"',
+    "kinetic": 'law = "coulomb"\nkinetic = 0.2',
+    "tanh": 'law = "tanh"\nreference_speed = "3 mm/s"',
+    "elastic-plastic": 'law = "elastic-plastic"\nbond_length = "20 um"',
+    "bonds": 'law = "nonlocal"\nbond_length = "20 um"',
+    "iwan": 'law = "iwan"\nstiffness = "3e6 N/m"\nchi = -0.5\nbeta = 0.5',
+    "bouc-wen": 'law = "bouc-wen"\nstiffness = "3e6 N/m"\nexponent = 1.0\nshape = 0.5',
+    "lugre": 'law = "lugre"\nstiffness = "3e6 N/m"\nkinetic = 0.2\nstribeck_speed = "1 mm/s"\nviscous = "1 N s/m"',
+}
+FAST_LAWS = ("coulomb", "elastic-plastic")
+DAMPING = (-0.011, 0.0, 0.005)
+OTHER_MODE = """[[structure.mode]]
+name = "yaw"
+frequency = "170 Hz"
+damping = -0.004
+slide = 0.4
+output = 0.5
+"""
+AMPLITUDES = np.geomspace(1e-5, 8e-3, 5)
+
+
+def rig(law: str, damping: float, other_mode: str = "", drive: str = ""):
+    """A block of 0.5 kg at 100 Hz on friction of at most 30 N, as a Model."""
+    drive = drive or 'kind = "base"\nfrequency = "100 Hz"\nacceleration = "1 g"'
+    return joint.freed(pf.build(f"""
+[normal]
+load = "100 N"
+[friction]
+{LAWS[law]}
+static = 0.3
+[structure]
+moving_mass = "0.5 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "100 Hz"
+damping = {damping}
+slide = 1.0
+{other_mode}[drive]
+{drive}
+cycles = 20
+"""))
+
+
+def written(found) -> str:
+    """The page of a backbone, after its picture, its table and its netCDF contents have been made."""
+    if found.curves:
+        pictures.draw(backbone_files.drawn(found))
+    backbone_files.contents(found)
+    backbone_files.lines_of(found)
+    return backbone_files.page(found, "title")
+
+
+def check_ends_well(law: str, damping: float, way: str, other_mode: str) -> None:
+    """Check that a method gives a curve with errors, or a sentence, and that both can be written."""
+    found = backbone(rig(law, damping, other_mode), "", AMPLITUDES, (way,))
+    assert "<html" in written(found)
+    assert (way in found.curves) != (way in found.missing)
+    for curve in found.curves.values():
+        for error in (curve.frequency_error, curve.damping_error):
+            assert np.isfinite(error).all() and (error >= 0).all()
+        assert (curve.frequency > 0).all() and np.isfinite(curve.damping).all()
+
+
+@pytest.mark.parametrize("damping", DAMPING)
+@pytest.mark.parametrize("law", FAST_LAWS)
+def test_every_sign_of_damping_ends_well(law, damping):
+    check_ends_well(law, damping, "balance", "")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("other_mode", ("", OTHER_MODE))
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("damping", DAMPING)
+@pytest.mark.parametrize("law", LAWS)
+def test_every_law_sign_of_damping_and_method_ends_well(law, damping, way, other_mode):
+    check_ends_well(law, damping, way, other_mode)
+
+
+@pytest.mark.parametrize("law", FAST_LAWS)
+def test_exact_viscous_damping_adds_to_that_of_friction(law):
+    """The free motion that a damping keeps up does not depend on the viscous part of one mode: zeta_s f_0/f is added."""
+    negative, positive = (backbone(rig(law, damping), "", AMPLITUDES, ("balance",)).curves["balance"]
+                          for damping in (-0.011, 0.005))
+    assert negative.frequency == pytest.approx(positive.frequency, rel=1e-7)
+    expected = positive.damping - 0.016 * 100 / positive.frequency
+    assert negative.damping == pytest.approx(expected, abs=1e-7)
+
+
+@pytest.mark.parametrize("law", FAST_LAWS)
+def test_the_damping_is_zero_at_the_limit_cycle_of_a_run(law):
+    """A run without a drive finds the unstable limit cycle from its own equations, without a backbone."""
+    found = backbone(rig(law, -0.02), "", AMPLITUDES, ("balance",))
+    free = pf.run(rig(law, -0.02, drive='kind = "free"\ndisplacement = "0.1 mm"'))
+    assert found.flutter == pytest.approx(free.measures["flutter_amplitude"].value, rel=1e-4)
+    assert "the mode gains energy" in written(found)
+
+
+def test_a_decay_below_the_limit_cycle_is_read_where_larger_releases_grow():
+    """The largest amplitudes are left out with a sentence; below, the decay loses what the balance says.
+
+    One swing loses up to 40 % of the amplitude here, so both agree to a few percent only.
+    """
+    found = backbone(rig("elastic-plastic", -0.02), "", np.geomspace(1e-3, 8e-3, 4), ("balance", "decay"))
+    decay, balance = found.curves["decay"], found.curves["balance"]
+    assert decay.amplitude[-1] < found.flutter < balance.amplitude[-1]
+    assert decay.damping == pytest.approx(balance.damping[balance.amplitude <= decay.amplitude[-1]], rel=0.05)
+    assert any("grows, because the negative damping" in note for note in found.notes)
