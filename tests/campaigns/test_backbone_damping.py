@@ -90,7 +90,8 @@ def test_every_law_sign_of_damping_and_method_ends_well(law, damping, way, other
 
 @pytest.mark.parametrize("law", FAST_LAWS)
 def test_exact_viscous_damping_adds_to_that_of_friction(law):
-    """The free motion that a damping keeps up does not depend on the viscous part of one mode: zeta_s f_0/f is added."""
+    """The free motion that a damping keeps up does not depend on the viscous part of one mode: zeta_s f_0/f is
+    added."""
     negative, positive = (backbone(rig(law, damping), "", AMPLITUDES, ("balance",)).curves["balance"]
                           for damping in (-0.011, 0.005))
     assert negative.frequency == pytest.approx(positive.frequency, rel=1e-7)
