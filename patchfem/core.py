@@ -241,7 +241,7 @@ class Measure:
     """One number with its unit, its numerical error (half-width; None where none is estimated) and what it means.
 
     `str` of it is the value and its error in the unit that people read: ``14.808 ± 0.044 um``. reason: why there is no
-    value, where it is None.
+    value, where it is None. engine: what computed it, in words; "" where the engine of the run did.
     """
 
     value: float | None
@@ -250,6 +250,7 @@ class Measure:
     floor: float = 0.0
     text: str = ""
     reason: str = ""
+    engine: str = ""
 
     def beyond(self, tolerance: float) -> float:
         """Error over what is `allowed` [1], above 1 where it misses the tolerance; 0 without a value or an error."""

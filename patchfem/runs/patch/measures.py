@@ -10,6 +10,7 @@ from ...contact import edges
 from ...core import Measure, PatchfemError, allowed, say
 from ...mesh.nested import plan_of
 from ...scene.keys.contact import outermost
+from ..results import patch_rows
 from ..results.patch_rows import DECISIVE, TABLE
 from .condensed import pair_beside
 from .limits import Limit, edge_limit, limit
@@ -121,7 +122,8 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
         out = _cornered(out, fine, series[0])
     for name, (value, error) in fine.sharper.items():
         if error < out[name].error:
-            out[name] = replace(out[name], value=value, error=error)
+            engine = patch_rows.SPECTRAL if fine.averaging is None else patch_rows.ON_POINTS
+            out[name] = replace(out[name], value=value, error=error, engine=engine)
     return _bounded(_unbounded(fine), out)
 
 
@@ -166,16 +168,23 @@ def combined(series: list, least: dict, nested: bool = True, tolerance: float | 
     mine, floors, names = series[-1], _floors(), list(series[-1])
     if len(series) == 1 or not mine["normal_load"] > 0:
         error = None if len(series) == 1 else 0.0
-        return {name: Measure(value, TABLE[name].unit, error, floors[name]) for name, value in mine.items()}
+        return {name: Measure(value, TABLE[name].unit, error, floors[name], engine=patch_rows.ON_FINEST_MESH)
+                for name, value in mine.items()}
     known, (hidden, floor) = np.array([[one[name] for name in names] for one in series]), \
         np.array([(least.get(name, 0.0), floors[name]) for name in names]).T
     wanted = np.inf if tolerance is None else allowed(tolerance, known[-1], floor)
     best, error = settled(known, hidden, wanted, nested, rough, np.isin(names, edged))
-    out = {name: Measure(value, TABLE[name].unit, wide, floors[name]) for name, value, wide in
+    out = {name: Measure(value, TABLE[name].unit, wide, floors[name], engine=mesh_engine(value, mine[name]))
+           for name, value, wide in
            zip(names, best.tolist(), np.maximum(error, alike * np.abs(known[-1])).tolist())}
     if mine["pressure_peak"] > 0:
         out["loaded_fraction"] = _of_peak(out["loaded_fraction"], out["pressure_peak"])
     return out
+
+
+def mesh_engine(value: float, finest: float) -> str:
+    """Return what computed a value of nested meshes, of which the finest gives `finest`."""
+    return patch_rows.ON_FINEST_MESH if value == finest else patch_rows.EXTRAPOLATED
 
 
 def settled(known, hidden, wanted, nested: bool = True, rough: float = 1.0, edged=False) -> tuple:

@@ -102,7 +102,8 @@ class Together(NamedTuple):
     def measures(self, k: int, floors: Mapping | None = None) -> dict:
         """The measures of the k-th patch by name; floors: name -> (q,) in place of those of the table."""
         return {name: Measure(float(column[k]), TABLE[name].unit, float(self.errors[name][k]),
-                              TABLE[name].floor if floors is None else float(floors[name][k]))
+                              TABLE[name].floor if floors is None else float(floors[name][k]),
+                              engine=one_by_one.mesh_engine(column[k], self.levels[0].values[name][k]))
                 for name, column in self.values.items()}
 
 

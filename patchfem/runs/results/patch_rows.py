@@ -57,6 +57,12 @@ ROWS = (
     Row("roll", "rad", 1e-12, "rotation of the upper piece about x; needs [contact.strips]; a positive rotation "
                               "opens the gap at +y", group="patch"),
 )
+# what computes a static measure, as `numerics.measures` of summary.json names it
+ON_FINEST_MESH = "finite elements, finest mesh"
+EXTRAPOLATED = "finite elements, extrapolated over nested meshes"  # or of a coarser one of them, whose error is smaller
+SPECTRAL = "spectral elements of order 4"
+ON_POINTS = "points on layered half-spaces"
+WORN = "wear in jumps of cycles"
 # what a mesh is chosen for
 DECISIVE = ("pressure_peak", "contact_fraction", "approach", "rotation", "normal_stiffness", "tangential_stiffness")
 TABLE = {row.name: row for row in ROWS}

@@ -10,7 +10,7 @@ from ..patch.limits import limit
 from ..patch.measures import other_strips
 from ..patch.press import areas, pressed
 from ..patch.values import values
-from ..results.patch_rows import TABLE
+from ..results.patch_rows import TABLE, WORN
 from .evolve import THIN, mean_depth, worn_through
 from .slip import UNBOUNDED, of_point
 
@@ -139,11 +139,12 @@ def of_patch(model, found, motion: dict, estimate: bool = True) -> dict:
             meshes = limit([*(one[name] for one in reversed(others)), value])
             error = jumps[name] + share * max(value - before[name], 0.0) + float(meshes.error) + 1e-12 * value + \
                 more + STRIPS * times * abs(strips[name] - value)
-        out[name] = Measure(value, TABLE[name].unit, error, TABLE[name].floor)
+        out[name] = Measure(value, TABLE[name].unit, error, TABLE[name].floor, engine=WORN)
     left = found.moments[-1].values.get("groove_amplitude")
     if left is not None:
         lost, row = out["worn_volume"].error, TABLE["groove_amplitude"]
-        out[row.name] = Measure(left, row.unit, None if lost is None else lost / float(area.sum()), row.floor)
+        out[row.name] = Measure(left, row.unit, None if lost is None else lost / float(area.sum()), row.floor,
+                                engine=WORN)
     return out
 
 
@@ -207,7 +208,7 @@ def volume_of_point(model, result, estimate: bool = True) -> dict:
     path, miss = of_point(model, result.window, {name: m.value for name, m in result.measures.items()})
     value = model.wear.coefficient * model.point.load * path * model.wear.cycles
     error = (miss + slip_miss(result.measures) + 1e-12) * value if estimate else None
-    return {"worn_volume": Measure(value, TABLE["worn_volume"].unit, error, TABLE["worn_volume"].floor)}
+    return {"worn_volume": Measure(value, TABLE["worn_volume"].unit, error, TABLE["worn_volume"].floor, engine=WORN)}
 
 
 def frames(found, fields: dict, period: float) -> dict:

@@ -1,0 +1,50 @@
+"""summary.json names what computed each measure."""
+
+import pytest
+
+from patchfem.export.summary import summary_of
+from patchfem.runs.patch.values import values
+from patchfem.runs.results import patch_rows
+from patchfem.runs.run import run
+from patchfem.scene.scene import loads
+
+PATCH = """
+[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6.35 mm"
+load = "26 lbf"
+substrate = "Ti-8Al-1Mo-1V"
+[contact.crown]
+radius = "1 m"
+[accuracy]
+tolerance = {}
+"""
+
+
+@pytest.mark.parametrize("tolerance, engine", [
+    (1e-3, patch_rows.EXTRAPOLATED), (1e-5, patch_rows.SPECTRAL)])
+def test_always_a_value_of_another_engine_is_not_that_of_the_mesh(tolerance, engine):
+    """A measure has the value of the finest mesh where that is named, and another one where another engine is."""
+    result = run(loads(PATCH.format(tolerance)))
+    on_mesh, named = values(result.patch), summary_of(result)["numerics"]["measures"]
+    assert named.keys() == {name for name, one in result.measures.items() if one.value is not None}
+    assert engine in named.values()
+    for name, words in named.items():
+        is_of_mesh = result.measures[name].value == on_mesh[name]
+        assert is_of_mesh if words == patch_rows.ON_FINEST_MESH else on_mesh[name] == 0 or not is_of_mesh, name
+
+
+def test_always_a_motion_has_the_engine_of_its_run():
+    bench = PATCH.format(1e-2) + """
+[friction]
+law = "coulomb"
+static = 0.3
+[slide]
+kind = "sine"
+amplitude = "5 um"
+frequency = "143 Hz"
+"""
+    numerics = summary_of(run(loads(bench)))["numerics"]
+    assert numerics["measures"]["secant_stiffness"] == numerics["engine"]
+    assert numerics["measures"]["normal_stiffness"].startswith("finite elements")
