@@ -206,7 +206,7 @@ EFFECTS = {
     "drive.kind=force": Effect("patchfem.dynamics.propagator", "G_i = phi_i F(t)", ("modes",), ("motion",)),
     "drive.kind=free": Effect("patchfem.dynamics.propagator", "z(0), z'(0) given, G = 0", ("modes",), ("motion",)),
     "drive.waveform=sine": _wave("a(t) = a sin(2 pi f t)", ("frequency", _SIZE), "sine endless",
-                                 "{what} of {level} at {frequency}{place}"),
+                                 "{what} of {level} at {frequency}{place}", "patchfem.structure.drive_sizes"),
     "drive.waveform=step": _wave("a(t) = a; or the base is displaced by X at t = 0: z(0) = -base X", ("", _SIZE),
                                  "step endless", "a step of {level} in {what}{place}"),
     "drive.waveform=sweep": _wave("a(t) = a sin(2 pi int f dt), f' or f'/f constant",

@@ -132,3 +132,11 @@ def even_samples(drive, cycles: float) -> int:
     they are more than MOST_EVEN in all; 0, where turning points are kept alone, below LEAST_EVEN and under a drive."""
     count = int(min(EVEN, MOST_EVEN / max(cycles, 1e-300))) if undriven(drive) else 0
     return count if count >= LEAST_EVEN else 0
+
+
+def _sine(asked: DriveKeys) -> BaseSine:
+    omega = 2 * np.pi * asked.keys.frequency
+    return BaseSine(float(asked.size(omega)), float(omega), asked.moving)
+
+
+MADE = {"sine": _sine}  # here, so that a run under a sine loads no other drive

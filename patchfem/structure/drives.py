@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core import BaseSine, PatchfemError, Segment
+from ..core import PatchfemError, Segment
 from .drive_sizes import DriveKeys, level_cycles
 
 
@@ -199,11 +199,6 @@ class Recorded:
         return np.interp(np.asarray(t, float), self.time, self.value, right=0.0)
 
 
-def _sine(asked: DriveKeys) -> BaseSine:
-    omega = 2 * np.pi * asked.keys.frequency
-    return BaseSine(float(asked.size(omega)), float(omega), asked.moving)
-
-
 def _levels(asked: DriveKeys) -> Piecewise:
     return levels(asked.levels, 2 * np.pi * asked.keys.frequency, level_cycles(asked.keys), asked.moving)
 
@@ -228,4 +223,4 @@ def _recorded(asked: DriveKeys) -> Recorded:
     return Recorded(time, scale * value, asked.period, asked.moving)
 
 
-MADE = {"sine": _sine, "levels": _levels, "step": _step, "sweep": _sweep, "file": _recorded}
+MADE = {"levels": _levels, "step": _step, "sweep": _sweep, "file": _recorded}
