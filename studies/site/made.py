@@ -267,14 +267,14 @@ def commands() -> str:
     """The first screen and the help of every verb, as the command line prints them."""
     from patchfem.__main__ import VERBS
 
-    parts = ["# Commands", "`patchfem` without arguments prints:", fenced("text", output_of()),
+    parts = ["# Commands", "`patchfem` without arguments prints:", fenced("text", run_patchfem()),
              "The sections below are the texts that `patchfem VERB --help` prints."]
     for verb in VERBS:
-        parts += [f"## patchfem {verb}", fenced("text", output_of(verb, "--help"))]
+        parts += [f"## patchfem {verb}", fenced("text", run_patchfem(verb, "--help"))]
     return "\n\n".join(parts) + "\n"
 
 
-def output_of(*words: str) -> str:
+def run_patchfem(*words: str) -> str:
     """Return what the command line prints on a terminal of 110 columns."""
     environment = dict(examples.ENVIRON, COLUMNS="110")
     return subprocess.run([sys.executable, "-m", "patchfem", *words], capture_output=True, text=True, cwd=ROOT,
