@@ -122,7 +122,7 @@ def test_exact_the_readme_compares_the_measured_rig_with_what_its_commands_compu
     assert f"accelerations are {min(ratios):.2f} to {max(ratios):.2f} times the twelve measured" in bullet
     assert f"{computed[143, 4][0]:.3f} mil at 143 Hz (measured: 0.08 mil)" in bullet
     assert f"{computed[135, 4][0]:.3f} mil at 135 Hz (measured: 0.25 mil)" in bullet
-    assert f"at 6 g it is {compute(143, 6)[0]:.0f} mil instead of 0.33 mil" in bullet
+    assert f"At 6 g it is {compute(143, 6)[0]:.0f} mil instead of 0.33 mil" in bullet
     at_5_g = pf.run(ROOT / "studies/rig/rig.toml").measures[amplitude].value / MIL
     assert f"displacement is {at_5_g:.3f} mil, {at_5_g / 0.23:.2f} times the measured 0.23 mil" in bullet
     second = pf.run(ROOT / "studies/table_1/second_path.toml").measures[amplitude].value / MIL
