@@ -12,6 +12,7 @@ module imports its own entry of this list and the entries before it:
 7. `remedies`  the measures that miss the tolerance, and what cures them
 8. `memory`    what a run takes
 9. `plan`      what would run: engine, sizes, cost
-10. `run`      a plan becomes a result
-11. `many`     many models at once
+10. `self_checks` two routes to one number: what a run notices by itself
+11. `run`      a plan becomes a result
+12. `many`     many models at once
 """

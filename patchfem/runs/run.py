@@ -23,6 +23,7 @@ from .remedies import Finding, beyond_tolerance
 from .results.patch_rows import unknown_measures
 from .results.result import Result, with_meanings, without_folders
 from .rig import engines
+from .self_checks import with_self_checks
 from .wear import evolve, measures
 
 __all__ = ["KeptState", "Plan", "Result", "plan", "run"]
@@ -118,7 +119,7 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
             result = measures.worn(replace(result, plan=what), evolved, estimate)
     if what.compile_seconds and estimate:
         compiled.ran(memory.compiled_kind(model, what.engine, what.unknowns))
-    return _whole(result, notes, begin, coarse, climbed)
+    return _whole(with_self_checks(result), notes, begin, coarse, climbed)
 
 
 def _whole(result: Result, notes: list, begin: float, coarse=(), climbed=()) -> Result:

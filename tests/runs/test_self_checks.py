@@ -1,0 +1,66 @@
+"""What a run notices by itself: faults put into the chain end as not_converged, right runs raise no alarm."""
+
+from dataclasses import replace
+
+import seeded_faults
+
+import patchfem as pf
+from patchfem.core import Outcome
+from patchfem.dynamics import propagator
+from patchfem.response import rows
+from patchfem.runs import self_checks
+from patchfem.structure import modes
+
+
+def test_a_right_run_raises_no_alarm():
+    """Each scene of the seeded faults runs to its own outcome, and together they make every check compare numbers."""
+    made = set()
+    for text in seeded_faults.SCENES.values():
+        result = pf.run(text)
+        assert result.outcome is not Outcome.NOT_CONVERGED
+        evidence = self_checks.Evidence(result)
+        for check in self_checks.CHECKS:
+            findings = list(check(evidence))
+            assert not any(finding.is_failed for finding in findings)
+            made |= {check} if findings else set()
+    assert made >= set(self_checks.CHECKS) - {self_checks.check_stuck}
+
+
+def test_a_wrong_participation_ends_as_not_converged(monkeypatch):
+    """Twice the slide of a mode: both numbers stand in the warning."""
+    real = modes.basis
+
+    def wrong(given, mass):
+        found = real(given, mass)
+        return replace(found, slide=2 * found.slide)
+
+    monkeypatch.setattr("patchfem.model.structure.basis", wrong)
+    result = pf.run(seeded_faults.SCENES["exact"].replace("8 g", "8.1 g"))
+    assert result.outcome is Outcome.NOT_CONVERGED
+    text = next(text for text in result.warnings if "self-check" in text)
+    assert "slide of mode 1" in text and " 2," in text and "it is 1;" in text
+    assert all(measure.error is None for measure in result.measures.values())
+
+
+def test_a_wrong_step_compliance_is_found(monkeypatch):
+    """A thousandth too much in the motion per force of a step; the run's own energy balance sees that as well."""
+    result = pf.run(seeded_faults.SCENES["march"])
+    assert not self_checks.failed_findings(result)
+    real = propagator._made
+    propagator._of_interfaces.cache_clear()
+    monkeypatch.setattr(propagator, "_made", lambda *given: replace(real(*given), beta=1.001 * real(*given).beta))
+    (found,) = self_checks.failed_findings(result)
+    propagator._of_interfaces.cache_clear()
+    assert "per friction force of a time step" in found.sentence
+    assert abs(found.found / found.expected - 1.001) < 1e-9
+
+
+def test_a_wrong_measure_ends_as_not_converged(monkeypatch):
+    """Twice every number of the loop, as a wrong factor in its harmonics would make it."""
+    real = rows.interface_loop
+    monkeypatch.setattr(rows, "interface_loop", lambda *given: {
+        name: 2 * value for name, value in real(*given).items()})
+    result = pf.run(seeded_faults.SCENES["march"])
+    assert result.outcome is Outcome.NOT_CONVERGED
+    assert any("loop_area" in text for text in result.warnings)
+    assert any("equivalent_stiffness" in text for text in result.warnings)
