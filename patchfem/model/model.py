@@ -9,7 +9,7 @@ from textwrap import shorten
 from typing import TYPE_CHECKING
 
 from ..core import PatchfemError
-from ..effects import absent
+from ..effects import absent, has
 from ..scene.keys.tables import Accuracy, Friction, Temperature
 from ..scene.scene import Scene
 from . import load as of_load
@@ -135,6 +135,8 @@ def build(scene: Scene) -> Model:
     if patch is not None and (scene.wear is not None or (rig is not None and rig.load_varies)):
         patch = replace(patch, sweeps="wear" if scene.wear is not None else "load")
     friction, heat, spread, pad = _law(scene)
+    if patch is not None and slide is not None and grooves is None:
+        patch = _with_slip(patch, slide, friction)
     named, measured = tuple(scene.named()), scene.measured
     found = Model(None, scene.kind, patch, point, friction, heat, spread, pad, slide, rig, scene.accuracy,
                   (scene.beside(measured.file), (measured.acceleration_gain, measured.displacement_gain),
@@ -143,6 +145,16 @@ def build(scene: Scene) -> Model:
     source = Source(scene.path, scene.title, scene.text, partial(resolved, scene, found), named, tuple(scene.remarks),
                     scene.sets, scene.notes)
     return replace(found, source=source)
+
+
+def _with_slip(patch: PatchModel, slide: SlidePath, friction: Friction | None) -> PatchModel:
+    """Let the mesh of a bench follow its partial slip, where the patch slips as parallel elements."""
+    if not patch.gives_way or slide.across is not None or friction is None or has(friction.law, "bonds"):
+        return patch
+    if not friction.static or friction.static <= 0:
+        return patch
+    slip = patch_model.PrescribedSlip(slide.amplitude, friction.static, friction.bond_length or 0.0)
+    return replace(patch, slip=slip)
 
 
 @lru_cache(64)

@@ -56,6 +56,18 @@ class Meshes(NamedTuple):
     name: str
 
 
+class PrescribedSlip(NamedTuple):
+    """A slide of the holders that lets a patch slip part by part at a friction limit per node.
+
+    amplitude [m]: half the range of the slide; static [1]: coefficient of friction; bond_length
+    [m]: of the springs of the law in series with the pieces, 0 without them.
+    """
+
+    amplitude: float
+    static: float
+    bond_length: float
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class PatchModel:
     """Two pieces and what presses them.
@@ -72,6 +84,7 @@ class PatchModel:
     the run. meshes: those that serve all cases of a sweep, None: the patch has its own. gathers: fields of its motion
     are not asked for, so that few points may stand for it. solved: how it was pressed together with others, a
     `runs.patch.static.SolvedPatch`, None: its run presses it; never kept where another value changes.
+    slip: the slide whose partial slip the mesh has to show, None where there is none.
     """
 
     length: float
@@ -102,6 +115,7 @@ class PatchModel:
     meshes: Meshes | None = None
     gathers: bool = False
     solved: object = None
+    slip: PrescribedSlip | None = None
 
     @property
     def alike(self) -> bool:

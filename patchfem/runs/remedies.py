@@ -1,6 +1,7 @@
 """Warnings of measures that are known less well than the tolerance asks: the worst one, how well, and what cures it."""
 
 from collections.abc import Mapping
+from dataclasses import replace
 from math import ceil, log2, log10, pi
 from types import MappingProxyType
 from typing import NamedTuple
@@ -42,11 +43,12 @@ class Finding(NamedTuple):
     climbed: tuple = ()
 
 
-def beyond_tolerance(seen: Finding, coarse=()) -> list:
+def beyond_tolerance(seen: Finding, coarse=(), still=()) -> list:
     """A warning for the mesh and one for the motion, each with the measures that miss the tolerance and the cure.
 
     Where any that a run answers first, FIRST, do so, these are named and the worst of them is cured. coarse:
-    the patch of the result on the coarser meshes of its ladder, where they are at hand.
+    the patch of the result on the coarser meshes of its ladder, where they are at hand; still: the patch on the ladder
+    of its static measures, fine to coarse, where that is another one.
     """
     model = seen.model
     tolerance = model.accuracy.tolerance
@@ -58,8 +60,15 @@ def beyond_tolerance(seen: Finding, coarse=()) -> list:
     if faced:
         out = faces.together(model, lambda face: beyond_tolerance(_of_face(seen, face), face.patches[1:]))
     else:
-        out = [_said(seen, static, _finer_mesh(seen, static, coarse))] if static else []
+        at_rest = _of_ladder(seen, still) if still else seen
+        out = [_said(seen, static, _finer_mesh(at_rest, static, still[1:] or coarse))] if static else []
     return [*out, _said(seen, moving, _finer_motion(seen, moving, coarse))] if moving else out
+
+
+def _of_ladder(seen, still: tuple) -> Finding:
+    """What is told of static measures that stand on a ladder of their own, patches fine to coarse."""
+    asked = replace(seen.model.patch, still=True, slip=None)
+    return seen._replace(model=replace(seen.model, patch=asked), patch=still[0])
 
 
 def _of_face(seen, face) -> Finding:
@@ -150,7 +159,7 @@ def _climbing(seen, coarse) -> float | None:
     """
     asked, tolerance = seen.model.patch, seen.model.accuracy.tolerance
     if asked.meshes is not None and asked.chosen and isinstance(seen.patch, press.Patch) and \
-            ladder.next_seconds(seen.patch) > ladder.SPENT[asked.still]:
+            ladder.next_seconds(seen.patch) > ladder.most_seconds(asked):
         return None
     if not any(coarse) or asked.meshes is not None:
         return TIGHTER * tolerance
@@ -269,10 +278,12 @@ def _finer_under(seen, coarse) -> str:
         return faces.in_scene(seen.model, f"the mesh causes this error; leave out {SIZE}")
     tighter = min((found for one in every if (found := _climbing(*one)) is not None), default=None)
     if tighter is None:
-        seconds, most = max(ladder.next_seconds(one.patch) for one, _ in every), ladder.SPENT[False]
-        why = f"no accuracy.tolerance leads to a finer mesh: the next one would take about {plain(seconds, 2)} " \
-            f"CPU s, and a run with motion spends at most {most:g} CPU s on its mesh" if seconds > most else \
-            "no accuracy.tolerance leads to a finer mesh"
+        seconds, most = max(ladder.next_seconds(one.patch) for one, _ in every), ladder.most_seconds(asked[0])
+        what = "a bench" if asked[0].slip else "a run with motion"
+        why = "no accuracy.tolerance leads to a finer mesh"
+        if seconds > most:
+            why += f": the next one would take about {plain(seconds, 2)} CPU s, and {what} spends at most {most:g} " \
+                   "CPU s on its mesh"
         return (f"the mesh ({nodes} interface nodes) causes this error, and {why}; use the value with its stated "
                 "error")
     return (f"the mesh ({nodes} interface nodes) causes this error; set accuracy.tolerance = {tighter:.3g} for a "

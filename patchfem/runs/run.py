@@ -61,11 +61,13 @@ def run(what, say=None, progress=None, per_point: bool = False, estimate: bool =
 def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool, kept: KeptState | None) -> Result:
     begin, model = perf_counter(), what.model
     seconds, warnings, notes = {}, list(model.source.remarks), list(model.source.notes)
-    patch, coarse, climbed = None, (None, None), ()
+    patch, coarse, climbed, still = None, (None, None), (), ()
     if model.rig is not None:
         warnings += engines.knobs_idle(model, what.engine)
     if model.patch is not None:
         patch, *coarse = patch_result.solve_all(model.patch, model.accuracy.tolerance, estimate, fresh)
+        if model.kind == "bench" and patch.pressure.outcome is not Outcome.NO_CONTACT:
+            still = patch_result.static_ladder(model.patch, model.accuracy.tolerance, estimate, fresh)
         seconds["contact"] = perf_counter() - begin
         if model.rig is not None and model.rig.stuck is not None:
             model = joint.freed(model, patch)
@@ -110,7 +112,8 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
             raise
         if patch is not None and what.kind != "patch":
             found = {name: m for name, m in result.measures.items() if name != "normal_load"}
-            result = replace(result, measures=patch_result.measured(model, patch, coarse) | found)
+            at_rest = patch_result.measured(model, *((still[0], still[1:]) if still else (patch, coarse)))
+            result = replace(result, measures=at_rest | found)
         if model.faced:
             own = faces.measured(model)
             result = replace(result, extra=result.extra | {"faces": faces.seen(model, result.extra.get("shots", ()))},
@@ -119,15 +122,16 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
             result = measures.worn(replace(result, plan=what), evolved, estimate)
     if what.compile_seconds and estimate:
         compiled.ran(memory.compiled_kind(model, what.engine, what.unknowns))
-    return _whole(with_self_checks(result), notes, begin, coarse, climbed)
+    return _whole(with_self_checks(result), notes, begin, coarse, climbed, still)
 
 
-def _whole(result: Result, notes: list, begin: float, coarse=(), climbed=()) -> Result:
+def _whole(result: Result, notes: list, begin: float, coarse=(), climbed=(), still=()) -> Result:
     """The result with its time since `begin`, its notes, and words that name no folder; climbed: the patch before wear
-    on the meshes of its ladder, fine to coarse, where the result is that of a worn one."""
+    on the meshes of its ladder, fine to coarse, where the result is that of a worn one; still: those of its static
+    measures, where these are others."""
     result.seconds["total"], model = perf_counter() - begin, result.plan.model
     apart = "strip" if model.patch is not None else "interface"
-    wide = beyond_tolerance(Finding(model, result.measures, result.patch, result.extra, climbed), coarse)
+    wide = beyond_tolerance(Finding(model, result.measures, result.patch, result.extra, climbed), coarse, still)
     warned, noted = result.warnings + wide, [*notes, *result.extra.get("notes", [])]
     warned, noted = (without_folders(texts, model.source.path) for texts in (warned, noted))
     faces = _yielding_faces(result)

@@ -8,6 +8,8 @@ yield slides, which its neighbours bound; the change by going over that range is
 
 import numpy as np
 
+SPREAD_FACTOR = 1.5  # times the change by `spread`, as an error (tests/README.md)
+STIFFER_FACTOR = 0.5  # times the change by `stiffer`, as an error
 PARTS = 4  # of an element, and of each halving of the first one
 OCTAVES = 8  # of the first element: slides down to a 256th of it are told
 TOGETHER = 1e-6  # of a yield slide, within which nodes at both ends of a contact count as one

@@ -53,6 +53,16 @@ class JenkinsSet:
     reluctant: int
 
     @cached_property
+    def point_yields(self) -> np.ndarray:
+        """(a,) [m]: the slide at which each of `points` yields."""
+        if not self.order.size:
+            return np.full(self.limit.size, self.yield_slide[0])
+        out = np.empty(self.limit.size)
+        counts = np.diff(np.append(self.starts, self.order.size))
+        out[self.order[::-1]] = np.repeat(self.yield_slide, counts)
+        return frozen_array(out)
+
+    @cached_property
     def share(self) -> np.ndarray:
         """(a, t) [N/m]: the force of a point is share @ stretch for any history."""
         if not self.low.size:

@@ -10,36 +10,38 @@ from ...effects import has, listed
 from ...friction.record import can_overshoot
 from ...response.coarser import Coarser, coarser_space, estimate, left_open
 from ...response.errors import StepScales, change, step_error
+from ...response.grid_convergence import convergence_errors
 from ...slip import shear_modes
 from . import bench, rigid, shear
 from .engine import ELEMENTS, LIST, LISTS, PLANE, STEPPED, slips_by_elements
 from .law import tail_of
 from .ledger import Watch
 
+MESH_TOL = 1e-2  # tolerance whose steps show what a mesh changes; elements follow any path exactly
 FINER = 0.5  # merge width of the run that shows what merging does
 MERGED = 2.0  # times its change: where merging is of second order 4/3 would do
 
 
 class Pass(NamedTuple):
-    """A pass beside: steps per cycle, on the coarser mesh or not, how bonds are summed, springs and modes of a
-    `Watch`."""
+    """A pass beside: steps per cycle, number of the coarser mesh, 0 of that of the run, how bonds are summed, springs
+    and modes of a `Watch`."""
 
     steps: int
-    rough: bool
+    level: int
     choice: object
     springs: Callable | None = None
     modes: int | None = None
 
 
-def errors_of(model, patch, coarse, fine, steps: int, say=None) -> tuple:
+def errors_of(model, patches: list, fine, steps: int, say=None) -> tuple:
     """([error by measure name, ...], seconds, `left_open`) of the pass `fine` at `steps` per cycle on the ladder of
-    `ladder_of`; coarse: the patch on the coarser mesh or None."""
+    `ladder_of`; patches: the patch on nested meshes, fine to coarse, [None] without a patch."""
     def solve(variant: Pass):
-        on = coarse if variant.rough else patch
+        on = patches[variant.level]
         watch = Watch(variant.choice, say, springs=variant.springs, modes=variant.modes)
         return bench.run(model, on, variant.steps, watch=watch)
 
-    ladder, made = ladder_of(model, patch, coarse, fine, steps), {}
+    ladder, made = ladder_of(model, patches, fine, steps), {}
     errors, seconds = estimate(solve, fine.values, ladder, made)
     kinds = [one.of for one in ladder]
     if sum_error(model, fine.engine):
@@ -48,25 +50,29 @@ def errors_of(model, patch, coarse, fine, steps: int, say=None) -> tuple:
     return errors, seconds, left_open(kinds, errors, runs)
 
 
-def ladder_of(model, patch, coarse, fine, steps: int) -> list:
+def ladder_of(model, patches: list, fine, steps: int) -> list:
     """The coarser runs of a bench: half and a quarter of the steps; at a quarter of them the coarser mesh, where there
     is one, other shear modes behind which bonds slide, fewer cells of a density of sliders, and for a merged list of
-    bonds narrower strips."""
+    bonds narrower strips. Parallel elements run on all coarser meshes, at steps that no tolerance changes."""
     choice = fine.engine.choice
-    half, few = Pass(max(4, steps // 8 * 4), False, choice), Pass(max(4, steps // 16 * 4), False, choice)
+    half, few = Pass(max(4, steps // 8 * 4), 0, choice), Pass(max(4, steps // 16 * 4), 0, choice)
     times = 2.0 if model.load_varies else 1.0  # first order
     scales = StepScales(overshoots=frozenset(["friction_force_peak", "friction_ratio_peak"] * can_overshoot(
         model.friction)))
 
     def rule(*values) -> dict:
+        if slips_by_elements(model):  # these follow any path exactly; samples of it change harmonics alone
+            return convergence_errors(*values)
         return {name: times * error for name, error in step_error(*values, steps, scales).items()}
 
-    out, meshed = [Coarser((half, few), rule, of="steps")], coarse is not None
+    out, meshed, patch = [Coarser((half, few), rule, of="steps")], len(patches) > 1, patches[0]
     if meshed and slips_by_elements(model):
-        out.append(shear.coarser_elements(model, patch, coarse, few))
+        length = model.friction.bond_length
+        same = model.slide.steps(MESH_TOL, model.accuracy.steps_per_cycle, length)
+        out.append(shear.coarser_elements(len(patches) - 1, few._replace(steps=same)))
     elif meshed:
         count = shear.modes_of(model, patch) if model.soft else None  # one change at a time
-        out.append(coarser_space(few._replace(rough=True, modes=count), few))
+        out.append(coarser_space(few._replace(level=1, modes=count), few))
         if count:
             out.append(coarser_space(few._replace(modes=shear_modes.beside(count)), few, "modes"))
     if has(model.friction.law, "cells") and fine.engine.kind == ELEMENTS:

@@ -37,7 +37,8 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
     seconds["bench"] = fine.seconds
     others, left = [], None
     if estimate:
-        others, seconds["error"], left = errors_of(model, patch, coarse[0], fine, steps, say)
+        patches = [patch, *(one for one in coarse if one is not None)]
+        others, seconds["error"], left = errors_of(model, patches, fine, steps, say)
     found = with_errors(fine.values, *others, least=1e-10)
     fields, created, power = {}, fine.values["energy_created"], np.abs(np.diff(fine.ledger[0])).sum()
     if f.reading == "report" and created > 1e-6 * power:

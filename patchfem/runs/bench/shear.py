@@ -9,15 +9,14 @@ from ...effects import has
 from ...friction.record import law_from
 from ...response.coarser import Coarser
 from ...response.errors import GAPS, change
+from ...response.grid_convergence import convergence_errors
 from ...slip.fields import element_fields, point_fields, shear_of
-from ...slip.grain import spread, stiffer
 from ..patch.kept import elements
 from .follow import follow_path
 from .ledger import Slid, Watch
 from .rigid import climbing
 
 OPEN = 1e-3  # of the mean pressure, under which nodes count that the lower piece does not press at first
-GRAIN, STIFF = 1.5, 0.5  # times the change by the grain of the nodes and by that of the stiffness (tests/README.md)
 
 
 def with_shear(model, patch, time, slide, frames: int, watch: Watch, engine=None) -> Slid:
@@ -127,20 +126,19 @@ def lists_of(patch, law, shear, found, force=None):
     return lists_model(law, law.static * force, sigma, shear, found.reach(law.order), found.merge)
 
 
-def coarser_elements(model, patch, coarse, few) -> Coarser:
-    """The coarser mesh of a bench of elements; patch, coarse: on both meshes; few: variant of `errors` beside."""
-    length = law_from(model.friction).element(1.0).length
-    stiff = stiffer(*(elements(one, model.friction.static, length).stiffness.sum() for one in (patch, coarse)))
-    runs = few._replace(rough=True), few._replace(springs=spread), few._replace(springs=stiff)
-    return Coarser(runs, mesh_error, few, "mesh")
+def coarser_elements(count: int, few) -> Coarser:
+    """Return the coarser meshes of a bench of elements.
 
-
-def mesh_error(fine: dict, rough: dict, spread: dict, stiff: dict) -> dict:
-    """Error by name of the measures of a run: the change by a coarser mesh, which can be small by chance, or what the
-    grain of the nodes or the change of the stiffness would do, where that is more.
-
-    rough: on the coarser mesh; spread, stiff: with the elements of `slip.grain`; all measures by name.
+    count: number of coarser meshes; few: the variant of `errors` that they are compared with.
     """
-    found, grain, stiffness = (change(fine, one) for one in (rough, spread, stiff))
-    return {name: gap if name in GAPS else max(gap, GRAIN * grain.get(name, 0.0), STIFF * stiffness.get(name, 0.0))
-            for name, gap in found.items()}
+    runs = tuple(few._replace(level=level) for level in range(1, count + 1))
+    return Coarser(runs, mesh_errors, few, "mesh")
+
+
+def mesh_errors(*values: dict) -> dict:
+    """Return the error of each measure from its values on nested meshes, fine to coarse.
+
+    What a balance misses is an error itself, and has its change.
+    """
+    missed = change(values[0], values[1])
+    return convergence_errors(*values) | {name: missed[name] for name in GAPS if name in missed}

@@ -21,6 +21,7 @@ from ...model.patch import bars
 from ...model.pieces import grid_of, outlined, rounded_edges
 from .condensed import Pair, condensed
 from .press import Patch, pressed
+from .slip_zones import slip_zones
 from .values import contact_ends
 
 SEARCH_CELLS = 96  # columns of the first search for the contact
@@ -36,6 +37,8 @@ WORN = 1 / 48  # of the interface, a column of the coarsest grid where wear may 
 CLOSER = 64  # cells along a contact of a node or two, in the next search
 WAVE = 16  # cells of the search, and of the third grid, in a wave of the gap
 CREST, CRESTS = 0.3, 4  # of the largest pressure: a crest that cells are graded to; its cells of the coarsest grid
+SLIP_CELLS = 4  # of the coarsest grid in a slip zone; the third grid has 16, which show the work to about 1 %
+MAX_SEARCH_CELL = 4.0  # cell of the search over the wanted one in a slip zone; above it the zone is searched again
 SEARCHES = 8  # of the contact, each on columns graded to what the one before found
 LEAST_LEVELS = 3  # nested meshes that show an order
 SPENT = {True: 3.0, False: 0.4}  # predicted seconds of the finest mesh: of a static patch, of one that moves
@@ -51,7 +54,8 @@ class ContactExtent:
 
     span: (from, to) [m] of the loaded stretch; places: where the pressure ends inside the interface, or the nodes of a
     contact too small to tell; corners: ends of the interface that bear; cell: longest cell [m] in which it ends;
-    crests: (place, half-width) [m] of the largest pressures inside it.
+    crests: (place, half-width) [m] of the largest pressures inside it; slip_zones: (from, to) [m] of the stretches that
+    a prescribed slide lets slip.
     """
 
     span: tuple
@@ -59,6 +63,7 @@ class ContactExtent:
     corners: tuple
     cell: float
     crests: tuple = ()
+    slip_zones: tuple = ()
 
     @property
     def wide(self) -> float:
@@ -94,12 +99,23 @@ def base_grids(asked, search: Search | None = None) -> list:
     layout, pair = search_layout(asked), search and search.of(asked)
     for _ in range(SEARCHES if asked.nominal_load > 0 else 0):  # without a load nothing bears, and no edge is found
         pair = pair or condensed(asked, *grids_of(asked, layout))
-        seen, x = [contact_extent(pressed(each, pair)) for each in (asked, *sweep)], pair.grid.x
+        seen, x = [contact_extent(pressed(each, pair), asked.slip) for each in (asked, *sweep)], pair.grid.x
         layout, pair = layout_of(asked, seen), None
         cells = max(one.cell / one.wide for one in seen)
-        if cells <= 1 / (EDGE[asked.still] - 1) and _shows_crests(asked, x, layout):
+        shows = _shows_crests(asked, x, layout) and _shows_slip(seen[0].slip_zones, x, layout)
+        if cells <= 1 / (EDGE[asked.still] - 1) and shows:
             break
     return grids_of(asked, layout)
+
+
+def _shows_slip(zones: tuple, x, layout: Layout) -> bool:
+    """Whether the cells of columns x (k,) [m] in the slip zones are not much longer than a layout wants them."""
+    middle, long = (x[1:] + x[:-1]) / 2, np.diff(x)
+    for low, high in zones:
+        inside = (x[1:] > low) & (x[:-1] < high)
+        if (long[inside] > MAX_SEARCH_CELL * layout.size(middle[inside])).any():
+            return False
+    return True
 
 
 def _shows_crests(asked, x, layout: Layout) -> bool:
@@ -144,6 +160,8 @@ def layout_of(asked, seen: list) -> Layout:
     sharp = JUMP if asked.singular_ends else 1
     if _longest(asked) < np.inf:
         bands += tuple((place, place, max(wide / CRESTS, least / JUMP)) for one in seen for place, wide in one.crests)
+    bands += tuple((low, high, max((high - low) / SLIP_CELLS, LEAST * asked.length))
+                   for one in seen for low, high in one.slip_zones)
     corner = max(min(thick / 16 if thick else np.inf, wide / EDGE[asked.still] / sharp), LEAST * asked.length)
     ends = {place for one in seen for place in one.corners}
     bands += tuple((place, place, corner) for place in sorted(ends))
@@ -164,8 +182,10 @@ def _coating(asked) -> float:
     return min((piece.thickness for piece in (asked.lower, asked.upper) if piece.thickness), default=0.0)
 
 
-def contact_extent(patch: Patch) -> ContactExtent:
+def contact_extent(patch: Patch, slip=None) -> ContactExtent:
     """Extent of the contact of a patch; where nothing touches, the cells around the narrowest gap.
+
+    slip: the `PrescribedSlip` of the holders, None where nothing slips part by part.
 
     Of a smooth skin the part that bears a thousandth of the largest pressure counts.
     """
@@ -189,7 +209,7 @@ def contact_extent(patch: Patch) -> ContactExtent:
     low = places[0] if index[0] else x[0]
     high = places[-1] if index[-1] < x.size - 1 else x[-1]
     return ContactExtent((float(low), float(high)), tuple(places.tolist()), corners, float(cells.max(initial=0.0)),
-                         _crests(x, sigma))
+                         _crests(x, sigma), slip_zones(patch, slip, found) if slip is not None else ())
 
 
 def _crests(x, sigma) -> tuple:

@@ -13,9 +13,11 @@ from .grids import LEAST_LEVELS, SPENT, Search, base_grids, seconds_of
 from .kept import KEPT, by_content, shares
 from .measures import measures, met, missed
 from .press import pressed, solve
+from .slip_zones import slip_missed
 
 FINE = 1e-3  # tolerance that bilinear meshes meet cheaply
 HELPED = 3.0  # times nearer to the tolerance, from which cells of order 4 end the climb even if they miss it
+TOL_OF_SPENT = 1e-3  # tolerance up to which a slip has the seconds of a mesh that moves; ten times tighter, 3.2 times
 MOST_DECADES = 6  # below a tolerance, in which another is looked for
 
 
@@ -112,10 +114,10 @@ def climb(asked, tolerance: float, estimate: bool = True, fresh: bool = False, s
 
     Where the tolerance is below FINE, or the next mesh is dear, cells of order 4 add sharper measures if they can, or
     points as fine as a trace; then the mesh serves fields and motion. The climb ends where the next mesh would take
-    more than the work that is spent on a patch. Without an estimate it is the third mesh, and nothing is solved on the
-    others. search: as of `base_grids`.
+    more than the work that is spent on a patch. With a prescribed slip it also has to show the work of that. Without an
+    estimate it is the third mesh, and nothing is solved on the others. search: as of `base_grids`.
     """
-    grids, out, sharp = base_grids(asked, search), [], None
+    grids, out, sharp, sharpened, on_points = base_grids(asked, search), [], None, False, None
     while True:
         try:
             wanted = estimate or len(out) == LEAST_LEVELS - 1
@@ -131,22 +133,52 @@ def climb(asked, tolerance: float, estimate: bool = True, fresh: bool = False, s
         if not estimate or nothing:
             return tuple(out)
         out[0], dear = replace(out[0], sharper=sharp or {}), seconds_of(grids)
-        found = measures(*out, tolerance=tolerance)
+        if on_points is not None:  # the solution on points of the trace serves finer meshes as well
+            out[0] = replace(out[0], averaging=on_points.averaging, fine=on_points.fine, stretches=on_points.stretches)
+        found, shows_slip = measures(*out, tolerance=tolerance), _shows_slip(asked, out, tolerance)
         if dear > SPENT[False] and not met(found, tolerance) and _finer(asked):
-            out[0] = _on_points(asked, out, tolerance)
-            if out[0].sharper:
-                return tuple(out)
-            sharp = {}
+            on_points = out[0] = _on_points(asked, out, tolerance)
+            sharp, sharpened = on_points.sharper, bool(on_points.sharper)
+            found = measures(*out, tolerance=tolerance)
         if sharp is None and not met(found, tolerance) and high_order.takes_cells(asked) and \
                 (dear > SPENT[False] or (asked.still and met(found, FINE))):
             before = missed(found, tolerance)
             sharp = high_order.sharper_by_cells(asked, out[0], partial(_enough, out, tolerance))
             out[0] = replace(out[0], sharper=sharp)
             found = measures(*out, tolerance=tolerance)
-            if missed(found, tolerance) <= before / HELPED:
-                return tuple(out)
-        if dear > SPENT[asked.still] or met(found, tolerance):
+            sharpened = missed(found, tolerance) <= before / HELPED
+        if dear > most_seconds(asked, tolerance) or (shows_slip and (sharpened or met(found, tolerance))):
             return tuple(out)
+
+
+def most_seconds(asked, tolerance: float | None = None) -> float:
+    """Return the predicted seconds that the finest mesh of a `PatchModel` may take at a tolerance, None: at any.
+
+    The motion of a prescribed slip costs little, so a tight tolerance buys it a finer mesh, up to what a static patch
+    may cost.
+    """
+    if asked.slip is None:
+        return SPENT[asked.still]
+    if tolerance is None:
+        return SPENT[True]
+    return min(SPENT[True], SPENT[False] * max(1.0, (TOL_OF_SPENT / tolerance) ** 0.5))
+
+
+def static_ladder(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
+    """The patch of a bench that slips part by part as a run without motion solves it, fine to coarse.
+
+    () where there is no such ladder: the mesh is pinned, shared with other cases, or solved already.
+    """
+    if not asked.gives_way or asked.solved is not None or asked.meshes is not None or not asked.chosen:
+        return ()
+    return climb(replace(asked, still=True, slip=None), asked.mesh_tolerance or tolerance, estimate, fresh)
+
+
+def _shows_slip(asked, patches: list, tolerance: float) -> bool:
+    """Whether the meshes of patches, fine to coarse, show the work of a prescribed slip to the tolerance."""
+    if asked.slip is None:
+        return True
+    return slip_missed(patches, asked.slip, tolerance) <= 1
 
 
 def _finer(asked) -> bool:
@@ -170,15 +202,18 @@ def climbs_at(asked, patches, tolerance: float) -> float | None:
     patches: as `climb` returns them for that tolerance. None where the next mesh is dear, or no tolerance asks for
     it: then the ladder has ended for good.
     """
-    if next_seconds(patches[0]) > SPENT[asked.still]:
+    seconds = next_seconds(patches[0])
+    if seconds > most_seconds(asked):
         return None
     if asked.gap.profile is not None and patches[0].sharper:
         ended = not met(measures(*(one for one in patches if one is not None), tolerance=tolerance), tolerance)
         return None if ended else tolerance / 10
     known = [one for one in patches if one is not None]
-    shares = (10.0**-k for k in range(1, MOST_DECADES + 1))
-    return next((share * tolerance for share in shares
-                 if not met(measures(*known, tolerance=share * tolerance), share * tolerance)), None)
+    for tighter in (tolerance * 10.0**-k for k in range(1, MOST_DECADES + 1)):
+        enough = met(measures(*known, tolerance=tighter), tighter) and _shows_slip(asked, known, tighter)
+        if not enough and seconds <= most_seconds(asked, tighter):
+            return tighter
+    return None
 
 
 def next_seconds(patch) -> float:

@@ -116,7 +116,7 @@ def _numbers(asked) -> tuple:
     shapes = [float(value) for _, part in asked.gap.shapes for _, value in part if isinstance(value, (int, float))]
     skin = [float(value or 0.0) for _, value in asked.skin or () if isinstance(value, (int, float)) or value is None]
     own = (asked.load, asked.approach, asked.offset, asked.line_moment, asked.rotates, asked.spring,
-           *(asked.strips or ()))
+           *(asked.slip or ()), *(asked.strips or ()))
     return (*(float(value or 0.0) for value in own), *shapes, *skin)
 
 
@@ -158,7 +158,7 @@ def _loaded(asked, pair, patch):
     """The contact of a case, pressed with others as `patch` or by itself; None of one that cannot be pressed: its own
     run says why."""
     try:
-        return grids.contact_extent(patch or pressed(asked, pair))
+        return grids.contact_extent(patch or pressed(asked, pair), asked.slip)
     except PatchfemError:
         return None
 
@@ -210,7 +210,7 @@ def _climbed(cases: list, bodies, tolerance: float, once: bool, least: int) -> t
         if missed_by <= 1:
             missed_by = next((by for one, seen in zip(cases, known) if seen is None and (
                 by := _missed(one, pairs, tolerance)) > 1), missed_by)
-        dear = bodies[0].x.size > MOST_NODES or grids.seconds_of(bodies) > grids.SPENT[cases[0].still]
+        dear = bodies[0].x.size > MOST_NODES or grids.seconds_of(bodies) > ladder.most_seconds(cases[0], tolerance)
         if missed_by <= 1 or once or dear:
             return pairs, missed_by
 

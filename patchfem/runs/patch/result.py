@@ -17,14 +17,14 @@ from ..results.patch_rows import TABLE
 from ..results.result import Result, at_rest
 from . import kept, skin
 from .kept import band
-from .ladder import solve_all
+from .ladder import solve_all, static_ladder
 from .measures import strip_error
 from .values import beyond_gentle, values
 
 LOCKS = 0.499  # Poisson's ratio; up to it the bars of locking cells hold
 SMALL = 0.02  # strain that is taken as small: what is of its second order is left out
 
-__all__ = ["bodies", "left_out", "measured", "probed", "solve_all", "static", "strained"]
+__all__ = ["bodies", "left_out", "measured", "probed", "solve_all", "static", "static_ladder", "strained"]
 COUPLED = 0.02  # of the tangential compliance; the closing by shear is said from there on
 BENT = 0.02  # of the load under which a tall piece buckles; as much is missing from its sideways motion
 WHOLE = 1 - 1e-6  # share of a far face that counts as all of it: printed digits of a mesh file

@@ -28,7 +28,8 @@ BEYOND = 2  # cells beyond a contact on coarser cells in which the one on these 
 
 class SolvedPatch(NamedTuple):
     """A patch solved together with others: static measures by name; band: sentences on the plane state, as
-    `measures.plane_band` has them; patches: the solved Patch on the finest mesh and on the next one."""
+    `measures.plane_band` has them; patches: the solved Patch on the meshes, fine to
+    coarse."""
 
     measures: dict
     band: list
@@ -179,7 +180,7 @@ def solved_patches(patches, tolerance: float) -> list:
     press as this module can. tolerance: as `pressed_together` has it."""
     pairs, found = shared_pairs(patches[0]), pressed_together(asked_of(patches), tolerance)
     return [SolvedPatch(found.measures(k), found.band(one, k),
-                        tuple(_patch_of(one, pair, level, k) for pair, level in zip(pairs[:2], found.levels)))
+                        tuple(_patch_of(one, pair, level, k) for pair, level in zip(pairs, found.levels)))
             if found.good[k] else None for k, one in enumerate(patches)]
 
 

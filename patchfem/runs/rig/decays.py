@@ -13,8 +13,7 @@ from ...core import NotConverged, PatchfemError
 from ...dynamics.harmonic import forces, quasi_static
 from ...dynamics.march import models
 from ...response.decay_curve import FAINT, DecayCurve, curve_of, of_turns, turns
-from ...slip.grain import spread, stiffer
-from ..bench import shear
+from ...slip.grain import SPREAD_FACTOR, STIFFER_FACTOR, spread, stiffer
 from ..patch import faces
 from . import interface, numerics
 from .solution import Solution
@@ -112,8 +111,8 @@ def mesh_error(fine, rough, read) -> np.ndarray:
     best, apart = read(fine), 0.0
     for k, other in rough:
         stiff = stiffer(float(fine.stiffness()[k]), float(other.stiffness()[k]))
-        apart = apart + np.fmax(np.abs(read(other) - best), shear.STIFF * np.abs(read(fine.remade(stiff)) - best))
-    return np.fmax(shear.GRAIN * np.abs(read(fine.remade(_spread)) - best), apart)
+        apart = apart + np.fmax(np.abs(read(other) - best), STIFFER_FACTOR * np.abs(read(fine.remade(stiff)) - best))
+    return np.fmax(SPREAD_FACTOR * np.abs(read(fine.remade(_spread)) - best), apart)
 
 
 def _spread(stiffness, slide) -> tuple:

@@ -1,0 +1,91 @@
+"""Where a prescribed slide lets a patch slip, and how well its meshes show the work of that slip."""
+
+import numpy as np
+
+from ...core import Measure
+from ...response.grid_convergence import convergence_errors
+from ...response.rows import floor_of
+from ...slip.shear_modes import JenkinsSet
+from .kept import elements
+
+
+def slip_zones(patch, slip, ends: list) -> tuple:
+    """Return the stretches (from, to) [m] in which points yield below the amplitude of a slide.
+
+    Between nodes the slide at which points yield is linear. At an end of the contact between two
+    nodes, where the pressure vanishes, Coulomb points yield at once.
+
+    Parameters
+    ----------
+    patch : Patch
+        The pressed patch.
+    slip : PrescribedSlip
+        What slides it.
+    ends : list of contact.edges.End
+        Ends of its contact inside the interface.
+    """
+    if patch.strips is not None or not patch.active.any():
+        return ()
+    found = elements(patch, slip.static, slip.bond_length)
+    yields = dict(zip(found.points.tolist(), found.point_yields.tolist()))
+    beyond = {(end.node, end.side): end.place for end in ends}
+    out = []
+    for stretch in np.split(found.points, 1 + np.flatnonzero(np.diff(found.points) > 1)):
+        places, slides = patch.x[stretch].tolist(), [yields[node] for node in stretch.tolist()]
+        if slip.bond_length == 0:
+            first, last = beyond.get((int(stretch[0]), -1)), beyond.get((int(stretch[-1]), 1))
+            if first is not None and first < places[0]:
+                places, slides = [first, *places], [0.0, *slides]
+            if last is not None and last > places[-1]:
+                places, slides = [*places, last], [*slides, 0.0]
+        out += _below(np.array(places), np.array(slides), slip.amplitude)
+    return tuple(out)
+
+
+def _below(x, slides, amplitude: float) -> list:
+    """Stretches (from, to) [m] in which slides (k,) [m] at x (k,) [m] lie below an amplitude [m]."""
+    yields = slides < amplitude
+    starts = np.flatnonzero(yields & ~np.append(False, yields[:-1]))
+    stops = np.flatnonzero(yields & ~np.append(yields[1:], False))
+    out = []
+    for first, last in zip(starts.tolist(), stops.tolist()):
+        low, high = float(x[first]), float(x[last])
+        if first > 0:
+            low = _crossing(x[first - 1:first + 1], slides[first - 1:first + 1], amplitude)
+        if last < x.size - 1:
+            high = _crossing(x[last:last + 2], slides[last:last + 2], amplitude)
+        if high > low:
+            out.append((low, high))
+    return out
+
+
+def _crossing(x, slides, amplitude: float) -> float:
+    """Place [m] between two nodes at which the slide of yielding equals the amplitude."""
+    share = (amplitude - slides[0]) / (slides[1] - slides[0])
+    return float(x[0] + share * (x[1] - x[0]))
+
+
+def cycle_work(found: JenkinsSet, amplitude: float) -> float:
+    """Return the work [J] of a cycle between -amplitude and amplitude [m] of parallel elements."""
+    beyond = np.maximum(amplitude - found.yield_slide, 0.0)
+    return float(4 * (found.stiffness * found.yield_slide) @ beyond)
+
+
+def peak_force(found: JenkinsSet, amplitude: float) -> float:
+    """Return the force [N] of parallel elements at a first slide of `amplitude` [m]."""
+    return float(found.stiffness @ np.minimum(found.yield_slide, amplitude))
+
+
+def slip_missed(patches, slip, tolerance: float) -> float:
+    """Return the largest error of work and force of the slip over what the tolerance allows [1].
+
+    patches: on nested meshes, fine to coarse, two or more.
+    """
+    values = []
+    for patch in patches:
+        found = elements(patch, slip.static, slip.bond_length)
+        values.append({"loop_area": cycle_work(found, slip.amplitude),
+                       "friction_force_peak": peak_force(found, slip.amplitude)})
+    errors = convergence_errors(*values)
+    return max(Measure(value, "", errors[name], float(floor_of(name))).beyond(tolerance)
+               for name, value in values[0].items())
