@@ -241,7 +241,7 @@ def test_always_every_measure_says_what_it_is(name, runs):
 def test_exact_a_number_behind_a_name_counts_interfaces_or_strips(runs):
     assert runs["two interfaces"].measures["slip_amplitude_2"].text.endswith("; of interface 2")
     assert meaning("loop_area_13", "strip") == TABLE["loop_area"].text + "; of strip 13"
-    assert meaning("relative_displacement_amplitude_steady").startswith("steady amplitude under a sine, extrapolated")
+    assert meaning("relative_displacement_amplitude_steady").startswith("steady amplitude under a periodic drive")
 
 
 def test_exact_a_table_is_aligned_and_rounded_by_the_error(runs):

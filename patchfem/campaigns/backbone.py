@@ -624,7 +624,8 @@ def _on_a_bench(joint: Joint, amplitudes) -> Curve:
     found, errors = [], []
     for slide in slides:
         fine, alone, steps, change = _settled(joint, float(slide), joint.held[0] / (2 * np.pi))
-        bars = with_errors(fine.values, *errors_of(alone, joint.patch, joint.coarse, fine, steps)[0], least=1e-10)
+        patches = [joint.patch] if joint.coarse is None else [joint.patch, joint.coarse]
+        bars = with_errors(fine.values, *errors_of(alone, patches, fine, steps)[0], least=1e-10)
         tip, area = ((fine.values[name], bars[name].error + off) for name, off in zip(LOOP, change))
         found.append(quasi_static.Loops(tip[0] * slide, area[0]))
         errors.append(quasi_static.Loops(tip[1] * slide, area[1]))

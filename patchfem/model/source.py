@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 from ..core import NotConverged, PatchfemError
@@ -13,8 +13,9 @@ from ..scene.lines import counted, place_of
 class Source:
     """Origin of a model: path and text of the scene, with what messages need.
 
-    text: as read; write() -> the TOML of `resolved`; effects: what the scene names; remarks: sentences on keys that
-    nothing uses; sets: `key=value` given beside the text; notes: sentences on what defaults leave out.
+    text: as read; write() -> the TOML of `resolved`, a partial function whose last argument is the model; effects: what
+    the scene names; remarks: sentences on keys that nothing uses; sets: `key=value` given beside the text; notes:
+    sentences on what defaults leave out.
     """
 
     path: Path
@@ -25,6 +26,12 @@ class Source:
     remarks: tuple
     sets: tuple = ()
     notes: tuple = ()
+
+    def describes(self, model) -> bool:
+        """Return whether the scene still describes a model: no part was replaced since the model was built."""
+        built = self.write.args[-1]
+        return all(getattr(model, part.name) is getattr(built, part.name) for part in fields(built)
+                   if part.name != "source")
 
     @property
     def resolved(self) -> str:

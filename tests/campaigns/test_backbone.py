@@ -489,8 +489,7 @@ def test_the_held_frequency_is_that_of_the_stiffness_which_a_run_prints():
     told = pf.run(CROWNED[:CROWNED.index("[structure]")] + '[slide]\nkind = "sine"\namplitude = "1 um"\n'
                   'frequency = "1 Hz"\n').measures["tangential_stiffness"]
     stuck = np.sqrt(OMEGA**2 + told.value / 0.5) / (2 * np.pi)
-    assert found.stuck == pytest.approx(stuck, rel=1e-9)
-    assert found.stuck_error == pytest.approx(stuck * told.error / told.value / 2, rel=0.1)
+    assert abs(found.stuck - stuck) <= found.stuck_error + stuck * told.error / told.value / 2 < 1e-3 * stuck
     assert "above the range of micro-slip" in " ".join(found.notes)
 
 

@@ -90,7 +90,7 @@ def test_always_the_doctor_names_every_package_of_the_project_and_what_writes_fi
 def test_always_a_fault_of_the_program_says_what_to_send(monkeypatch):
     monkeypatch.setattr(examine, "examined", lambda: 1 / 0)
     answer = cli("doctor")
-    assert answer.code == 1 and "internal fault, please report it: ZeroDivisionError" in answer.err
+    assert answer.code == 1 and "internal fault in " in answer.err and "(doctor): ZeroDivisionError" in answer.err
     assert "what `patchfem doctor` says to the project's issue tracker" in answer.err
 
 

@@ -67,7 +67,7 @@ def test_exact_results_name_no_folder_of_this_machine(tmp_path):
     (tmp_path / "trace.csv").write_text("x [um],z [um]\n" + rows)
     (tmp_path / "a.toml").write_text(PATCH + '[contact.profile]\nfile = "trace.csv"\n')
     answer, out = cli("run", tmp_path / "a.toml", "-o", tmp_path / "out"), tmp_path / "out"
-    assert answer.code == 0 and "trace.csv: the trace, from x = " in (out / "summary.json").read_text()
+    assert answer.code == 0 and "trace.csv: x runs from " in (out / "summary.json").read_text()
     assert {one.name for one in out.iterdir() if str(tmp_path).encode() in one.read_bytes()} == set()
     assert without_folders(["/a/b c/t.csv: x is 3 m/s", "3 m/s: as it is"], tmp_path / "a.toml") == \
         ["t.csv: x is 3 m/s", "3 m/s: as it is"]

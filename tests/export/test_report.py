@@ -54,7 +54,7 @@ def patch(load=1.0, frames=1, effects=("contact",)) -> dict:
     if frames > 1:
         fields["shear_stress"] = 0.3 * sigma * np.sin(np.arange(frames))[:, None]
     mises = np.tile((sigma[1:] + sigma[:-1])[:, None] / 2 * np.exp(-depth[1:] / 1e-3), (2, 1, 1))
-    bodies = {"depth": (depth, depth), "coating": (0.0, 0.25e-3), "mises": mises}
+    bodies = {"x": x, "depth": (depth, depth), "coating": (0.0, 0.25e-3), "mises": mises, "pressure": sigma}
     return data | {"x": x, "fields": fields, "bodies": bodies}
 
 

@@ -7,13 +7,14 @@ from pathlib import Path
 import pytest
 
 import patchfem
-from patchfem.effects import LAWS
+from patchfem.effects import LAWS, SINE, WAVEFORMS
 from patchfem.runs.rig.engines import AUTOMATIC, ENGINES, FINDERS, function_of
 from patchfem.scene.keys.tables import Friction
 from patchfem.scene.rules.methods import BESIDE, TAKES, Motion, lacking
 
 HOOKS = ("solve", "cost", "chosen", "refuse", "words", "notes")
 PACKAGE = Path(patchfem.__file__).parent
+LEVELS = WAVEFORMS["levels"]
 OWN = ("runs/rig/comparison.py", "runs/bench", "friction/bonds", "scene")  # own methods, sums, tables
 
 
@@ -56,7 +57,7 @@ def motions():
     """Motions of every law with everything that may stand beside it."""
     for law, soft, varies, yaws, spring, waveform in product(
             LAWS, ("", "[contact.shear]"), ("", "with normal.amplitude"), (False, True),
-            ("", "[structure.stiffening]", "[normal.grooves]"), ("sine", "levels")):
+            ("", "[structure.stiffening]", "[normal.grooves]"), (SINE, LEVELS)):
         for count in (1, 2):
             yield Motion([Friction(law=law, static=0.3)] * count, [soft] * count, varies, yaws, spring, waveform)
 
@@ -76,9 +77,9 @@ def test_exact_the_march_takes_all_that_others_lack():
 def test_exact_what_has_no_solution_between_events_is_named():
     ep, coulomb, tanh = (Friction(law=law, static=0.3) for law in ("elastic-plastic", "coulomb", "tanh"))
     for laws, soft in (([], ""), ([coulomb], ""), ([coulomb], "[contact.shear]"), ([ep], ""), ([ep], "a holder")):
-        assert "" in reasons(Motion(laws, [soft] * len(laws), "", False, "", "sine"))
-    for m, said in ((Motion([tanh], [""], "", False, "", "sine"), "for law 'tanh'"),
-                    (Motion([ep], [""], "", True, "", "sine"), "with strips that yaw"),
-                    (Motion([coulomb], [""], "", True, "", "levels"), "with strips that yaw and waveform 'levels'"),
-                    (Motion([coulomb], [""], "", False, "[normal.grooves]", "sine"), "with [normal.grooves]")):
+        assert "" in reasons(Motion(laws, [soft] * len(laws), "", False, "", SINE))
+    for m, said in ((Motion([tanh], [""], "", False, "", SINE), "for law 'tanh'"),
+                    (Motion([ep], [""], "", True, "", SINE), "with strips that yaw"),
+                    (Motion([coulomb], [""], "", True, "", LEVELS), "with strips that yaw and waveform 'levels'"),
+                    (Motion([coulomb], [""], "", False, "[normal.grooves]", SINE), "with [normal.grooves]")):
         assert all(reasons(m)) and said in reasons(m)

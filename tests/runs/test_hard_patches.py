@@ -290,11 +290,11 @@ def test_always_an_automatic_mesh_is_found_and_stays_small(name, cheap):
 
 
 def test_always_the_command_line_names_what_was_wrong(tmp_path):
-    """Exit 0 with numbers throughout, 2 for what a scene got wrong; never a traceback."""
+    """Exit 3 with numbers throughout where a pinned mesh is too coarse, 2 for mistakes; never a traceback."""
     path = tmp_path / "hard.toml"
     path.write_text(BLOCKS + '[contact.crown]\nradius = "1 mm"\n', "utf-8")
     code, out, err = cli("run", path, "-o", tmp_path / "out", "--set", COARSE, "--json")
-    assert code == 0 and "NaN" not in out and "Infinity" not in out and "Traceback" not in err
+    assert code == 3 and "NaN" not in out and "Infinity" not in out and "Traceback" not in err
     assert all(np.isfinite(m["value"]) for m in json.loads(out)["measures"].values())
     assert json.loads(out)["contact"]["stretches"] == [[0.0, 0.0]]  # one node bears all
     assert ", at x = 0 mm; peak" in cli("run", path, "-o", tmp_path / "out", "--set", COARSE).out

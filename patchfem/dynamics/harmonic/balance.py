@@ -11,7 +11,7 @@ from ..integrated import accelerations
 from .branch import Backbone, Branch, backbone, branches, levels, response
 from .forces import Group
 from .laws import Flow, Interlock, Jenkins, OfSpeed, Spring, Track, law_of_model, synthesis
-from .point import Periodic, point, slip_of
+from .point import Periodic, friction_force, point, slip_of
 from .stability import with_stability
 
 __all__ = ["Backbone", "Branch", "Flow", "Group", "Interlock", "Jenkins", "OfSpeed", "Periodic", "Spring", "backbone",
@@ -60,7 +60,7 @@ def cycle_energy(periodic: Periodic, modes) -> dict:
 
 
 def periodic_response(periodic: Periodic, modes, drive, samples: int = 1000) -> Response:
-    """One cycle of a steady motion on `samples` + 1 equal times, for measures; slide, force and slip of row 0.
+    """One cycle of a steady motion on `samples` + 1 equal times, for measures; slide, friction force and slip of row 0.
 
     The forces are the laws' own at each instant, so the accelerations have no ringing of cut-off harmonics; `extra` has
     normal_load [N] where a law's load changes on the way.
@@ -84,5 +84,6 @@ def periodic_response(periodic: Periodic, modes, drive, samples: int = 1000) -> 
     loads = [cycle(s.load) for s in found if s.load is not None]
     return Response(np.arange(samples + 1) * (2 * np.pi / omega / samples), cycle(z), cycle(rate), cycle(track.q),
                     cycle(omega * track.rate), cycle(modes.output @ z), cycle(modes.output @ rate),
-                    cycle(modes.output @ accel + floor), cycle(floor), cycle(forces[0]), cycle(slip_of(track, found)),
+                    cycle(modes.output @ accel + floor), cycle(floor), cycle(friction_force(group.laws[0], found)),
+                    cycle(slip_of(track, found)),
                     {"normal_load": loads[0]} if loads else {})

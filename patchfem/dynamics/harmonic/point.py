@@ -77,8 +77,15 @@ class Periodic:
         for at in (np.argmin(places), np.argmax(places)):  # the cycle begins there: its first sample is the turn
             track = Track(self.coefficients[0] * np.exp(1j * k * angles[at]), self.omega, self.samples)
             found = [law.sample(track) for law in self.group.laws[0]]
-            out.append((float(places[at]), float(sum(one.force[0] for one in found)), float(slip_of(track, found)[0])))
+            out.append((float(places[at]), float(friction_force(self.group.laws[0], found)[0]),
+                        float(slip_of(track, found)[0])))
         return tuple(out)
+
+
+def friction_force(laws: tuple, sampled: list) -> np.ndarray:
+    """Return the force (N,) [N] of the friction laws of a row at its samples, without its bonded springs."""
+    forces = [one.force for law, one in zip(laws, sampled) if law.is_friction]
+    return sum(forces, np.zeros_like(sampled[0].force))
 
 
 def slip_of(track: Track, found: list) -> np.ndarray:

@@ -19,9 +19,9 @@ from ...mesh.nested import coarser, finer, plan_of
 from ...mesh.tensor import TensorGrid
 from ...model.patch import bars
 from ...model.pieces import grid_of, outlined, rounded_edges
+from . import slip_zones
 from .condensed import Pair, condensed
 from .press import Patch, pressed
-from .slip_zones import slip_zones
 from .values import contact_ends
 
 SEARCH_CELLS = 96  # columns of the first search for the contact
@@ -209,7 +209,7 @@ def contact_extent(patch: Patch, slip=None) -> ContactExtent:
     low = places[0] if index[0] else x[0]
     high = places[-1] if index[-1] < x.size - 1 else x[-1]
     return ContactExtent((float(low), float(high)), tuple(places.tolist()), corners, float(cells.max(initial=0.0)),
-                         _crests(x, sigma), slip_zones(patch, slip, found) if slip is not None else ())
+                         _crests(x, sigma), slip_zones.slip_zones(patch, slip, found) if slip is not None else ())
 
 
 def _crests(x, sigma) -> tuple:

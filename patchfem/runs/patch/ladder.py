@@ -7,13 +7,12 @@ from ...core import NotConverged, Outcome
 from ...mesh import anymesh
 from ...mesh.nested import coarser, finer, plan_of
 from ...model.pieces import bodies_of
-from . import fine, high_order
+from . import fine, high_order, slip_zones
 from .condensed import Keyed, condensed, shared_pairs
 from .grids import LEAST_LEVELS, SPENT, Search, base_grids, seconds_of
 from .kept import KEPT, by_content, shares
 from .measures import measures, met, missed
 from .press import pressed, solve
-from .slip_zones import slip_missed
 
 FINE = 1e-3  # tolerance that bilinear meshes meet cheaply
 HELPED = 3.0  # times nearer to the tolerance, from which cells of order 4 end the climb even if they miss it
@@ -178,7 +177,7 @@ def _shows_slip(asked, patches: list, tolerance: float) -> bool:
     """Whether the meshes of patches, fine to coarse, show the work of a prescribed slip to the tolerance."""
     if asked.slip is None:
         return True
-    return slip_missed(patches, asked.slip, tolerance) <= 1
+    return slip_zones.slip_missed(patches, asked.slip, tolerance) <= 1
 
 
 def _finer(asked) -> bool:

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...dynamics.events.elements import JOINED
 from ...effects import NO_WAVEFORM, has
-from ...friction.record import can_overshoot
+from ...friction import record
 from ...model.model import Model
 from ...response.coarser import Coarser, coarser_space
 from ...response.errors import (
@@ -218,7 +218,7 @@ def _march_in_time(model: Model, numerics, patch) -> list:
     f = model.friction
     turn = f.bond_length if f is not None and has(f.law, "bonds") else 0.0
     overshoots = frozenset(of_number("friction_force_peak", number) for number, one in enumerate(model.rig.interfaces)
-                           if can_overshoot(one.numbers))
+                           if record.can_overshoot(one.numbers))
     scales = StepScales(model.rig.displacement, turn, overshoots)
     return [Coarser(_halves(numerics, patch), lambda *values: step_error(*values, numerics.steps, scales), of="steps")]
 
