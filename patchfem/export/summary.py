@@ -13,7 +13,7 @@ from ..disk.installed import installed
 from ..disk.whole import write_text
 from ..effects import EFFECTS
 from ..runs.patch import values
-from ..runs.results.result import Result, choices
+from ..runs.results.result import Result, choices, measure_engines
 from ..runs.rig.plan import run_away
 
 KNOWN = 10.0  # errors of a stiffness, up to which nothing is divided by it
@@ -104,7 +104,8 @@ def summary_of(result: Result) -> dict:
     answer = summary(__version__, what.model.source.title, what.kind, str(result.outcome), result.measures,
                      effects_of(result), list(what.not_in_scene), (result.warnings, result.extra.get("notes", [])),
                      result.seconds)
-    return answer | {"numerics": choices(result)} | contact_of(result) | run_away_of(result) | loop_of(result)
+    numerics = choices(result) | {"measures": measure_engines(result)}
+    return answer | {"numerics": numerics} | contact_of(result) | run_away_of(result) | loop_of(result)
 
 
 def run_away_of(result: Result) -> dict:

@@ -123,9 +123,7 @@ def choices(result) -> dict:
     behind the pieces' shear, how bonds are summed, and interface nodes and strips of its patch,
     and the length [m] that its profile is averaged over.
 
-    map: "events" or "yields" that a steady motion was found by. measures: by name of each that has a value what
-    computed it, in words: how a static measure was found on the meshes of the patch (`patch_rows`), or the engine of
-    the run. A choice that the run did not make is left out.
+    map: "events" or "yields" that a steady motion was found by. A choice that the run did not make is left out.
     """
     extra, patch, out = result.extra, result.patch, {}
     if (engine := extra.get("engine")) is not None:
@@ -150,9 +148,18 @@ def choices(result) -> dict:
             out["profile_averaging"] = float(patch.averaging)
         if result.plan.model.patch.strips is not None:
             out["strips"] = int(result.plan.model.patch.strips[0])
-    engines = {name: one.engine or extra.get("engine", "") for name, one in result.measures.items()
-               if one.value is not None}
-    return out | {"measures": {name: engine for name, engine in engines.items() if engine}}
+    return out
+
+
+def measure_engines(result) -> dict:
+    """Return by name of each measure that has a value what computed it, in words.
+
+    A static measure of a patch names how it was found on the meshes of the patch (`patch_rows`); another measure has
+    the engine of the run.
+    """
+    engines = {name: measure.engine or result.extra.get("engine", "") for name, measure in result.measures.items()
+               if measure.value is not None}
+    return {name: engine for name, engine in engines.items() if engine}
 
 
 def without_folders(texts, path: Path) -> list:
