@@ -87,12 +87,18 @@ class Reader:
 
     def thinned(self, run, drive, values: dict) -> dict:
         """Return what thinned histories leave open of the measures of the whole run, by every second of their samples.
+
+        The changes without the even and without the odd ones add up, as each reversal has neighbours of one kind.
         """
         rows = [row for row in NEEDS_RUN if row.name in values]
         if not rows:
             return {}
-        fewer = self.values(replace(run, response=_between_reversals(run.response)), drive)
-        return {row.name: row.halves[0] * abs(values[row.name] - fewer[row.name]) for row in rows}
+        out = dict.fromkeys([row.name for row in rows], 0.0)
+        for parity in (0, 1):
+            fewer = self.values(replace(run, response=_between_reversals(run.response, parity)), drive)
+            for row in rows:
+                out[row.name] += row.halves[0] * abs(values[row.name] - fewer[row.name])
+        return out
 
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:
         """The Solution of a run; drive: where it is not the model's; more: other fields of it."""
@@ -117,12 +123,12 @@ class Reader:
         return Level(size, self.sticks(run), kept, {name: left * abs(v) for name, v in kept.items()} if left else {})
 
 
-def _between_reversals(histories):
-    """Return histories without every second sample; the ends and the reversals of the slide stay."""
+def _between_reversals(histories, parity: int):
+    """Return histories with every second sample, of this parity; the ends and the reversals of the slide stay."""
     step = np.diff(histories.slide)
-    kept = np.arange(histories.time.size) % 2 == 0
+    kept = np.arange(histories.time.size) % 2 == parity
     kept[1:-1] |= step[1:] * step[:-1] <= 0
-    kept[-1] = True
+    kept[[0, -1]] = True
     return histories.at(kept)
 
 
