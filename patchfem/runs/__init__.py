@@ -11,8 +11,9 @@ module imports its own entry of this list and the entries before it:
 6. `wear`      a patch worn by a bench or a rig over many cycles
 7. `remedies`  the measures that miss the tolerance, and what cures them
 8. `memory`    what a run takes
-9. `plan`      what would run: engine, sizes, cost
-10. `self_checks` two routes to one number: what a run notices by itself
-11. `run`      a plan becomes a result
-12. `many`     many models at once
+9. `tolerance_forecast`  whether a tolerance will be missed, before anything runs
+10. `plan`     what would run: engine, sizes, cost
+11. `self_checks`  two routes to one number: what a run notices by itself
+12. `run`      a plan becomes a result
+13. `many`     many models at once
 """

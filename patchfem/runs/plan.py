@@ -21,6 +21,7 @@ from .patch import plan as patch_plan
 from .rig import engines
 from .rig import numerics as rig_numerics
 from .rig import plan as of_rig
+from .tolerance_forecast import NOTHING_FORESEEN, Forecast, foresee_tolerance
 from .wear import plan as of_wear
 
 LONGEST = 1e6  # seconds of a run, twelve days, beyond which none is begun
@@ -46,7 +47,8 @@ class Plan:
 
     effects: names in the scene; steps: of the time loop, all passes; seconds, bytes: estimates; chain: link ->
     stiffness [N/m] or "rigid"; groups: name -> value; verdict: sentences; parts: of the memory, as `memory.needs`;
-    compile_seconds: besides `seconds`, where no run of this kind has left its compiled code.
+    compile_seconds: besides `seconds`, where no run of this kind has left its compiled code; tolerance: whether it will
+    be missed.
     """
 
     model: Model
@@ -63,6 +65,7 @@ class Plan:
     verdict: tuple
     parts: tuple = ()
     compile_seconds: float = 0.0
+    tolerance: Forecast = NOTHING_FORESEEN
 
     def __repr__(self) -> str:
         sizes = ", ".join(f"{count} {name.removesuffix('_about').replace('_', ' ')}"
@@ -83,7 +86,7 @@ class Plan:
                 "steps": self.steps, "seconds": self.seconds, "bytes": self.bytes, "stiffness_chain": self.chain,
                 "groups": self.groups, "verdict": list(self.verdict), "modes": self.modes(self.chain),
                 "memory": {part.what: int(part.bytes) for part in self.parts},
-                "compile_seconds": self.compile_seconds}
+                "compile_seconds": self.compile_seconds, "tolerance": self.tolerance.as_json()}
 
 
 def compile_words(seconds: float) -> str:
@@ -158,9 +161,11 @@ def _planned(model: Model, per_point: bool) -> Plan:
         said[0] = [*said[0], *of_rig.first_words(model.rig, groups, chain)]
     if engine in SKIPS and drive_sizes.sinusoidal(model.rig.drive) and model.rig.cycles >= MANY:
         said[2] = [*said[2], UP_TO]
+    foreseen = foresee_tolerance(model)
+    said[0] = [*([foreseen.sentence()] if foreseen.causes else []), *said[0]]
     return Plan(model, model.kind, model.source.effects, model.absent, engine, unknowns, steps, round(seconds, 2),
                 int(sum(part.bytes for part in parts)), chain, groups, tuple(_verdict(model, groups, parts, said)),
-                parts, memory.compile_seconds(model, engine, unknowns))
+                parts, memory.compile_seconds(model, engine, unknowns), foreseen)
 
 
 def _verdict(model: Model, groups: dict, parts: tuple, said: list) -> list:

@@ -1,0 +1,184 @@
+"""Whether a scene will miss its tolerance, and by which key it would meet it, before anything is computed.
+
+A scene that leaves its numerical settings to the tolerance mostly meets it. A key that fixes a setting can prevent
+this: steps per cycle, the element size, a method, the neglected part of a sum over bonds. The rules below compare such
+a key with what the tolerance asks for. They speak only where measured runs nearly always missed the tolerance
+(`FEWER_STEPS`, `OF_ELEMENT`); in between they are silent, and the run itself warns.
+"""
+
+from dataclasses import replace
+from math import ceil, exp, floor, log, log10
+from typing import NamedTuple
+
+from ..core import say
+from ..effects import has
+from ..model.model import Model
+from ..scales import plain
+from ..structure import drive_sizes
+from .bench import engine as bench_engine
+from .patch import grids as patch_grids
+from .rig import costs, engines, lists, numerics
+
+# steps per cycle over those that the tolerance asks for, below which runs missed it: of 60 random rigs and 30 benches
+# with 50 to 6400 steps and tolerances of 0.1 to 1e-4, one in twenty met it below these
+FEWER_STEPS = 2 / 3
+FEWER_STEPS_OF_BENCH = {True: 1 / 3, False: 1 / 8}  # with a law of bonds, with any other law
+ENOUGH_STEPS = 4.0  # times the steps that the tolerance asks for: then all measures met it, not only the displacement
+OF_ELEMENT = 0.2  # error over element size / length of the contact; even meshes had 0.2 to 7 (crowns, tilts, flat ends)
+FINEST_PATCH = 1e-6  # error that the finest mesh of a static patch leaves, which costs some CPU s
+FINEST_MOTION = 3e-5  # same of pieces that slip part by part in a rig, whose mesh is kept coarse for the time steps
+SAFE_TOLERANCE = 1e-3  # tolerance that the meshes of patches meet
+MAX_CYCLES = 1e5  # cycles of a drive that are proposed at most
+
+
+class Cause(NamedTuple):
+    """What prevents a tolerance, and its cure.
+
+    words: the cause as the end of a sentence; cure: {key: value to set, None to leave the key out}.
+    """
+
+    words: str
+    cure: dict
+
+
+class Forecast(NamedTuple):
+    """What is foreseen of a tolerance: that asked for, and the causes for which it will be missed."""
+
+    asked: float
+    causes: tuple
+
+    def sentence(self) -> str:
+        """Say that the tolerance will be missed and what to do; "" if nothing prevents it."""
+        if not self.causes:
+            return ""
+        words = " and ".join(cause.words for cause in self.causes)
+        return f"the tolerance {self.asked:g} will not be met {words}; {_cure_words(self.cure())}"
+
+    def cure(self) -> dict:
+        """Return {key: value to set, None to leave the key out} of all causes."""
+        return {key: value for cause in self.causes for key, value in cause.cure.items()}
+
+    def as_json(self) -> dict:
+        """Return the object that `plan --json` has under "tolerance"."""
+        return {"asked": self.asked, "missed": bool(self.causes), "cure": self.cure(), "sentence": self.sentence()}
+
+
+NOTHING_FORESEEN = Forecast(0.0, ())
+
+
+def _cure_words(cure: dict) -> str:
+    """Say which keys to set and which to leave out."""
+    dropped = [key for key, value in cure.items() if value is None]
+    given = [f"{key} = {value:.15g}" for key, value in cure.items() if value is not None]
+    parts = [f"leave out {' and '.join(dropped)}"] * bool(dropped) + [f"set {' and '.join(given)}"] * bool(given)
+    return " and ".join(parts)
+
+
+def foresee_tolerance(model: Model) -> Forecast:
+    """Foresee whether a model will miss its tolerance, from its numbers alone."""
+    tolerance = model.accuracy.tolerance
+    if cause := _mesh_cause(model, tolerance):
+        return Forecast(tolerance, (cause,))
+    causes = [_even_mesh_cause(model, tolerance)]
+    if model.kind in ("rig", "linear"):
+        causes += [_rig_steps_cause(model), _bond_sum_cause(model, tolerance)]
+    elif model.kind == "bench":
+        causes.append(_bench_steps_cause(model))
+    return Forecast(tolerance, tuple(cause for cause in causes if cause is not None))
+
+
+def _without(model: Model, **keys) -> Model:
+    """Return a model with other values of [accuracy]."""
+    return replace(model, accuracy=model.accuracy.model_copy(update=keys))
+
+
+def _mesh_cause(model: Model, tolerance: float) -> Cause | None:
+    """A tolerance that no mesh of pieces meets in a bearable time."""
+    if model.kind == "patch" and model.patch.mesh is None and tolerance < FINEST_PATCH / 2:
+        finest = FINEST_PATCH
+    elif model.kind == "rig" and (model.soft or model.rig.soft) and tolerance < FINEST_MOTION:
+        finest = FINEST_MOTION
+    else:
+        return None
+    cure = {"accuracy.tolerance": SAFE_TOLERANCE}
+    if model.patch is not None and model.patch.size is not None and not model.patch.chosen:
+        cure["contact.element_size"] = None
+    if model.kind == "rig":
+        cure |= _steps_cure(_without(model, tolerance=SAFE_TOLERANCE))
+    return Cause(f"by any mesh: the finest one leaves errors of about {finest:g} or more", cure)
+
+
+def _even_mesh_cause(model: Model, tolerance: float) -> Cause | None:
+    """Elements of a fixed size that are too long for the contact."""
+    patch = model.patch
+    if patch is None or patch.chosen or patch.mesh is not None or patch.meshes is not None:
+        return None
+    if not patch.nominal_load > 0:
+        return None
+    share = patch.size / patch_grids.expected_contact(patch).wide
+    if tolerance > OF_ELEMENT * share:
+        return None
+    words = f"with contact.element_size = {say(patch.size, 3)} ({plain(share, 2)} of the length in contact)"
+    return Cause(words, {"contact.element_size": None})
+
+
+def _rig_steps_cause(model: Model) -> Cause | None:
+    """Time steps of a rig that are too few."""
+    engine = engines.engine_of(model)
+    if not engine.in_time(model, numerics.choose(model), None) or engine.name == engines.SMOOTH.name:
+        return None
+    steps, wanted = numerics.choose(model).steps, costs.steps_wanted(model)
+    if steps > FEWER_STEPS * wanted:
+        return None
+    pinned = model.accuracy.steps_per_cycle is not None
+    words = f"with accuracy.steps_per_cycle = {steps}" if pinned else f"with the {steps} steps per cycle of this run"
+    return Cause(words, _steps_cure(model) | _more_cycles(model))
+
+
+def _steps_cure(model: Model) -> dict:
+    """Keys by which time steps no longer prevent the tolerance: an engine without steps if there is one, else more
+    steps; {} if there are enough."""
+    accuracy = model.accuracy
+    free = engines.engine_of(_without(model, method="auto", steps_per_cycle=None))
+    stepless = (engines.EXACT.name, engines.PIECES.name, engines.SMOOTH.name)
+    if free.name in stepless:
+        dropped = {"accuracy.steps_per_cycle": None} if accuracy.steps_per_cycle is not None else {}
+        return dropped | ({"accuracy.method": None} if accuracy.method != "auto" else {})
+    steps, enough = numerics.choose(model).steps, ENOUGH_STEPS * costs.steps_wanted(model)
+    if steps >= enough:
+        return {}
+    unit = 10**(floor(log10(enough)) - 1)
+    return {"accuracy.steps_per_cycle": 4 * ceil(ceil(enough / unit) * unit / 4)}
+
+
+def _more_cycles(model: Model) -> dict:
+    """Cycles in which the transient of the slowest mode decays below the tolerance, {} if the scene has them."""
+    rig, tolerance = model.rig, model.accuracy.tolerance
+    if not rig.waveform.is_sine or not drive_sizes.sinusoidal(rig.drive):
+        return {}
+    decay = drive_sizes.slowest(rig.modes) * rig.drive.period
+    if decay <= 0 or exp(-decay * rig.cycles) <= tolerance:
+        return {}
+    cycles = ceil(log(1 / tolerance) / decay)
+    return {"drive.cycles": cycles} if cycles <= MAX_CYCLES else {}
+
+
+def _bond_sum_cause(model: Model, tolerance: float) -> Cause | None:
+    """A part of the sum over bonds that is neglected by keys of the scene."""
+    pinned = [f"accuracy.{key}" for key in ("tail", "merge") if getattr(model.accuracy, key) is not None]
+    if not pinned or model.friction is None or not has(model.friction.law, "bonds") or \
+            engines.engine_of(model).name != engines.MARCH.name:
+        return None
+    if lists.quadrature_of(model, numerics.choose(model)).error <= tolerance:
+        return None
+    return Cause(f"with {' and '.join(pinned)} as given", dict.fromkeys(pinned))
+
+
+def _bench_steps_cause(model: Model) -> Cause | None:
+    """Steps of a bench that are too few."""
+    if model.accuracy.steps_per_cycle is None or (has(model.friction.law, "memoryless") and not model.soft):
+        return None  # without a memory there is a closed form
+    steps, wanted = bench_engine.steps_of(model), bench_engine.steps_of(_without(model, steps_per_cycle=None))
+    if steps > FEWER_STEPS_OF_BENCH[has(model.friction.law, "bonds")] * wanted:
+        return None
+    return Cause(f"with accuracy.steps_per_cycle = {steps}", {"accuracy.steps_per_cycle": None})
