@@ -1,0 +1,311 @@
+"""Random benches behind [contact.shear] against an own finite-element and partial-slip solver.
+
+`python micro_slip.py score 52000 60` scores 60 benches from seed 52000 on: crowned, tilted or both,
+coated or not, slid by 0.02 to 2 of the slide at which all of the patch slips, at tolerances of 1e-2
+to 1e-4. `table 52100 12` lists errors at four tolerances.
+
+The solver shares nothing with patchfem. The half of a pair is a grid of biquadratic elements,
+assembled as sums of Kronecker products. Pressure and shear are constant on the cells of the
+interface, contact and stick hold for the averages over cells. With the limits g = mu p of the
+cells, the missing shear r = g - t at the slide q solves r >= 0, C r >= C g - q, r (C r - C g + q)
+= 0, and Masing's rule gives the loop. Each bench is solved on two grids; their difference is the
+uncertainty of the reference.
+"""
+
+import sys
+from collections import defaultdict
+from time import process_time
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.sparse import bmat, csc_matrix, kron, lil_matrix
+from scipy.sparse.linalg import splu
+
+MATERIALS = (("steel", 210e9, 0.3), ("titanium", 121e9, 0.32), ("aluminium", 70e9, 0.33))
+COATING = 250e9, 0.24  # Young's modulus [Pa] and Poisson's ratio
+MASS = np.array([[4, 2, -1], [2, 16, 2], [-1, 2, 4]]) / 30  # quadratic element of length 1
+STIFFNESS = np.array([[7, -8, 1], [-8, 16, -8], [1, -8, 7]]) / 3
+GRADIENT = np.array([[-3, -4, 1], [4, 0, -4], [-1, 4, 3]]) / 6  # derivative of the row by the column
+
+
+def line_matrix(element, lengths, scale):
+    """Global matrix (2 n + 1, 2 n + 1) of quadratic elements; scale: (n,) factor of each."""
+    out = lil_matrix((2 * lengths.size + 1, 2 * lengths.size + 1))
+    for k, factor in enumerate(scale):
+        out[2 * k:2 * k + 3, 2 * k:2 * k + 3] += factor * element
+    return csc_matrix(out)
+
+
+def stiffness_of(columns, rows, young, poisson):
+    """Stiffness of a grid in plane strain, unknowns u, then v, x before y; the last row is held.
+
+    columns (n + 1,), rows (m + 1,) [m]; young, poisson: (m,) of the rows.
+    """
+    hx, hy = np.diff(columns), np.diff(rows)
+    lame, shear = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 + 2 * poisson)
+    mass, stiff, grad = (line_matrix(*part) for part in
+                         ((MASS, hx, hx), (STIFFNESS, hx, 1 / hx), (GRADIENT, hx, np.ones(hx.size))))
+    free = 2 * hy.size
+
+    def along_y(element, lengths, scale):
+        return line_matrix(element, lengths, scale)[:free, :free]
+
+    def terms(a, b):
+        return kron(stiff, along_y(MASS, hy, a * hy)) + kron(mass, along_y(STIFFNESS, hy, b / hy))
+
+    mixed = kron(grad, along_y(GRADIENT, hy, lame).T) + kron(grad.T, along_y(GRADIENT, hy, shear))
+    uu, vv = terms(lame + 2 * shear, shear), kron(stiff, along_y(MASS, hy, shear * hy)) + \
+        kron(mass, along_y(STIFFNESS, hy, (lame + 2 * shear) / hy))
+    return csc_matrix(bmat([[uu, mixed], [mixed.T, vv]])), free
+
+
+def compliances(columns, rows, young, poisson, cells, width):
+    """Normal and tangential compliance (k, k) [m/N] of both pieces between the averages of cells."""
+    matrix, free = stiffness_of(columns, rows, young, poisson)
+    size = matrix.shape[0]
+    order = np.argsort(np.tile(np.repeat(np.arange(2 * columns.size - 1), free), 2), kind="stable")
+    factor = splu(matrix[order][:, order], permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
+                  options={"SymmetricMode": True})
+    place = np.empty(size, int)
+    place[order] = np.arange(size)
+    out = []
+    for offset in (size // 2, 0):  # v for pressure, u for shear
+        nodes = np.array([[place[offset + (2 * c + k) * free] for k in range(3)] for c in cells])
+        found = np.empty((len(cells), len(cells)))
+        for first in range(0, len(cells), 64):
+            part = nodes[first:first + 64]
+            load = np.zeros((size, len(part)))
+            for column, triple in enumerate(part):
+                load[triple, column] = (1 / 6, 4 / 6, 1 / 6)
+            moved = factor.solve(load)
+            found[:, first:first + 64] = (moved[nodes[:, 0]] + 4 * moved[nodes[:, 1]] + moved[nodes[:, 2]]) / 6
+        out.append((found + found.T) / width)
+    return out
+
+
+def complementary(matrix, right, load=None):
+    """Solve f >= 0, matrix f - right - d >= 0, complementary; d = 0, or so that sum f = load."""
+    active = np.ones(right.size, bool)
+    for _ in range(200):
+        index = np.flatnonzero(active)
+        ones = np.ones(index.size)
+        block = matrix[np.ix_(index, index)]
+        both = np.linalg.solve(block, np.stack([right[index], ones], axis=1)) if index.size else np.zeros((0, 2))
+        level = 0.0 if load is None else (load - both[:, 0].sum()) / both[:, 1].sum()
+        force = np.zeros(right.size)
+        force[index] = both[:, 0] + level * both[:, 1]
+        apart = matrix @ force - right - level
+        following = np.where(active, force > 0, apart < -1e-14 * np.abs(right).max())
+        if (following == active).all():
+            return force, level
+        active = following
+    raise RuntimeError("active set cycles")
+
+
+def spaced(start, stop, size):
+    """Places from start to stop with steps of about size(x)."""
+    x, out = start, [start]
+    while x < stop:
+        x += size(x + size(x) / 2)
+        out.append(x)
+    out = np.array(out)
+    return start + (out - start) * (stop - start) / (out[-1] - start)
+
+
+class Bench:
+    """A bench in SI: pieces, shapes, law, slide and tolerance."""
+
+    def __init__(self, seed):
+        draw = np.random.default_rng(seed)
+        self.kind = draw.choice(["crown", "tilt", "both"])
+        self.length, self.width = draw.uniform(10e-3, 60e-3), draw.uniform(5e-3, 45e-3)
+        self.height, self.load = draw.uniform(3e-3, 25e-3), 10**draw.uniform(1.5, 4)
+        self.name, self.young, self.poisson = MATERIALS[draw.integers(3)]
+        self.static, self.thick = draw.uniform(0.1, 0.6), draw.choice([0.0, 1.0], p=[0.6, 0.4])
+        self.thick *= draw.uniform(50e-6, 400e-6)
+        plane = self.young / (1 - self.poisson**2)
+        reach = draw.uniform(0.15, 1.8) * self.length / 2  # half-width of Hertz
+        self.radius = reach**2 * np.pi * plane / 2 / (4 * self.load / self.width)
+        opening = 2 * self.load * 2 * self.height / (plane * self.length * self.width) / self.length
+        self.angle = 10**draw.uniform(-0.7, 1.5) * opening
+        self.crowned, self.tilted = self.kind != "tilt", self.kind != "crown"
+        if self.kind == "both":
+            self.angle *= 0.3
+        self.share = 10**draw.uniform(np.log10(0.02), np.log10(2))
+        self.tolerance = draw.choice(["1e-2", "1e-3", "1e-3", "1e-4"])
+        self.cycles = int(draw.integers(2, 4))
+        self.amplitude = None
+
+    def gap(self, x):
+        """Gap [m] at x [m] of the unloaded faces."""
+        return (x**2 / (2 * self.radius) if self.crowned else 0.0) + (self.angle * x if self.tilted else 0.0)
+
+    def text(self):
+        """Scene file; the amplitude has to be set."""
+        out = [f'[contact]\nlength = "{self.length!r} m"\nwidth = "{self.width!r} m"\nheight = "{self.height!r} m"',
+               f'load = "{self.load!r} N"',
+               f'substrate = {{young = "{self.young!r} Pa", poisson = {self.poisson!r}, density = "7000 kg/m^3"}}']
+        if self.thick:
+            out += [f'[contact.coating]\nthickness = "{self.thick!r} m"', 'material = {young = '
+                    f'"{COATING[0]!r} Pa", poisson = {COATING[1]!r}, density = "14500 kg/m^3"}}']
+        out += [f'[contact.crown]\nradius = "{self.radius!r} m"'] if self.crowned else []
+        out += [f'[contact.tilt]\nangle = "{self.angle!r} rad"'] if self.tilted else []
+        out += ['[contact.shear]\n[friction]\nlaw = "coulomb"', f"static = {self.static!r}", '[slide]\nkind = "sine"',
+                f'amplitude = "{self.amplitude!r} m"', f'frequency = "10 Hz"\ncycles = {self.cycles}\n']
+        return "\n".join(out).replace("np.float64(", "").replace(")", "")
+
+
+class Reference:
+    """Own solution of a bench; fine: cells per length, 1 for the coarse grid."""
+
+    def __init__(self, bench, fine):
+        self.bench, half = bench, bench.length / 2
+        cells, low, high = spaced(-half, half, lambda x: bench.length / 80), -half, half
+        for _ in range(3):  # zoom to the contact on coarse grids
+            centre = (cells[1:] + cells[:-1]) / 2
+            chosen = np.flatnonzero((centre > low) & (centre < high))
+            normal, _ = self._matrices(cells, chosen, 1.0)
+            force, _ = complementary(normal, -bench.gap(centre[chosen]), bench.load)
+            ends = self._ends(cells, chosen, force)
+            wide = ends[1] - ends[0]
+            cells = spaced(-half, half, self._sizes(ends, 1 / 40, 0.25))
+            low, high = max(ends[0] - 0.2 * wide, -half), min(ends[1] + 0.2 * wide, half)
+        self.ends = ends
+        cells = spaced(-half, half, self._sizes(ends, 4e-4 / fine, 0.12 / fine))
+        centre = (cells[1:] + cells[:-1]) / 2
+        margin = 0.02 * wide
+        chosen = np.flatnonzero((centre > ends[0] - margin) & (centre < ends[1] + margin))
+        normal, shear = self._matrices(cells, chosen, fine)
+        force, _ = complementary(normal, -bench.gap(centre[chosen]), bench.load)
+        index = np.flatnonzero(force > 0)
+        self.shear, self.limit = shear[np.ix_(index, index)], bench.static * force[index]
+        self.stiffness = float(np.linalg.solve(self.shear, np.ones(index.size)).sum())
+
+    def _sizes(self, ends, least, slope):
+        """Cell length at x for a contact between `ends`, `least` of it at its open ends."""
+        half, wide = self.bench.length / 2, ends[1] - ends[0]
+        inside = wide * max(least, 1 / 60 * slope / 0.12)
+        open_ends = [end for end in ends if abs(end) < half * (1 - 1e-9)]
+
+        def size(x):
+            out = min([wide * least + slope * abs(x - end) for end in open_ends] + [inside]) \
+                if ends[0] <= x <= ends[1] else min([wide * least + slope * abs(x - end) for end in ends])
+            corner = self.bench.length * 2e-3 + 3 * slope * min(half - x, half + x)
+            return min(out, max(corner, self.bench.length * 1e-3), self.bench.length / 12)
+        return size
+
+    def _ends(self, cells, chosen, force):
+        """Ends of the contact, between cells by the square of the pressure."""
+        loaded = np.flatnonzero(force > 0)
+        first, last = chosen[loaded[0]], chosen[loaded[-1]]
+        return float(cells[first]), float(cells[last + 1])
+
+    def _matrices(self, cells, chosen, fine):
+        bench, near = self.bench, float(np.diff(cells)[chosen].min())
+
+        def size(y):
+            far = bench.height * 4e-3 + 0.5 / fine * (bench.height - y)
+            at_coat = np.inf if not bench.thick else bench.thick / 3 + 0.4 / fine * abs(y - bench.thick)
+            return max(min(near + 0.35 / fine * y, far, at_coat), near)
+        rows = spaced(0.0, bench.height, size)
+        if bench.thick:
+            rows = np.append(spaced(0.0, bench.thick, size), spaced(bench.thick, bench.height, size)[1:])
+        middle = (rows[1:] + rows[:-1]) / 2
+        young = np.where(middle < bench.thick, COATING[0], bench.young)
+        poisson = np.where(middle < bench.thick, COATING[1], bench.poisson)
+        return compliances(cells, rows, young, poisson, chosen, bench.width)
+
+    def measures(self):
+        """Measures by their names in patchfem."""
+        bench, amplitude = self.bench, self.bench.amplitude
+        free = self.shear @ self.limit
+        slides = amplitude * (np.arange(161) / 160)**2
+        lack = np.array([self.stiffness * q - self.limit.sum() + complementary(self.shear, free - q)[0].sum()
+                         for q in slides])
+        lack[0] = 0.0
+        curve = PchipInterpolator(slides, np.maximum(lack, 0.0))
+        area = curve.antiderivative()
+
+        def loop(a):
+            return float(4 * a * curve(a) - 8 * area(a))
+        force = self.stiffness * amplitude - float(curve(amplitude))
+        stored = float(-area(amplitude) - 4 * area(amplitude / 2) + amplitude * curve(amplitude)) \
+            - loop(amplitude) / 4 - loop(amplitude / 2) / 2
+        lost = loop(amplitude) / 4 + (bench.cycles - 0.5) * loop(amplitude) + loop(amplitude / 2) / 2
+        angle = (np.arange(4000) + 0.5) * np.pi / 4000
+        back = curve(amplitude) - 2 * curve(amplitude * (1 - np.cos(angle)) / 2)
+        end = float(curve(amplitude) - 2 * curve(amplitude / 2))
+        return {"tangential_stiffness": self.stiffness, "loop_area": loop(amplitude),
+                "slip_amplitude": loop(amplitude) / (4 * self.limit.sum()), "friction_force_peak": force,
+                "secant_stiffness": force / amplitude, "energy_stored": stored, "energy_dissipated": lost,
+                "friction_work": lost + stored, "friction_ratio_peak": force / bench.load,
+                "friction_ratio_end": end / bench.load,
+                "equivalent_stiffness": self.stiffness - float(2 / np.pi / amplitude * np.mean(back * np.cos(angle))
+                                                               * np.pi)}
+
+
+def solved(seed):
+    """(bench with its amplitude, measures of the fine grid, their differences from the coarse one)."""
+    bench = Bench(seed)
+    fine, coarse = Reference(bench, 1.5), Reference(bench, 1.0)
+    bench.amplitude = float(bench.share * bench.static * bench.load / fine.stiffness)
+    found, other = fine.measures(), coarse.measures()
+    return bench, found, {name: abs(value - other[name]) for name, value in found.items()}
+
+
+def run(bench, tolerance):
+    """(measures, CPU seconds, nodes) of patchfem, without operators that it keeps on disk."""
+    from patchfem.runs.run import run as run_scene
+    from patchfem.scene.scene import loads
+    begin = process_time()
+    result = run_scene(loads(bench.text(), "bench.toml", [f"accuracy.tolerance={tolerance}"]), fresh=True)
+    return result.measures, process_time() - begin, result.patch.x.size
+
+
+def score(first, count):
+    """Print the share of errors that hold, per measure."""
+    every, seconds = defaultdict(list), []
+    for seed in range(first, first + count):
+        bench, true, unsure = solved(seed)
+        found, spent, nodes = run(bench, bench.tolerance)
+        seconds.append(spent)
+        missed = {}
+        for name, value in true.items():
+            one = found.get(name)
+            if one is None or one.value is None or one.error is None:
+                continue
+            # below a thousandth of the floor a digit is nothing; nor is the reference better than its own change
+            apart = max(abs(one.value - value) - unsure[name], 0.0)
+            missed[name] = apart / max(one.error, 1e-3 * one.floor)
+            every[name].append((missed[name], one.error / abs(value), abs(one.value / value - 1)))
+        out = {name: round(float(miss), 2) for name, miss in missed.items() if miss > 1}
+        print(seed, bench.kind, "coated" if bench.thick else "bare", f"share {bench.share:.3f} tol {bench.tolerance}",
+              f"nodes {nodes} {spent:.2f} s; reference loop {unsure['loop_area'] / abs(true['loop_area']):.1e}",
+              f"K {unsure['tangential_stiffness'] / true['tangential_stiffness']:.1e}", out, flush=True)
+    print(f"CPU s: median {np.median(seconds):.2f}, mean {np.mean(seconds):.2f}, largest {max(seconds):.2f}")
+    for name, rows in every.items():
+        miss, wide, off = np.array(rows).T
+        print(f"{name:22s} {100 * np.mean(miss <= 1):5.1f} % of {miss.size}, worst {miss.max():.2f}, median error "
+              f"{np.median(wide):.1e} true {np.median(off):.1e}")
+
+
+def table(first, count):
+    """Print error and true error of four measures at four tolerances."""
+    names = ("loop_area", "friction_force_peak", "equivalent_stiffness", "tangential_stiffness")
+    for seed in range(first, first + count):
+        bench, true, unsure = solved(seed)
+        print(seed, bench.kind, f"share {bench.share:.3f}, reference",
+              ", ".join(f"{name} {unsure[name] / abs(true[name]):.0e}" for name in names))
+        before = None
+        for tolerance in ("1e-2", "1e-3", "1e-4", "1e-5"):
+            found, spent, nodes = run(bench, tolerance)
+            cells = [f"{found[name].error / abs(true[name]):.1e}/{abs(found[name].value / true[name] - 1):.0e}"
+                     for name in names]
+            grows = [name for name, one in found.items() if before and one.error is not None and name in true
+                     and before[name].error is not None and one.error > before[name].error * (1 + 1e-9)]
+            print("  ", tolerance, nodes, f"{spent:.2f} s", *cells, "GROWS" if grows else "", *grows, flush=True)
+            before = found
+
+
+if __name__ == "__main__":
+    {"score": score, "table": table}[sys.argv[1]](int(sys.argv[2]), int(sys.argv[3]))
