@@ -277,7 +277,8 @@ def score(first, count):
             # below a thousandth of the floor a digit is nothing; nor is the reference better than its own change
             apart = max(abs(one.value - value) - unsure[name], 0.0)
             missed[name] = apart / max(one.error, 1e-3 * one.floor)
-            every[name].append((missed[name], one.error / abs(value), abs(one.value / value - 1)))
+            size = max(abs(value), 1e-300)
+            every[name].append((missed[name], one.error / size, abs(one.value - value) / size))
         out = {name: round(float(miss), 2) for name, miss in missed.items() if miss > 1}
         print(seed, bench.kind, "coated" if bench.thick else "bare", f"share {bench.share:.3f} tol {bench.tolerance}",
               f"nodes {nodes} {spent:.2f} s; reference loop {unsure['loop_area'] / abs(true['loop_area']):.1e}",

@@ -11,6 +11,7 @@ The rest is tabulated for loads at |x| < REACH of the half length: contacts near
 
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -84,7 +85,7 @@ def _lines(block: Block) -> tuple:
     faces = [0.0, block.thickness, block.height] if block.thickness else [0.0, block.height]
     least = {face: step / 4 for face in faces[:-1]} | {block.height: step / 16}
     down = [0.0]
-    for low, high in zip(faces[:-1], faces[1:]):
+    for low, high in pairwise(faces):
         borders, far = [low], [high]
         while far[-1] - borders[-1] > 0:
             near = min(least[low] + GROWTH * (borders[-1] - low), (far[-1] - borders[-1]))
@@ -287,7 +288,8 @@ def _values(pair: Pair, case: Case, level: tuple, length: float, alike: bool) ->
     out = {"contact_fraction": np.diff(ends).sum() / length, "pressure_peak": pressure.max(), "approach": delta,
            "rotation": theta, "contact_half_width": (ends[-1, 1] - ends[0, 0]) / 2, "moment": moment,
            "pressure_centre": moment / load, "loaded_fraction": load / (case.width * length * pressure.max()),
-           "normal_stiffness": stiffness(matrix[on], one), "rotational_stiffness": stiffness(matrix[on], middle[active])}
+           "normal_stiffness": stiffness(matrix[on], one),
+           "rotational_stiffness": stiffness(matrix[on], middle[active])}
     if alike:
         shear = pair.matrix(middle[active], low[active], high[active], True)
         out["tangential_stiffness"] = stiffness(shear, one)
