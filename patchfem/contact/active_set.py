@@ -1,4 +1,4 @@
-"""Primal-dual active set on a dense interface compliance, started from a rigid rest position and coarser nodes.
+"""Primal-dual active-set method on a dense interface compliance, started from the rest position of a rigid piece.
 
 On a guessed contact set A the forces and the rigid motion follow from
 
@@ -16,8 +16,6 @@ import numpy as np
 from ..elasticity.lapack import dpotrf, dpotrs
 
 ROUND = 1e-14  # rounding of an opening, relative to the terms it is the sum of
-SMALL = 100  # nodes up to which a new factor costs no more than the change of an old one
-COARSEST = 60  # nodes below which no coarser problem is solved first
 
 
 def factor(matrix: np.ndarray) -> np.ndarray:
@@ -30,16 +28,12 @@ def factor(matrix: np.ndarray) -> np.ndarray:
 
 
 class Operator:
-    """A compliance c (m, m) [m/N], symmetric positive definite, that solves equations on a part of its nodes.
+    """A compliance c (m, m) [m/N], symmetric positive definite, that solves equations on a part of its nodes."""
 
-    The last factor is kept. A set that differs by few nodes is solved with it: an entering node is one more row, a
-    leaving node one more force that makes its own vanish.
-    """
-
-    __slots__ = ("answers", "base", "c", "index", "low")
+    __slots__ = ("c",)
 
     def __init__(self, c: np.ndarray):
-        self.c, self.base, self.index, self.low, self.answers = c, None, None, None, {}
+        self.c = c
 
     @property
     def own(self) -> float:
@@ -62,57 +56,25 @@ class Operator:
         return self.c[rows[:, None], rows]
 
     def solver(self, active: np.ndarray):
-        """Function (n, k) -> (n, k) that solves with the block of the n nodes that are set in `active` (m,) bool.
+        """Factor the block of the active nodes and return a function that solves with it.
 
-        The factor is kept for the next set. LinAlgError where the block is not positive definite.
+        Parameters
+        ----------
+        active : (m,) bool ndarray
+            The nodes whose block of the compliance is factored; n of them are set.
+
+        Returns
+        -------
+        callable
+            Function (n, k) -> (n, k) that solves for k right-hand sides.
+
+        Raises
+        ------
+        LinAlgError
+            If the block is not positive definite.
         """
-        index = np.flatnonzero(active)
-        if self.base is not None and index.size > SMALL:
-            changed = np.flatnonzero(active != self.base)
-            # a changed node costs a few solves, a new factor n^3/3: the change pays while few nodes do
-            if changed.size * 12 <= index.size:
-                return self._changed(active, changed) if changed.size else self._same
-        self.base, self.index, self.low, self.answers = active, index, factor(self.part(index)), {}
-        return self._same
-
-    def _same(self, sides: np.ndarray) -> np.ndarray:
-        return dpotrs(self.low, sides, lower=1)[0]
-
-    def _columns(self, gone, new) -> np.ndarray:
-        """Answers (n, k) of the kept factor to unit forces at the nodes that leave and enter.
-
-        They are kept as well, because the next sets differ little.
-        """
-        lacking = [node for node in (*gone, *new) if node not in self.answers]
-        if lacking:
-            unit = self.c[self.index[:, None], lacking]
-            for k, node in enumerate(lacking):
-                if self.base[node]:
-                    unit[:, k] = self.index == node
-            self.answers.update(zip(lacking, self._same(np.asfortranarray(unit)).T))
-        return np.stack([self.answers[node] for node in (*gone, *new)], axis=1)
-
-    def _changed(self, active, changed):
-        base = self.index
-        gone, new = changed[~active[changed]], changed[active[changed]]
-        places, rows = np.searchsorted(base, gone), self.c[new[:, None], base]
-        answer = self._columns(gone.tolist(), new.tolist())
-        small = np.concatenate([answer[places], rows @ answer])
-        small[gone.size:, gone.size:] -= self.c[new[:, None], new]
-        stays, index = active[base], np.flatnonzero(active)
-        old, entered = np.searchsorted(index, base[stays]), np.searchsorted(index, new)
-
-        def solve(sides):
-            whole = np.zeros((base.size, sides.shape[1]), order="F")
-            whole[stays] = sides[old]
-            free = self._same(whole)
-            lack = np.concatenate([free[places], rows @ free - sides[entered]])
-            added = np.linalg.solve(small, lack)
-            out = np.empty(sides.shape)
-            out[old] = (free - answer @ added)[stays]
-            out[entered] = added[gone.size:]
-            return out
-        return solve
+        lower_factor = factor(self.part(np.flatnonzero(active)))
+        return lambda right_sides: dpotrs(lower_factor, right_sides, lower=1)[0]
 
     def bent(self, force: np.ndarray, index: np.ndarray) -> np.ndarray:
         """Displacement C f (m,) [m] of forces f (m,) [N] that vanish outside the sorted nodes `index`."""
@@ -328,29 +290,3 @@ def first_set(operator: Operator, ask: Ask) -> np.ndarray:
         return ask.gap < 0
     deep = ask.load * np.sqrt(abs(operator.c.diagonal().mean() * operator.c.mean()))
     return ask.gap <= ask.gap.min() + deep
-
-
-def nested_set(operator: Operator, ask: Ask, every: int = 4) -> tuple:
-    """First guess of the contact set from coarser nodes: (set, iterations spent there).
-
-    The lowest of each four nodes form a coarser problem, which is solved in the same way. Its set is spread over those
-    of the four that its rigid motion reaches.
-    """
-    m = ask.x.size
-    if m < COARSEST:
-        return first_set(operator, ask), 0
-    blocks = -(-m // every)
-    padded = np.full(blocks * every, np.inf)
-    padded[:m] = ask.gap
-    lowest = padded.reshape(blocks, every).argmin(axis=1) + every * np.arange(blocks)
-    kept = lowest if lowest[0] == 0 and lowest[-1] == m - 1 else np.unique(np.concatenate([[0], lowest, [m - 1]]))
-    coarse = Operator(operator.part(kept))
-    question = ask._replace(x=ask.x[kept], gap=ask.gap[kept])
-    start, before = nested_set(coarse, question, every)
-    found, active, count = settle(coarse, question, start, 30)  # a coarse answer is only a start
-    touched = np.zeros(blocks, bool)
-    touched[kept[active] // every] = True
-    spread = np.repeat(touched, every)[:m]
-    if found is not None:
-        spread &= ask.gap < found.closing - found.theta * ask.x
-    return spread, before + count

@@ -13,11 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
-from ..core import NotConverged, PatchfemError, frozen_array
-from .unilateral import solve_forces
+from ..core import PatchfemError, frozen_array
 
-NOISE = 1e-13  # of the largest term: what counts as nothing
-BLOCKS = 12  # sets tried with all failing nodes flipped at once
 ROOM = 64e6  # bytes of kept contact sets
 SIDES = 16  # most sides of a polygon, as in `polygon_kernels`
 
@@ -44,38 +41,24 @@ class ContactSet:
 
 
 class ContactSets:
-    """Contact sets of a pair of bodies around a solved state; each is worked out when first met and kept.
+    """Pressed state around which `press_kernels` searches for the contact sets of a pair of bodies.
 
     c: (m, m) [m/N]; x: (m,) [m]; opening: (m,) [m], g + theta0 x - delta0 of the state, below zero where the bodies
     would overlap without forces; on: (m,) bool, the contact set of the state. load N0 [N] and moment M0 [N m] are those
-    of the state. PatchfemError where nothing presses. Compiled twin: `press_kernels`.
+    of the state. PatchfemError where nothing presses. The tests have a NumPy form of the search.
     """
 
     def __init__(self, c, x, opening, on):
         self.c, self.x, self.opening = frozen_array(c), frozen_array(x), frozen_array(opening)
-        self.kept, self.load, self.moment, self.energy = {}, 0.0, 0.0, 0.0
+        self.load, self.moment, self.energy = 0.0, 0.0, 0.0
         self.size = float(np.abs(self.opening).max())
-        self.reference = self._made(np.asarray(on, bool))
-        self.reference = found = self.at(0.0, 0.0)
+        found = self._made(np.asarray(on, bool))
         force = found.forces(0.0, 0.0)
         self.load, self.moment, self.energy = float(force.sum()), float(force @ self.x), float(found.energy[0])
         self.size += float(np.abs(self.c @ force).max())
         if not self.load > 0:
             raise PatchfemError("contact: the motion must start from a loaded contact; raise contact.load")
-        self.kept = {}
-        self.reference = self.contact_set(found.on)
-
-    def contact_set(self, on: np.ndarray) -> ContactSet:
-        """The contact set whose nodes `on` (m,) bool touch, made when first asked for.
-
-        Beyond `ROOM` bytes the oldest one gives way.
-        """
-        key = on.tobytes()
-        if key not in self.kept:
-            if len(self.kept) * 3 * on.size * 8 > ROOM:
-                self.kept.pop(next(iter(self.kept)))
-            self.kept[key] = self._made(on)
-        return self.kept[key]
+        self.reference = self._made(found.on)
 
     def _made(self, on) -> ContactSet:
         index = np.flatnonzero(on)
@@ -91,43 +74,6 @@ class ContactSets:
         energy = np.array([square[0, 0] / 2 - self.energy, square[0, 1] - self.load, square[0, 2] + self.moment,
                            square[1, 1], square[1, 2], square[2, 2]])
         return ContactSet(frozen_array(on, bool), frozen_array(rows), frozen_array(energy))
-
-    def at(self, d: float, t: float, start: ContactSet | None = None) -> ContactSet:
-        """The contact set that holds at a motion d [m], t [rad] beyond the reference.
-
-        start: set to search from, None the reference. Nodes that fail are exchanged, all of them in the first `BLOCKS`
-        sets, then the first alone, which ends for every positive definite C (Murty 1974). Behind it stands
-        `unilateral.solve_forces`. NotConverged where that misses as well. Compiled twin: `press_kernels.locate`.
-        """
-        touching = self.reference if start is None else start
-        for count in range(BLOCKS + 10 * self.x.size):
-            value = touching.values(d, t)
-            terms = np.abs(touching.rows[0]) + np.abs(d * touching.rows[1]) + np.abs(t * touching.rows[2])
-            least = np.where(touching.on, NOISE * terms[touching.on].max(initial=0.0),
-                             NOISE * (self.size + abs(d) + abs(t) * np.abs(self.x[[0, -1]]).max()))
-            fails = value < -least
-            if not fails.any():
-                return touching
-            if count >= BLOCKS:
-                fails &= np.cumsum(fails) == 1
-            touching = self.contact_set(touching.on != fails)
-        force, _, _ = solve_forces(self.c, self.x, self.opening - d + t * self.x, np.zeros(0))
-        touching = self.contact_set(force > 0)
-        if self.flaw(touching, d, t) > 1e-12:  # as `unilateral.SOLVED`
-            raise NotConverged("contact: no set of touching nodes satisfies the contact conditions during the motion; "
-                               "raise the load or check the mesh")
-        return touching
-
-    def flaw(self, touching: ContactSet, d: float, t: float) -> float:
-        """Largest relative violation of contact at (d, t), recomputed from the definition.
-
-        Gaps are measured in the size of the openings, pulls in the load.
-        """
-        force = np.where(touching.on, touching.values(d, t), 0.0)
-        opening = self.opening - d + t * self.x + self.c @ force
-        size = self.size + abs(d) + abs(t) * np.abs(self.x[[0, -1]]).max()
-        pulls = max(-force.min(initial=0.0), 0.0) / max(np.abs(force).sum(), 1e-300)
-        return float(max(np.abs(opening[touching.on]).max(initial=0.0) / size, -opening.min(initial=0.0) / size, pulls))
 
     def arrays(self, room: float = ROOM) -> dict:
         """The sets as arrays of `press_kernels.SetArrays`, nothing in it yet but the reference set in `wanted`.

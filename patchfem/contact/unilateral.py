@@ -15,7 +15,7 @@ import numpy as np
 from ..core import Compliance, NotConverged, Outcome, PatchfemError, Pressure, frozen_array, say
 from ..elasticity.lapack import one_thread
 from . import gradients
-from .active_set import ROUND, Ask, Found, Operator, factor, flaw, nested_set, rest, settle
+from .active_set import ROUND, Ask, Found, Operator, factor, first_set, flaw, rest, settle
 
 LIMIT = 1e-9  # largest relative residual of a skin that still counts as solved
 SOLVED = 1e-12  # of a contact without a skin
@@ -99,16 +99,16 @@ def solve(operator: Operator, ask: Ask, start: np.ndarray | None = None, limit: 
         moment = None if ask.moment is None else ask.moment + ask.spring * lean
         ask = ask._replace(gap=gap - low, moment=moment)
     found = _balanced_on_one(operator, ask, lean) if ask.least == 2 else None
-    before = count = 0
+    count = 0
     if found is None:
         if start is None or np.count_nonzero(start) < ask.least:
-            start, before = nested_set(operator, ask)
+            start = first_set(operator, ask)
         found, _, count = settle(operator, ask, start, limit)
         if found is None or not flaw(found) <= SOLVED:
             found, more = _fallen_back(operator, ask, limit)
             count += more
     closing = 0.0 if low is None else float(found.closing + low)
-    return Solved(found.force, closing, found.theta + lean, found.stiffness, found.force > 0, before + count)
+    return Solved(found.force, closing, found.theta + lean, found.stiffness, found.force > 0, count)
 
 
 def solve_forces(c, x, gap, target, start=None, limit: int = 100, spring: float = 0.0) -> tuple:

@@ -4,12 +4,12 @@ from functools import cache
 
 import numpy as np
 import pytest
+from contact_sets_reference import ContactSets
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pieces import LOAD, coated_pair, rough
 
 from patchfem.compiled import load
-from patchfem.contact.contact_sets import ContactSets
 from patchfem.contact.unilateral import press, solve_forces
 from patchfem.core import PatchfemError
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
 
 from patchfem.contact import unilateral
-from patchfem.contact.active_set import SMALL, Ask, Operator, nested_set, rest, settle
+from patchfem.contact.active_set import Ask, Operator, rest, settle
 from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.gradients import descend, gradients, nearest
 from patchfem.contact.unilateral import SOLVED, press, press_by, solve, undetermined
@@ -359,39 +359,6 @@ def test_exact_the_rest_position_of_a_rigid_piece(seed, line, power, held):
     height = gap + theta * x
     low = x[height <= height.min() + 1e-12]
     assert low[0] - 1e-9 <= 2 * line + spring * theta <= low[-1] + 1e-9
-
-
-@pytest.mark.parametrize("control", list(CONTROLS.values())[:3])
-@pytest.mark.parametrize("shape", list(SHAPES.values()))
-def test_always_coarser_nodes_leave_few_sets_to_try(shape, control):
-    pair = coated_pair(400)
-    ask = Ask(pair.interface.x, shape(pair.interface.x), *control)
-    wanted = solve(Operator(pair.normal), ask)
-    lean = 0.0 if ask.moment is None else rest(ask.x, ask.gap, *control)
-    level = ask.gap + lean * ask.x
-    turned = ask._replace(gap=level - level.min(),
-                          moment=None if ask.moment is None else ask.moment + ask.spring * lean)
-    start, _ = nested_set(Operator(pair.normal), turned)
-    assert settle(Operator(pair.normal), turned, start)[2] <= 6 and wanted.iterations <= 20
-
-
-@given(seed=st.integers(0, 2**32 - 1), gone=st.integers(0, 9), new=st.integers(0, 9))
-def test_exact_a_changed_factor_solves_as_a_new_one(seed, gone, new):
-    rng, pair = np.random.default_rng(seed), coated_pair(200)
-    active = np.zeros(201, bool)
-    active[rng.permutation(201)[:SMALL + 40]] = True
-    operator = Operator(pair.normal)
-    operator.solver(active)
-    kept = operator.low
-    other = active.copy()
-    other[rng.permutation(np.flatnonzero(active))[:gone]] = False
-    other[rng.permutation(np.flatnonzero(~active))[:new]] = True
-    sides = rng.normal(size=(np.count_nonzero(other), 2))
-    found = operator.solver(other)(sides)
-    index = np.flatnonzero(other)
-    wanted = np.linalg.solve(pair.normal[np.ix_(index, index)], sides)
-    assert np.abs(found - wanted).max() <= 1e-9 * np.abs(wanted).max()
-    assert operator.low is kept or (gone + new) * 12 > other.sum()
 
 
 # ---- random gaps on random operators, every control
