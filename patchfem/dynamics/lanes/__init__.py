@@ -7,6 +7,6 @@ without a stop, a yield or a release in it is exact and one with it finds its pl
 `flowing_kernels` (laws of one stretch, from their own kernels: tanh, Bouc-Wen, LuGre, bonds) and `masing_kernels`
 (sliders of one first loading: Iwan's by `power_curve_kernels`, without cells, a patch's by `table_curve_kernels`), of
 which every step is of that order, behind a table of the second at its yields. Read `loop_kernels` first, then `run`,
-which decides where the loop is compiled (`cuda_kernels`: for a graphics processor); `reading` gives the numbers of a
-run from event to event (`events`), whose measures are taken off them.
+which loads the compiled loop; `reading` gives the numbers of a run from event to event (`events`), whose measures are
+taken off them.
 """

@@ -1,6 +1,5 @@
 """Cases of one mode, one interface and a sine as numbers, and their march in lanes."""
 
-from importlib import import_module
 from typing import NamedTuple
 
 import numpy as np
@@ -61,11 +60,8 @@ def flows(law: str) -> bool:
     return "." in law
 
 
-def kernels(law: str, device: str = "cpu"):
-    """The loop of a law, "rigid", "yielding", "masing", "table" or one of a stretch, of a device: the one place that
-    decides what compiles it and where its arrays are, "cpu" or "cuda"."""
-    if device == "cuda":
-        return import_module(f"patchfem.{HERE}.cuda_kernels").kernels(law)  # it brings numba
+def kernels(law: str):
+    """Load the compiled loop of a law: "rigid", "yielding", "masing", "table" or the kernels of a stretch law."""
     loop = f"{HERE}.loop_kernels"
     if flows(law):
         return instance(loop, {"law": instance(f"{HERE}.flowing_kernels", {"friction": law})})
@@ -208,13 +204,11 @@ def room_of(numbers, motion) -> tuple:
     return np.zeros(each * at.LANES), np.zeros(at.LANES + 1, np.int64)
 
 
-def march(law: str, cases: Cases, cycles: int, window: int, steps: int, device: str = "cpu") -> Marched:
+def march(law: str, cases: Cases, cycles: int, window: int, steps: int) -> Marched:
     """March cases over `cycles` by so many steps each; the last `window` of them are read, fewer of what repeats. All
     numbers of a march that ran away are NaN.
-
-    device: as of `kernels`.
     """
-    loop, n = kernels(law, device), len(cases.damp)
+    loop, n = kernels(law), len(cases.damp)
     numbers, table, order = numbers_of(law, cases, steps), table_of(steps), np.arange(n)
     motion, history = begun_at(law, cases), np.zeros((n, cycles, 4))
     start, ended, shown = motion.copy(), np.zeros(n, np.int64), np.zeros((n, at.SHOWN))

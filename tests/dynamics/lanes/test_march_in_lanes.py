@@ -1,9 +1,5 @@
 """Cases marched side by side: against the text run as Python, against finer steps, and against the laws of energy."""
 
-import os
-import subprocess
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -397,33 +393,6 @@ def test_exact_without_friction_a_march_is_the_closed_form():
             turned = vectors @ np.diag(np.exp(values * 14 * np.pi)) @ np.linalg.inv(vectors)
             want = forced + (turned @ (np.array([0, 0.1]) - forced)).real
             np.testing.assert_allclose(found.motion[k, [at.X, at.V]], want, atol=1e-12)
-
-
-SIMULATED = """
-import sys
-sys.path[:0] = {paths!r}
-import numpy as np
-from test_march_in_lanes import cases, run
-from numba import config
-assert config.ENABLE_CUDASIM
-for law in ("rigid", "yielding"):
-    ours, theirs = (run.march(law, cases(law, 3), 4, 2, 24, device) for device in ("cpu", "cuda"))
-    for name in ("motion", "history", "shown"):
-        one, other = getattr(ours, name), getattr(theirs, name)
-        size = np.nanmax(np.abs(one), axis=tuple(range(one.ndim - 1)), initial=0.0)
-        assert one.any() and np.array_equal(np.isnan(one), np.isnan(other)), (law, name)
-        assert (np.nan_to_num(np.abs(one - other)) <= 1e-12 * size).all(), (law, name)
-print("equal")
-"""
-
-
-def test_exact_the_simulator_of_cuda_marches_as_the_processor():
-    """The same text, a case in each thread, in numba's simulator in a process of its own: equal to 1e-12 of the size of
-    each number."""
-    paths = [one for one in sys.path if "tests" in one] + [str(Path(__file__).parent)]
-    said = subprocess.run([sys.executable, "-W", "ignore", "-c", SIMULATED.format(paths=paths)], capture_output=True,
-                          text=True, env=os.environ | {"NUMBA_ENABLE_CUDASIM": "1"}, check=False)
-    assert said.returncode == 0 and said.stdout == "equal\n", said.stderr
 
 
 @pytest.mark.parametrize("law", ["table", "friction.laws.stretch_kernels"])
