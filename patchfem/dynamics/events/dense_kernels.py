@@ -2,11 +2,12 @@
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
-from .drive_kernels import RATE, drive_series
+from .drive_kernels import RATE, drive_series, rate_of
 from .march_kernels import EACH, HEAD
 from .memory_kernels import RIGID
 from .search_kernels import moved, speed_series
-from .series_kernels import fastest, largest, motion_series, powers, value
+from .series_kernels import REACH, fastest, largest, motion_series, powers, value
+from .slow_kernels import at_reach, shortened
 from .stick_kernels import constrain
 
 
@@ -27,10 +28,15 @@ def unfold(row, h, plant, clock, room):
             room.mask[f], room.held[0] = holds, -1.0
     if room.held[0] < 0.0:
         constrain(plant, room)
-    own = fastest(plant, room.springs) if room.held[1] == 0.0 else 0.0
-    top = powers(max(own, segment[RATE]) * h)
-    drive_series(segment, row[5], row[6], clock.period[0], h, top, room.waves)
-    motion_series(place, speed, room.polys[faces], room.springs, plant, room.waves[0], h, top, room.coefs, room)
+    own, rate = fastest(plant, room.springs) if room.held[1] == 0.0 else 0.0, rate_of(segment, clock.period[0])
+    if own * h > REACH * (1 + 1e-9):
+        at_reach(segment, row[5], row[6], clock.period[0], place, speed, room.polys[faces], plant, room)
+        top = powers(rate * h)
+        shortened(rate * h / REACH, top, faces, room)
+    else:
+        top = powers(max(own, segment[RATE]) * h)
+        drive_series(segment, row[5], row[6], clock.period[0], h, top, room.waves)
+        motion_series(place, speed, room.polys[faces], room.springs, plant, room.waves[0], h, top, room.coefs, room)
     for f in range(faces):
         speed_series(plant.faces[f], len(plant.square), room.coefs, top, room.polys[f])
     return top

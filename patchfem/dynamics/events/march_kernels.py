@@ -22,6 +22,7 @@ from .search_kernels import (
     speed_series,
 )
 from .series_kernels import EPS, NONE, REACH, fastest, motion_series, powers, value
+from .slow_kernels import followed, shortened
 from .stick_kernels import LAST, at_rest, keep, settle
 from .sum_kernels import sums
 
@@ -229,14 +230,15 @@ def happen(what, face, sign, plant, table, memory, clock):
 
 
 @njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def piece_series(h, rate, motion, force, plant, clock, room):
-    """Compute the series of a piece that starts now; return its highest power.
-
-    h: length of the piece [s]; rate: fastest rate in it [1/s].
-    """
+def piece_series(h, rate, slow, motion, force, plant, clock, room):
+    """Fill the room with the series of a piece of h [s] from here on; its highest power. rate: the fastest [1/s]; slow:
+    as of `followed`, whose series the room has where it is not 0."""
     top, now, segment = powers(rate * h), clock.now, clock.segments[int(clock.now[2])]
-    drive_series(segment, now[0], now[1], clock.period[0], h, top, room.waves)
-    motion_series(motion[0], motion[1], force, room.springs, plant, room.waves[0], h, top, room.coefs, room)
+    if slow > 0.0:
+        shortened(slow * h / REACH, top, len(plant.reach), room)
+    else:
+        drive_series(segment, now[0], now[1], clock.period[0], h, top, room.waves)
+        motion_series(motion[0], motion[1], force, room.springs, plant, room.waves[0], h, top, room.coefs, room)
     return top
 
 
@@ -260,9 +262,10 @@ def begin_piece(left, motion, plant, table, memory, clock, room):
     for f in range(len(plant.reach)):
         room.springs[f] = tangent(f, table, memory)[0]
     own = fastest(plant, room.springs) if room.held[1] == 0.0 else 0.0
-    rate = max(own, rate_of(segment, clock.period[0]))
+    slow = followed(motion, memory.force, plant, clock, room) if own > 0.0 else 0.0
+    rate = slow if slow > 0.0 else max(own, rate_of(segment, clock.period[0]))
     h = min(REACH / rate * min(1.0, max(rate * wait(motion, plant, table, memory), 0.02)), left)
-    top = piece_series(h, rate, motion, memory.force, plant, clock, room)
+    top = piece_series(h, rate, slow, motion, memory.force, plant, clock, room)
     for f in range(len(plant.reach)):
         if holds(f, table, memory):
             memory.force[f] = room.reactions[f, 0]

@@ -8,6 +8,7 @@ from ...compiled import kernels
 from ...core import ModalBasis, PatchfemError
 from .elements import Memory, Table, virgin
 
+SLOW = 0.02  # of the slowest rate of the modes
 kinds, series = kernels("dynamics.events.drive_kernels"), kernels("dynamics.events.series_kernels")
 
 
@@ -21,7 +22,8 @@ class Plant(NamedTuple):
     square: (n,) omega^2 [1/s2]; damping: (n, n) D [1/s], coupled: whether it is more than its diagonal; base, output:
     (n,); faces: (i, n); mass [kg]; reach: (i,) |face|^2/mass [1/kg], how much a spring there adds to a square of a
     rate; square_most, damping_most: norms of the modes' own; along: number of an interface that
-    moves as the output does, -1 where none does.
+    moves as the output does, -1 where none does; slow: rate [1/s] of a drive up to which the modes, once they do not
+    ring, follow it in a series of its own (`slow_kernels`), 0 where one has no stiffness or no damper.
     """
 
     square: np.ndarray
@@ -35,6 +37,7 @@ class Plant(NamedTuple):
     damping_most: float
     coupled: int
     along: int
+    slow: float
 
 
 def plant_of(modes: ModalBasis) -> Plant:
@@ -46,10 +49,13 @@ def plant_of(modes: ModalBasis) -> Plant:
     coupled = len(damping) > 1 and bool(np.any(damping != np.diag(np.diag(damping))))
     most = np.linalg.norm(damping, 2) if coupled else np.abs(damping).max()
     square, reach = np.array(modes.omega, float)**2, (faces**2).sum(axis=1) / modes.mass
+    least = float(square.min())
+    slow = SLOW * min(np.sqrt(least), least / max(most, 1e-300)) if np.diag(damping).all() else 0.0
     if faces.shape == (1, 1):
         square, reach = tuple(square.tolist()), tuple(reach.tolist())
     return Plant(square, np.ascontiguousarray(damping), np.array(modes.base, float), np.ascontiguousarray(faces),
-                 output, reach, float(modes.mass), float(modes.omega.max()**2), float(most), int(coupled), along)
+                 output, reach, float(modes.mass), float(modes.omega.max()**2), float(most), int(coupled), along,
+                 float(slow))
 
 
 class Clock(NamedTuple):

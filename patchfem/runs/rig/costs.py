@@ -32,6 +32,7 @@ MOST_STEPS = 6400  # finest automatic march, steps per cycle
 HELD = 6  # power of the limit over the push that gives the share of the time in which an element holds (measured .01)
 MOST_PAIRS, AT = 4, 1e-3  # 49 of 769 cells at this tolerance and above: 2e-4 of the motion behind a joint that slips
 REACH = 2.0  # radians of the fastest rate in a piece, of `dynamics.events.series_kernels`
+DYING = 33.0  # times of decay until what rings after an event is round-off, `dynamics.events.slow_kernels`
 PINNED = ("steps_per_cycle", "tail", "merge", "shear_modes")  # knobs of the march
 REPEATS = 30.0  # times of decay of the slowest mode, after which a motion is seen to repeat to its digits
 MORE = 3.5  # times the steps of a march, of which more are not worth their digits: a step costs less than one of it
@@ -98,7 +99,18 @@ def ringing_and_events(model: Model) -> tuple:
     rows = 0 if drive.segments else len(drive.breaks) / model.rig.cycles
     ringing, quick = max(rate * drive.period, 2 * pi * fastest(drive)) / REACH, fastest(drive)
     events = 2 * max(count, faces) * quick + 2 + rows
+    if 2 * pi * quick <= made.slow * drive.period:
+        dying = DYING / min(slowest(modes), float(modes.omega.min())**2 / damping)
+        times = events + _jumps(model) if model.rig.interfaces else 1 / model.rig.cycles  # that it rings
+        ringing = min(ringing, times * dying * rate / REACH + 4 * quick)
     return ringing, events
+
+
+def _jumps(model: Model) -> float:
+    """Slips per cycle of a slow drive that end early as static friction falls to kinetic, at most."""
+    falls = [(one.numbers.static - one.numbers.kinetic) * (model.nominal_load if one.load is None else one.load)
+             for one in model.rig.interfaces if one.numbers.kinetic is not None]
+    return sum(2 * model.rig.mass * largest(model.rig.drive) / fall for fall in falls if fall > 0)
 
 
 def seconds_of_pieces(model: Model) -> float:
