@@ -102,12 +102,10 @@ def analysis(values, harmonics: int) -> np.ndarray:
 
 
 class Law:
-    """A law of a row. total: tangent stiffness at rest [N/m], 0 of one that creeps under any force; is_friction: False
-    for a bonded spring beside the contact, whose force is not part of the friction force."""
+    """A law of a row. total: tangent stiffness at rest [N/m], 0 of one that creeps under any force."""
 
     __slots__ = ()
     total = 0.0
-    is_friction = True
 
     def sharpness(self, amplitude: float) -> int:
         """Samples of a cycle that resolve its corners at a slide amplitude [m]; 0 of one that has none."""
@@ -162,7 +160,6 @@ class Jenkins(Law):
 class Spring(Law):
     """Bonded spring: stiffness [N/m], cubic [N/m3] q^3 besides."""
 
-    is_friction = False
     stiffness: float = 0.0
     cubic: float = 0.0
 
@@ -181,7 +178,6 @@ class Spring(Law):
 class Interlock(Law):
     """Interlocking of wavelength [m]: stiffness wavelength/(2 pi) sin(2 pi q/wavelength), stiffness [N/m] at rest."""
 
-    is_friction = False
     stiffness: float
     wavelength: float
 

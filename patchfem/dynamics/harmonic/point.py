@@ -14,7 +14,7 @@ from ...core import NotConverged
 from .continuation import follow
 from .forces import Group
 from .harmonic import Balance, System, newton, pack, solve_linear, unpack
-from .laws import Track, synthesis
+from .laws import Interlock, Track, synthesis
 from .starts import one_harmonic
 
 LADDER = (7, 15, 31, 63, 127, 255)  # harmonics that are tried
@@ -83,9 +83,12 @@ class Periodic:
 
 
 def friction_force(laws: tuple, sampled: list) -> np.ndarray:
-    """Return the force (N,) [N] of the friction laws of a row at its samples, without its bonded springs."""
-    forces = [one.force for law, one in zip(laws, sampled) if law.is_friction]
-    return sum(forces, np.zeros_like(sampled[0].force))
+    """Return the force (N,) [N] of the laws of a row at its samples, without that of an interlock beside friction.
+
+    The interlock of [structure.bonded] is a spring beside the contact, so its force is no friction force.
+    """
+    friction = [one.force for law, one in zip(laws, sampled) if not isinstance(law, Interlock)]
+    return sum(friction or [one.force for one in sampled])
 
 
 def slip_of(track: Track, found: list) -> np.ndarray:
