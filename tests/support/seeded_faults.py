@@ -129,7 +129,104 @@ OPERATORS = {ast.Add: "-", ast.Sub: "+", ast.Mult: "/", ast.Div: "*"}
 COMPARISONS = {ast.Lt: ">", ast.Gt: "<", ast.LtE: ">=", ast.GtE: "<="}
 
 # (file, line, original text, mutated text, scene), drawn by `draw --seed 1` before any check was written
-FAULTS = ()
+FAULTS = (  # drawn by seed 1: file, line, original and changed text, scene
+    ('friction/laws/elastic_plastic.py', 26,
+     'return parallel([self.static * load / self.length], [self.length])._replace(length=self.length)',
+     'return parallel([self.static * load * self.length], [self.length])._replace(length=self.length)',
+     'point'),
+    ('friction/laws/elastic_plastic_kernels.py', 27,
+     'rest = free - end',
+     'rest = free + end',
+     'point'),
+    ('dynamics/events/march_kernels.py', 88,
+     'row[HEAD + i], row[HEAD + n + i] = motion[0, i], motion[1, i]',
+     'row[HEAD + i], row[HEAD - n + i] = motion[0, i], motion[1, i]',
+     'exact'),
+    ('dynamics/events/series_kernels.py', 249,
+     'rest, wide = 0.0, FEW // 4 * 4 + 4',
+     'rest, wide = 0.0, FEW // 4 * 4 - 4',
+     'exact'),
+    ('structure/drive_sizes.py', 108,
+     'return span > drive.period * (1 - 1e-6)  # round-off of times after many cycles',
+     'return span < drive.period * (1 - 1e-6)  # round-off of times after many cycles',
+     'exact'),
+    ('structure/modes.py', 21,
+     'return ModalBasis(tuple(mode.name for mode in modes), frozen_array(2 * np.pi * column["frequency"]),',
+     'return ModalBasis(tuple(mode.name for mode in modes), frozen_array(2 / np.pi * column["frequency"]),',
+     'exact'),
+    ('response/spectrum.py', 19,
+     'waves = np.exp(-1j * omega * time[:-1])',
+     'waves = np.exp(1j * omega * time[:-1])',
+     'march'),
+    ('response/spectrum.py', 19,
+     'waves = np.exp(-1j * omega * time[:-1])',
+     'waves = np.exp(-1j / omega * time[:-1])',
+     'march'),
+    ('runs/patch/values.py', 100,
+     '"contact_half_width": float(stretches[-1, 1] - stretches[0, 0]) / 2,',
+     '"contact_half_width": float(stretches[-1, 1] + stretches[0, 0]) / 2,',
+     'bench'),
+    ('runs/patch/values.py', 83,
+     '"pressure_centre": p.moment / p.load if p.load > 0 else 0.0, "loaded_fraction": 0.0, "normal_stiffness": 0.0,',
+     '"pressure_centre": p.moment * p.load if p.load > 0 else 0.0, "loaded_fraction": 0.0, "normal_stiffness": 0.0,',
+     'bench'),
+    ('dynamics/propagator.py', 55,
+     'a = drive.values((start[:, None] + self.nodes).ravel()).reshape(count, -1)',
+     'a = drive.values((start[:, None] - self.nodes).ravel()).reshape(count, -1)',
+     'march'),
+    ('dynamics/propagator.py', 185,
+     'c, s = fade * np.cos(under), fade * np.sinc(under / np.pi)',
+     'c, s = fade * np.cos(under), fade / np.sinc(under / np.pi)',
+     'march'),
+    ('friction/bonds/point_kernels.py', 92,
+     'mean = z * f1 + g * eps * x * (sigma * f2 - young * (f1 - f2))',
+     'mean = z * f1 + g / eps * x * (sigma * f2 - young * (f1 - f2))',
+     'march'),
+    ('friction/bonds/point_kernels.py', 26,
+     'return f1, (1 - f1) / x, e',
+     'return f1, (1 + f1) / x, e',
+     'march'),
+    ('slip/shear_modes.py', 231,
+     'c, s = float(low[k, k] / size), float(low[k, k + 1] / size)',
+     'c, s = float(low[k, k] * size), float(low[k, k + 1] / size)',
+     'bench'),
+    ('slip/shear_modes.py', 236,
+     'one[both] = c * one[k] + s * one[k + 1], s * one[k] - c * one[k + 1]',
+     'one[both] = c * one[k] - s * one[k + 1], s * one[k] - c * one[k + 1]',
+     'bench'),
+    ('contact/unilateral.py', 216,
+     'return Pressure(frozen_array(out.force / weight), frozen_array(opening), float(touch + out.closing),',
+     'return Pressure(frozen_array(out.force / weight), frozen_array(opening), float(touch - out.closing),',
+     'static'),
+    ('contact/unilateral.py', 216,
+     'return Pressure(frozen_array(out.force / weight), frozen_array(opening), float(touch + out.closing),',
+     'return Pressure(frozen_array(out.force * weight), frozen_array(opening), float(touch + out.closing),',
+     'static'),
+    ('elasticity/condense.py', 169,
+     'return (out + out.T) / 2',
+     'return (out + out.T) * 2',
+     'static'),
+    ('elasticity/condense.py', 162,
+     'half[np.ix_(place, place)] = part / 2',
+     'half[np.ix_(place, place)] = part * 2',
+     'static'),
+    ('mesh/ends.py', 28,
+     'return length / 2 - self.size + (self.size * GENTLE / hypot(1, GENTLE) if self.kind == "radius" else 0.0)',
+     'return length * 2 - self.size + (self.size * GENTLE / hypot(1, GENTLE) if self.kind == "radius" else 0.0)',
+     'static'),
+    ('mesh/grading.py', 89,
+     'if coating > 0:',
+     'if coating < 0:',
+     'static'),
+    ('elasticity/elasticity.py', 33,
+     'mu = young / (2 * (1 + poisson))',
+     'mu = young / (2 / (1 + poisson))',
+     'static'),
+    ('elasticity/tensor_stiffness.py', 42,
+     'stiff, mass, half = weight / h, weight * h / 6, weight / 2',
+     'stiff, mass, half = weight / h, weight / h / 6, weight / 2',
+     'static'),
+)
 
 
 class Fault(NamedTuple):
@@ -248,10 +345,11 @@ def executed_lines(scene: str) -> dict:
 def applied(fault: Fault, package: Path) -> Path:
     """Write a fault into a copy of the package; returns its file."""
     path = package / fault.file
-    lines = path.read_text("utf-8").splitlines()
-    if lines[fault.line - 1] != fault.original:  # the line has moved since the draw
-        fault = fault._replace(line=lines.index(fault.original) + 1)
-    lines[fault.line - 1] = fault.mutated
+    lines, original = path.read_text("utf-8").splitlines(), fault.original.strip()
+    number = fault.line - 1
+    if lines[number].strip() != original:  # the line has moved since the draw
+        number = [line.strip() for line in lines].index(original)
+    lines[number] = lines[number].replace(original, fault.mutated.strip())
     path.write_text("\n".join(lines) + "\n", "utf-8")
     return path
 
