@@ -1,0 +1,167 @@
+"""Score `patchfem compare` on pairs of stylus traces with known truth (`stylus_pairs`, `known_pairs`).
+
+    python tests/support/score_pairs.py GENERATOR --seeds 90000-90016 [--table FILE.json]
+
+A headline is false where it says something that is not so: wear on an unworn surface, no wear although the worn part is
+deeper than the comparison claims to detect, one place for two. An interval holds where it contains the truth.
+"""
+
+import argparse
+import contextlib
+import importlib
+import io
+import json
+import re
+import tempfile
+import time
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+
+from patchfem.__main__ import main as run_command
+
+UNITS = {"nm": 1e-9, "um": 1e-6, "mm": 1e-3, "m": 1.0}
+
+
+def compare(pair, folder: Path) -> dict:
+    """Return the JSON answer of `patchfem compare` for a pair; `error` holds the message where it is refused."""
+    names = []
+    for name, (x, z) in (("before", pair.before), ("after", pair.after)):
+        path = folder / f"{name}.csv"
+        np.savetxt(path, np.column_stack([x * 1e3, z * 1e6]), delimiter=",", fmt="%.7f", header="x [mm],z [um]",
+                   comments="")
+        names.append(str(path))
+    out, err, code = io.StringIO(), io.StringIO(), 0
+    start = time.process_time()
+    with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
+        try:
+            run_command(["compare", *names, "--json", "-o", str(folder / "out")])
+        except SystemExit as end:
+            code = end.code or 0
+    seconds = time.process_time() - start
+    if code:
+        return {"seconds": seconds, "error": (err.getvalue().strip().splitlines() or ["?"])[-1]}
+    return {"seconds": seconds} | json.loads(out.getvalue())
+
+
+def find_faults(pair, unworn: bool, answer: dict) -> list:
+    """List what the headline or the sentences say that is false."""
+    headline = answer.get("verdict", "")
+    text = " ".join((headline, *answer.get("sentences", []))).lower()
+    comparable = not headline.lower().startswith("not comparable")
+    faults = []
+    if pair.kind == "elsewhere":
+        if comparable and answer.get("worn_depth_mean", {}).get("value") is not None:
+            faults.append("depth for two different places")
+        return faults
+    says_worn = headline.lower().startswith("worn")
+    if unworn and says_worn:
+        faults.append("worn, but nothing wore")
+    if pair.kind in ("deposits", "even", "wedge") and says_worn:
+        faults.append("depth of wear shown where none can be shown")
+    if unworn and any(word in headline for word in ("reduced", "increased", "flatter")):
+        faults.append("waves changed, but they did not")
+    true_mean, true_max = pair.worn.mean(), pair.worn.max()
+    limit = re.search(r"would have been found from a mean depth of ([\d.e+-]+) (nm|um|mm)", text)
+    if limit and pair.kind not in ("even", "wedge") and true_mean > float(limit[1]) * UNITS[limit[2]]:
+        faults.append(f"mean {true_mean:.3g} m not found, limit stated {limit[0]}")
+    if "no wear" in text and not unworn and true_max > 20 * 15e-9 and pair.kind not in ("even", "wedge"):
+        faults.append(f"no wear, but {true_max:.3g} m at the deepest place")
+    hidden = (answer.get("hidden_wear") or {}).get("high")
+    if hidden is not None and pair.kind in ("even", "wedge") and hidden < true_mean:
+        faults.append(f"at most {hidden:.3g} m hidden, true {true_mean:.3g} m")
+    return faults
+
+
+def check_intervals(pair, answer: dict) -> dict:
+    """Return name -> (holds, half-width, error) for each printed quantity whose truth is known."""
+    truth = {}
+    x = pair.after[0]
+    y = x + pair.shift
+    common = (y >= 0) & (y <= pair.before[0][-1])
+    worn, spacing = np.maximum(pair.worn[common], 0.0), x[1] - x[0]  # pile-up is not counted as negative wear
+    hides = pair.kind in ("even", "wedge", "elsewhere")
+    if not hides:
+        truth["shift"] = None
+        truth["worn_depth_mean"], truth["worn_depth_max"] = worn.mean(), worn.max()
+        truth["worn_area"] = worn.sum() * spacing
+    if getattr(pair, "span", None) is not None:
+        lost = np.maximum(pair.worn, 0)
+        truth["track_from"], truth["track_to"] = pair.span
+        truth["track_width"] = pair.span[1] - pair.span[0]
+        truth["track_area_gross"] = lost.sum() * spacing
+        truth["track_depth"] = truth["track_area_gross"] / truth["track_width"]
+        truth["worn_from_after"], truth["worn_to_after"] = pair.span
+    found = {}
+    for name, true in truth.items():
+        quantity = answer.get(name)
+        if isinstance(quantity, dict) and quantity.get("over", "common length") != "common length":
+            continue  # it is a mean over the track alone, which the entries of the track cover
+        if true is None or not isinstance(quantity, dict):
+            continue
+        if quantity.get("low") is None or quantity.get("high") is None:
+            continue
+        low, high = quantity["low"], quantity["high"]
+        outside = max(low - true, true - high, 0.0)
+        half = (high - low) / 2
+        found[name] = (outside <= 0.0, half, quantity["value"] - true, outside / half if half > 0 else np.inf)
+    return found
+
+
+def main() -> None:
+    """Score a generator and print one line per pair, then shares per kind and per quantity."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("generator", choices=("stylus_pairs", "known_pairs"))
+    parser.add_argument("--seeds", required=True, metavar="FIRST-LAST")
+    parser.add_argument("--table", type=Path)
+    request = parser.parse_args()
+    module = importlib.import_module(request.generator)
+    draw = getattr(module, "draw_pair", None) or module.pair
+    unworn_kinds = getattr(module, "UNWORN", None) or ("unworn", "dust", "mirrored", "turned")
+    first, last = map(int, request.seeds.split("-"))
+    rows = []
+    for kind in module.KINDS:
+        for seed in range(first, last + 1):
+            pair = draw(kind, seed)
+            with tempfile.TemporaryDirectory() as folder:
+                answer = compare(pair, Path(folder))
+            if "error" in answer:
+                row = {"kind": kind, "seed": seed, "seconds": answer["seconds"], "error": answer["error"], "faults": [],
+                       "intervals": {}, "headline": ""}
+            else:
+                row = {"kind": kind, "seed": seed, "seconds": answer["seconds"], "headline": answer["verdict"],
+                       "faults": find_faults(pair, kind in unworn_kinds, answer),
+                       "intervals": check_intervals(pair, answer)}
+            rows.append(row)
+            wrong = [f"{name} {value[3]:.1f}" for name, value in row["intervals"].items() if not value[0]]
+            print(f"{kind:16s} {seed} {row['seconds']:.2f} s  {row['headline'][:60]!r} {row.get('error', '')} "
+                  f"{row['faults'] or ''} {wrong or ''}", flush=True)
+    print_summary(rows)
+    if request.table:
+        request.table.write_text(json.dumps(rows, default=float))
+
+
+def print_summary(rows: list) -> None:
+    """Print the shares per kind and per quantity."""
+    for kind in dict.fromkeys(row["kind"] for row in rows):
+        chosen = [row for row in rows if row["kind"] == kind]
+        checks = [value for row in chosen for value in row["intervals"].values()]
+        answered = sum("worn_depth_mean" in row["intervals"] for row in chosen)
+        print(f"{kind:16s} {len(chosen)} pairs, {sum(bool(row['faults']) for row in chosen)} false, "
+              f"{answered} with a mean depth, intervals {sum(c[0] for c in checks)}/{len(checks)}")
+    checks = defaultdict(list)
+    for row in rows:
+        for name, value in row["intervals"].items():
+            checks[name].append(value)
+    for name, values in checks.items():
+        worst = max(value[3] for value in values)
+        print(f"{name:18s} holds {sum(v[0] for v in values)}/{len(values)} = "
+              f"{np.mean([v[0] for v in values]):.3f}, median half-width {np.median([v[1] for v in values]):.3g}, "
+              f"worst miss {worst:.1f} half-widths outside")
+    print(f"false {sum(bool(row['faults']) for row in rows)} of {len(rows)}; refused "
+          f"{sum('error' in row for row in rows)}; CPU median {np.median([row['seconds'] for row in rows]):.2f} s")
+
+
+if __name__ == "__main__":
+    main()
