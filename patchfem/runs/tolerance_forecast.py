@@ -24,10 +24,12 @@ from .rig import costs, engines, lists, numerics
 FEWER_STEPS = 2 / 3
 FEWER_STEPS_OF_BENCH = {True: 1 / 3, False: 1 / 8}  # with a law of bonds, with any other law
 ENOUGH_STEPS = 4.0  # times the steps that the tolerance asks for: then all measures met it, not only the displacement
+ENOUGH_STEPS_OF_BENCH = 2.0  # same of a bench: a triangle needs 1.1 times, a sine at most 1
 OF_ELEMENT = 0.2  # error over element size / length of the contact; even meshes had 0.2 to 7 (crowns, tilts, flat ends)
 FINEST_PATCH = 1e-6  # error that the finest mesh of a static patch leaves, which costs some CPU s
 FINEST_MOTION = 3e-5  # same of pieces that slip part by part in a rig, whose mesh is kept coarse for the time steps
 SAFE_TOLERANCE = 1e-3  # tolerance that the meshes of patches meet
+STEPLESS = ("exact", "piecewise", "smooth")  # engines that need no steps per cycle
 MAX_CYCLES = 1e5  # cycles of a drive that are proposed at most
 
 
@@ -125,7 +127,7 @@ def _even_mesh_cause(model: Model, tolerance: float) -> Cause | None:
 def _rig_steps_cause(model: Model) -> Cause | None:
     """Time steps of a rig that are too few."""
     engine = engines.engine_of(model)
-    if not engine.in_time(model, numerics.choose(model), None) or engine.name == engines.SMOOTH.name:
+    if not engine.in_time(model, numerics.choose(model), None) or engine.name == "smooth":
         return None
     steps, wanted = numerics.choose(model).steps, costs.steps_wanted(model)
     if steps > FEWER_STEPS * wanted:
@@ -140,15 +142,19 @@ def _steps_cure(model: Model) -> dict:
     steps; {} if there are enough."""
     accuracy = model.accuracy
     free = engines.engine_of(_without(model, method="auto", steps_per_cycle=None))
-    stepless = (engines.EXACT.name, engines.PIECES.name, engines.SMOOTH.name)
-    if free.name in stepless:
+    if free.name in STEPLESS:
         dropped = {"accuracy.steps_per_cycle": None} if accuracy.steps_per_cycle is not None else {}
         return dropped | ({"accuracy.method": None} if accuracy.method != "auto" else {})
     steps, enough = numerics.choose(model).steps, ENOUGH_STEPS * costs.steps_wanted(model)
     if steps >= enough:
         return {}
-    unit = 10**(floor(log10(enough)) - 1)
-    return {"accuracy.steps_per_cycle": 4 * ceil(ceil(enough / unit) * unit / 4)}
+    return {"accuracy.steps_per_cycle": _rounded_steps(enough)}
+
+
+def _rounded_steps(steps: float) -> int:
+    """Round steps per cycle up to two digits and to a multiple of four, of which a half and a quarter are whole."""
+    unit = 10**(floor(log10(steps)) - 1)
+    return 4 * ceil(ceil(steps / unit) * unit / 4)
 
 
 def _more_cycles(model: Model) -> dict:
@@ -181,4 +187,5 @@ def _bench_steps_cause(model: Model) -> Cause | None:
     steps, wanted = bench_engine.steps_of(model), bench_engine.steps_of(_without(model, steps_per_cycle=None))
     if steps > FEWER_STEPS_OF_BENCH[has(model.friction.law, "bonds")] * wanted:
         return None
-    return Cause(f"with accuracy.steps_per_cycle = {steps}", {"accuracy.steps_per_cycle": None})
+    enough = _rounded_steps(ENOUGH_STEPS_OF_BENCH * wanted)
+    return Cause(f"with accuracy.steps_per_cycle = {steps}", {"accuracy.steps_per_cycle": enough})
