@@ -43,8 +43,8 @@ class Seen:
     slide [m] up to which it is round-off; even: equally spaced samples of the window, None where they are its own;
     inside(window, number): the window of an interface with samples inside the steps, None where those at their ends are
     enough; together: the interfaces are parts of one, which has no others beside it; number: of the interface, from 0.
-    run: histories of the whole run from t = 0 on, thinned before the last cycles but with every reversal and stop; None
-    where they are not kept.
+    run: histories of the whole run from t = 0 on, equally spaced samples and every reversal; None where they are not
+    kept.
     """
 
     window: Response

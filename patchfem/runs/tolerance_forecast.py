@@ -127,7 +127,7 @@ def _even_mesh_cause(model: Model, tolerance: float) -> Cause | None:
 def _rig_steps_cause(model: Model) -> Cause | None:
     """Time steps of a rig that are too few."""
     engine = engines.engine_of(model)
-    if not engine.in_time(model, numerics.choose(model), None) or engine.name == "smooth":
+    if not engine.in_time(model, numerics.choose(model), None) or engine is engines.SMOOTH:
         return None
     steps, wanted = numerics.choose(model).steps, costs.steps_wanted(model)
     if steps > FEWER_STEPS * wanted:

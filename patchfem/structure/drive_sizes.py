@@ -127,10 +127,13 @@ def undriven(drive) -> bool:
     return len(drive.segments) == 1 and largest(drive) == 0
 
 
-def even_samples(drive, cycles: float) -> int:
-    """Equally spaced samples per cycle that are kept of a whole release of so many cycles: EVEN of them, fewer where
-    they are more than MOST_EVEN in all; 0, where turning points are kept alone, below LEAST_EVEN and under a drive."""
-    count = int(min(EVEN, MOST_EVEN / max(cycles, 1e-300))) if undriven(drive) else 0
+def even_samples(drive, cycles: float, *, wanted: bool = False) -> int:
+    """Equally spaced samples per cycle that are kept of a whole run of so many cycles: EVEN of them, fewer where they
+    are more than MOST_EVEN in all; 0, where turning points are kept alone, below LEAST_EVEN and under a drive.
+
+    wanted: a measure reads the histories of the whole run, so that they are kept under a drive too.
+    """
+    count = int(min(EVEN, MOST_EVEN / max(cycles, 1e-300))) if wanted or undriven(drive) else 0
     return count if count >= LEAST_EVEN else 0
 
 

@@ -105,22 +105,23 @@ def started(modes: ModalBasis, drive, groups, cycles: float, window: int = 1, tr
 
 
 def simulate(modes: ModalBasis, drive, groups, cycles: float, window: int = 10, travel: float = np.inf,
-             frames: int = 0, progress=None, start: Start | None = None, memory=None) -> PieceRun:
+             frames: int = 0, progress=None, start: Start | None = None, memory=None, *,
+             even: bool = False) -> PieceRun:
     """Run `cycles` drive cycles from rest or `start`; keeps the last `window` cycles whole.
 
-    groups: Elements of every interface; frames: snapshots of the elements in the last cycle; memory: of the elements at
-    the start, unstretched without. The outcome is set only where the output passes `travel` [m]; the run ends there.
-    NotConverged where events pile up.
+    groups: Elements of every interface; frames: snapshots of the elements in the last cycle; memory: of the
+    elements at the start, unstretched without; even: as `wanted` of `even_samples`. The outcome is set only where
+    the output passes `travel` [m]; the run ends there. NotConverged where events pile up.
     """
     if start is not None and abs(float(modes.output @ start.z)) > travel:
         raise PatchfemError("structure.travel: the displacement at the start is larger than this travel; raise the "
                             "travel, or start nearer to the middle")
     run = started(modes, drive, groups, cycles, window, travel, start, memory)
-    done = run.go(frames, progress)
+    done = run.go(frames, progress, even=even)
     if done is None:  # the travel ends the run: the same again to there, for the last cycles before it
         again = started(modes, drive, groups, run.now / drive.period, window, np.inf, start, memory)
         again.outcome = Outcome.EXCEEDS_TRAVEL
-        done = again.go(frames, None)
+        done = again.go(frames, None, even=even)
     return done
 
 
@@ -329,9 +330,9 @@ class _Run:
     def _at(self, face: int, column: int) -> int:
         return self.kernels.HEAD + 2 * self.modes.omega.size + self.kernels.EACH * face + column
 
-    def go(self, frames: int, progress) -> PieceRun | None:
-        """The whole run; None where its output passed the travel."""
-        end, wide, late, even = self.cycles, [], [], even_samples(self.drive, self.cycles)
+    def go(self, frames: int, progress, *, even: bool = False) -> PieceRun | None:
+        """The whole run; None where its output passed the travel. even: as of `simulate`."""
+        end, wide, late, even = self.cycles, [], [], even_samples(self.drive, self.cycles, wanted=even)
         first, last = max(0.0, end - self.window), max(0.0, end - 1)
         begin = max(0.0, min(first, end - 2))
         if begin > 0:

@@ -107,14 +107,15 @@ def fresh(modes: ModalBasis, drive, model, steps_per_cycle: int, travel: float =
 
 def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float, steps_per_cycle: int,
           window: int = 10, travel: float = np.inf, frames: int = 0, say=None, progress=None,
-          start=None, marks=(), whole: bool = True, folds: bool = False) -> MarchResult:
+          start=None, marks=(), whole: bool = True, folds: bool = False, *, even: bool = False) -> MarchResult:
     """March for `cycles` drive cycles at `steps_per_cycle` steps from rest or from `start` (core.Start).
 
-    window: whole cycles kept at the end; frames: snapshots of the interface during the last cycle; marks: numbers of
-    whole cycles after which a Mark is kept besides; whole: False keeps nothing, samples and extremes, from before the
-    last cycles of a run without marks; folds: of bonds behind shear modes extremes and phasors of all cycles are kept
-    besides, and the sample of the largest slide. The outcome is set for travel and where a step missed its residual or
-    the motion is not finite (not_converged, `message` says what); Missing when a bond list overflows.
+    window: whole cycles kept at the end; frames: snapshots of the interface during the last cycle; marks: numbers
+    of whole cycles after which a Mark is kept besides; whole: False keeps nothing, samples and extremes, from
+    before the last cycles of a run without marks; folds: of bonds behind shear modes extremes and phasors of all
+    cycles are kept besides, and the sample of the largest slide; even: as `wanted` of `even_samples`. The outcome
+    is set for travel and where a step missed its residual or the motion is not finite (not_converged, `message`
+    says what); Missing when a bond list overflows.
     """
 
     # samples: what is kept so far, `last` of it the cycles of the window; marks may be those of an interrupted march
@@ -135,7 +136,7 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
         samples.again = True
     extremes, phasors = samples.extremes, samples.phasors
     # room: for how many more samples of cycles before the window; picked: first step of a cycle -> those worth keeping
-    room, whole, picked, even = samples.room, whole or bool(asked), {}, even_samples(drive, cycles)
+    room, whole, picked, even = samples.room, whole or bool(asked), {}, even_samples(drive, cycles, wanted=even)
     # a fraction of a cycle comes first, the window is whole
     size = (total - run.done) % steps_per_cycle or steps_per_cycle
     while run.done < total and run.outcome is None:

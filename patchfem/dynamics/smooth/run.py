@@ -345,19 +345,20 @@ class Motion:
 
 
 def simulate(modes: ModalBasis, drive, element, cycles: float, tolerance: float, window: int = 10,
-             travel: float = np.inf, frames: int = 0, start=None, progress=None) -> SmoothResult:
+             travel: float = np.inf, frames: int = 0, start=None, progress=None, *, even: bool = False) -> SmoothResult:
     """Run `cycles` drive cycles from rest or from `start` (core.Start) with steps that meet a relative tolerance.
 
     element: a law with its rate form (`friction.protocol.Element`) on the one interface of the modes; window: whole
     cycles kept at the end; travel [m]: of the output, where the run ends; frames: snapshots of the interface in the
-    last cycle; progress(share): called where the run comes back for other reasons, so it changes nothing. The outcome
-    is set for travel and where no step meets the tolerance (not_converged, `message` says where).
+    last cycle; progress(share): called where the run comes back for other reasons, so it changes nothing; even: as
+    `wanted` of `even_samples`. The outcome is set for travel and where no step meets the tolerance (not_converged,
+    `message` says where).
     """
     run, period = Motion(modes, drive, element, cycles, tolerance, travel, start), drive.period
     run.ends_only(window)
     end, kept, shots = cycles * period, [], []
     run.progress = progress
-    whole, even = min(2.0, cycles) * period, even_samples(drive, cycles)
+    whole, even = min(2.0, cycles) * period, even_samples(drive, cycles, wanted=even)
     if even:
         begin = end - max(whole, window * period)
         kept.append(run.until(begin, np.arange(0, begin, period / even)))
@@ -368,7 +369,8 @@ def simulate(modes: ModalBasis, drive, element, cycles: float, tolerance: float,
     at = end - np.linspace(min(1.0, cycles), 0.0, frames + 1)[1:] * period if frames else []
     rows, (fine, unsure) = run.last(end, window * period, [float(min(t, end)) for t in at], shots)
     if run.outcome is not None and run.time > 0:  # its last cycles were not known before: once more to where it ended
-        done = simulate(modes, drive, element, run.time / period, tolerance, window, np.inf, frames, start)
+        done = simulate(modes, drive, element, run.time / period, tolerance, window, np.inf, frames, start,
+                        even=bool(even))
         return replace(done, outcome=run.outcome, message=run.message)
     last, turned = run.response(rows), run.response(_merged(rows, run, rows[0, 0]))
     rows = np.concatenate([*_early(run, kept[0][0, 0] if kept and not even else rows[0, 0]), *kept, rows])

@@ -11,7 +11,7 @@ from ...friction.record import law_from
 from ...response.ends import end_error
 from ...response.inside_steps import motion_inside_steps
 from ...response.measures import peaks_between, step_harmonic
-from ...response.rows import lateral_work
+from ...response.rows import NEEDS_RUN, lateral_work
 from ...response.spectrum import friction_harmonic, motion_harmonic
 from ...structure.drive_sizes import omega_of, peak_speed, sinusoidal, whole
 from . import levels as rig_levels
@@ -43,7 +43,7 @@ def marched(model, numerics, patch, frames: int = 0, say=None, progress=None) ->
     folds = model.patch is not None and model.patch.gathers  # nobody sees its histories
     done = engine.march(rig.modes, rig.drive, contact, numerics.cycles, numerics.steps, numerics.window, rig.travel,
                      frames, say, progress, rig.start, rig_levels.level_ends(rig),
-                     numerics.whole and not folds, folds)
+                     numerics.whole and not folds, folds, even=bool(NEEDS_RUN))
     seconds = perf_counter() - begin
     done = strips.run_of_strips(done, patch) if rig.strips_slide_apart else done
     return contact, done, seconds, {"reduce": reduced, "compiled_code": loaded}

@@ -18,7 +18,7 @@ from ...response import run_events
 from ...response.loops import interface_loops
 from ...response.measures import REST, harmonic
 from ...response.ringing import held_modes, held_ring, strongest
-from ...response.rows import stuck_share
+from ...response.rows import NEEDS_RUN, stuck_share
 from ...response.spectrum import distorted
 from ...structure.drive_sizes import is_periodic, largest, omega_of, sinusoidal, slowest, whole
 from ..bench import averaged
@@ -52,7 +52,7 @@ def _run(reader, frames: int, say, progress) -> Solution:
 
     def go(drive, state, watch, last: bool, cycles: float = rig.level_cycles):
         done = histories.simulate(rig.modes, drive, reader.groups, cycles, numerics.window, rig.travel, frames * last,
-                                  watch, *state)
+                                  watch, *state, even=bool(NEEDS_RUN))
         return reader.over_strips(done)
 
     if rig.levels:

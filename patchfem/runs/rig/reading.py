@@ -15,6 +15,7 @@ from ...response.loops import at_turns
 from ...response.measures import slip_noise, window_amplitudes, window_ends
 from ...response.outcome import steady_of
 from ...response.rows import NEEDS_RUN, measures_of, row_of
+from ...structure.drive_sizes import even_samples
 from .solution import Solution, decaying, last_cycles
 
 
@@ -42,7 +43,7 @@ class Reader:
         """Measures of the last cycles of a run, or of a mark of it; drive: where it is not the model's; ledger: as
         `Seen` has it."""
         drive = drive or self.model.rig.drive
-        given = {"own": self.integrated(run, drive), "run": _from_the_start(run)} | self.more(run, drive, stuck)
+        given = {"own": self.integrated(run, drive), "run": self.whole_run(run, drive)} | self.more(run, drive, stuck)
         if self.rubs:
             given = {"by": at_turns(self.model), "ledger": ledger} | given
         window, book = given.pop("window", run.window), given.pop("book", run.ledger)
@@ -85,8 +86,15 @@ class Reader:
         return {name: row_of(name).halves[0] * gap + row_of(name).halves[1] / self.steps
                 for name, gap in apart.items()} if own.loops or hasattr(drive, "band") else {}
 
-    def thinned(self, run, drive, values: dict) -> dict:
-        """Return what thinned histories leave open of the measures of the whole run, by every second of their samples.
+    def whole_run(self, run, drive):
+        """Return the histories of a run, or of a mark of it, from t = 0 on; None if equal steps of them are not kept.
+        """
+        histories = getattr(run, "response", None)
+        kept = NEEDS_RUN and histories is not None and even_samples(drive, self.numerics.cycles, wanted=True)
+        return histories if kept and histories.time.size and histories.time[0] == 0 else None
+
+    def between_samples(self, run, drive, values: dict) -> dict:
+        """Return what the samples leave open of the measures of the whole run, by every second of them.
 
         The changes without the even and without the odd ones add up, as each reversal has neighbours of one kind.
         """
@@ -112,7 +120,7 @@ class Reader:
                         amplitudes=window_amplitudes(run.amplitudes, window),
                         outcome=run.outcome or (Outcome.STUCK if stuck else None), book=run.ledger, seconds=seconds,
                         contact=self.contact, held=self.held,
-                        own=own | self.own(run, drive, values) | self.thinned(run, drive, values),
+                        own=own | self.own(run, drive, values) | self.between_samples(run, drive, values),
                         extremes=run.amplitudes, **more)
 
     def level(self, size: float, run, drive=None, left: float = 0.0) -> Level:
@@ -127,15 +135,9 @@ def _between_reversals(histories, parity: int):
     """Return histories with every second sample, of this parity; the ends and the reversals of the slide stay."""
     step = np.diff(histories.slide)
     kept = np.arange(histories.time.size) % 2 == parity
-    kept[1:-1] |= step[1:] * step[:-1] <= 0
+    kept[1:-1] |= step[1:] * step[:-1] < 0
     kept[[0, -1]] = True
     return histories.at(kept)
-
-
-def _from_the_start(run):
-    """Return the histories of a run, or of a mark of it, if they begin at t = 0, and None else."""
-    histories = getattr(run, "response", None)
-    return histories if histories is not None and histories.time.size and histories.time[0] == 0 else None
 
 
 def every_second(window):

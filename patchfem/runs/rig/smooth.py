@@ -6,7 +6,7 @@ from time import perf_counter
 from ...dynamics.integrated import Integrated
 from ...dynamics.smooth import run as engine
 from ...response.measures import slip_noise
-from ...response.rows import row_of
+from ...response.rows import NEEDS_RUN, row_of
 from .interface import contact_of
 from .reading import Reader, every_second
 from .solution import Solution
@@ -29,7 +29,7 @@ def smooth_run(model, numerics, patch, frames: int = 0, say=None, progress=None)
     loaded = perf_counter() - begin
     begin = perf_counter()
     done = engine.simulate(rig.modes, rig.drive, contact.element, numerics.cycles, numerics.local, numerics.window,
-                        rig.travel, frames, rig.start, progress)
+                        rig.travel, frames, rig.start, progress, even=bool(NEEDS_RUN))
     reader = SmoothReader(model, numerics, patch, contact)
     return reader.solution(done, perf_counter() - begin, prepare={"compiled_code": loaded}, extra={
         "step_tolerance": numerics.local, "steps_taken": int(done.ledger["steps"])}), done, reader
