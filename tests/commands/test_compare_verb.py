@@ -82,8 +82,6 @@ def test_exact_json_says_why_there_is_no_depth(files, tmp_path, no_page):
     found = json.loads(cli("compare", files[0], other, "--json", "-o", tmp_path / "out").out)
     for name in NAMES[:4]:
         assert found[name]["value"] is None and "no common part" in found[name]["reason"]
-    guess = found["worn_depth_mean_from_abbott"]
-    assert guess["low"] < guess["value"] < guess["high"] and guess["high"] - guess["low"] > UM
     assert found["amplitude_ratio"]["value"] > 0
 
 

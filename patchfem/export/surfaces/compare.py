@@ -12,8 +12,8 @@ from ...campaigns.compare import data_of as pressed_data
 from ...disk.whole import write_text
 from ...scales import LADDERS, plain, step_of
 from ...surface.areal import level_plane
-from ...surface.compare.carried import NO_LIMIT
 from ...surface.compare.compare import Comparison
+from ...surface.compare.reference import NO_LIMIT
 from ...surface.profile import Profile, even, level
 from ...surface.quantity import LEVEL, Quantity
 from ...surface.roughness.parameters import Heights, abbott
@@ -41,8 +41,7 @@ WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_ma
          "hidden_wear": "mean wear that a tilt may hide",
          "worn_volume": "worn volume", "grown_volume": "grown volume",
          "worn_share": "fraction of the common region that is worn",
-         "shift_x": "shift along x", "shift_y": "shift along y", "rotation": "rotation",
-         "worn_depth_mean_from_abbott": "worn depth, mean, from Abbott curves"}
+         "shift_x": "shift along x", "shift_y": "shift along y", "rotation": "rotation"}
 COMMON, TRACK = "common length", "track"
 DRAWN = 1_000_000  # heights that a histogram and an Abbott curve are drawn from, spread over a larger scan
 NOTE = ("All intervals are 95 % intervals. The intervals of shift, depth and area hold for the measured place and "
@@ -154,7 +153,7 @@ def _of_traces(one: Comparison) -> dict:
         return {} if one.change is None else _of_scans(one.change)
     sizes, *others = ({name: plain_of(each) for name, each in found.items()}
                       for found in (one.tracks.sizes, *one.tracks.others))
-    return {"registration": {"shift": plain_of(one.shift), "mirrored": one.mirrored, "turned": one.turned},
+    return {"registration": {"shift": plain_of(one.shift), "mirrored": one.mirrored},
             "track": sizes or None, "other_tracks": others, "removed": dict(zip(("before", "after"), one.removed))}
 
 
@@ -190,7 +189,7 @@ def surfaces(one: Comparison) -> tuple:
     found = one.registration
     if found is not None:
         pairs = [Profile(found.x, z, each.source) for z, each in
-                 ((found.first, one.before), (found.first - found.rest, one.after))]
+                 ((found.first, one.before), (found.first - found.depth, one.after))]
     else:
         pairs = [one.before, one.after]
     return tuple(level(even(each)) for each in pairs)
@@ -258,14 +257,14 @@ def figures(one: Comparison) -> list:
     """Pictures [(svg, caption, alternative text)] of a comparison."""
     out, found, flanks = [], one.registration, one.flanks
     if found is not None:
-        second = found.first - found.rest
+        second = found.first - found.depth
         tilt = np.polyval(np.polyfit(found.x, found.first, 1), found.x)
-        worn = np.where(found.rest > 3 * found.noise, found.rest, 0.0)
+        worn = np.where(found.depth > 3 * found.noise, found.depth, 0.0)
         out.append((pictures.overlay(found.x, found.first - tilt, second - tilt, worn, _closer(found.x, worn)),
                     "The trace measured after wear, moved by shift, tilt and offset, is drawn over the trace measured "
                     "before.",
                     f"Both traces after alignment: mean worn depth {' '.join(shown(one.worn.mean)[::2])}"))
-        out.append((pictures.difference(found.x, found.rest, found.used, found.noise, None),
+        out.append((pictures.difference(found.x, found.depth, found.unworn, found.noise, None),
                     "The curve is the depth of the second trace (after wear) below the first trace (before wear). "
                     "Blue: the unworn heights to which shift, tilt and offset were fitted.",
                     f"Worn depth along the trace: largest {' '.join(shown(one.worn.largest)[::2])}"))

@@ -360,7 +360,7 @@ def data_of(one: Lost, found: tuple) -> dict:
     return {"patchfem": __version__, "verdict": found[0], "sentences": found[1], "confidence": LEVEL,
             "before": one.before.path, "after": one.after.path, "direction": "x", "reference": "run",
             "shift": plain_of(zero), **{name: plain_of(each) for name, each in one.values.items()},
-            "registration": {"shift": plain_of(zero), "mirrored": False, "turned": False},
+            "registration": {"shift": plain_of(zero), "mirrored": False},
             "track": {name: plain_of(each) for name, each in one.track.items()} or None,
             "removed": {"before": 0, "after": 0},
             "runs": {when: {"outcome": each.run.summary["outcome"], "cycles": each.cycles,

@@ -4,29 +4,40 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ...core import PatchfemError, say
+from ...core import PatchfemError, frozen_array, say
 from ..areal import Areal
 from ..files.read import read_surface
 from ..profile import Profile, despiked, even
 from ..quantity import SIDE, Quantity, around, refused
 from ..roughness.spectrum import BAND
 from ..scans.change import Change, changed
-from . import depth as worn_depth
-from .carried import Carried, carried, hidden_wear, outside, raised
-from .depth import Worn
+from .alignment import Alignment, align
 from .flanks import Flanks, flanks_of
+from .gain import find_gain
+from .model import Parameter
 from .place import CLEAR, Match
 from .ratios import BEYOND, Size, at_step, bridged, likeness, loose, of_noise, ratio, scattered, size_along, size_of
-from .registration import Registration, gain_of, register
-from .rivals import BENT, flanks_differ, readings
+from .readings import BENT, find_readings, find_worn_flanks
+from .reference import Reference, cut_at_wear, find_reference, has_grown, limit_hidden_wear
 from .same import Place, found_place
-from .shallow import on_flanks, shallow_of
 from .specks import without_specks
-from .tracks import Tracks, beside_flanks, of_flanks, pieces_of, tracks_of
+from .worn import (
+    Tracks,
+    Worn,
+    beside_flanks,
+    measure_tracks,
+    measure_worn,
+    pieces_of,
+    section_of,
+    tracks_of_flanks,
+    unknown_worn,
+    worn_of_flanks,
+)
 
 SHIFT = "shift: the point at x in the first trace (before wear) is at x + shift in the second trace (after wear)"
 STRETCH = ("length of the second trace (after wear) divided by the length of the first trace for the same stretch of "
            "surface, found from the unworn valleys")
+MIN_STRETCH = 1e-4  # difference in length that is told, however well it is known
 LOUD = 1.0  # mean square of the noise over that of the surface, from which a ratio is one of noise
 TILT = "tilt of the second trace (after wear) relative to the first (before wear)"
 AMPLITUDE = ("amplitude of a sine with the same mean square as the waves of 60 um to 110 um: value after wear divided "
@@ -36,17 +47,45 @@ SLOPE = "root mean square slope between neighbouring samples: value after wear d
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """What `compared` found for one direction.
+    """Differences of two traces or two scans, before and after wear.
 
-    before, after: Profile or Areal; direction: "x", "y" or ""; reference: what the worn depth counts from: "place",
-    "flanks" or "" for nothing; match: the search for the same place, None for scans and where the shift was told;
-    shift, stretch, tilt, worn_*, amplitude_ratio, slope_ratio, abbott: Quantity; sizes: `Size` before and after; notes:
-    sentences; exchanged: whether material stands above the first trace and none is missing, or a place shows in the
-    other order alone; tracks; carried: what carries the registration, None without one; hidden: what a wedge may hide;
-    removed: heights missing or left out in each; mirrored, turned: whether one trace was, for the registration; gain:
-    heights after over before where they differ by one factor, None where not. change: of two scans, place by place.
-    visible [m]: depth from which a track would have been found where none is shown, None where that is not known;
-    open: the readings that explain two traces alike, in a few words, "" where there is one.
+    Attributes
+    ----------
+    before, after : Profile or Areal
+    direction : str
+        "x" or "y" for traces of scans, else "".
+    reference : str
+        What the worn depth counts from: "place" (heights that agree in both traces), "flanks" (of the
+        trace after) or "" (nothing; there is no worn depth).
+    match : Match or None
+        Search for the same place; None for scans and where the shift is given.
+    shift, stretch, tilt, amplitude_ratio, slope_ratio : Quantity
+    worn : Worn
+    sizes : tuple
+        `Size` before and after.
+    registration : Alignment or None
+    flanks : Flanks or None
+    notes : tuple of str
+    exchanged : bool
+        Whether material stands above the first trace and none is missing, or the traces share a place in
+        the other order alone.
+    tracks : Tracks
+    reference_by : Reference or None
+        Unworn parts or valleys that the alignment rests on.
+    hidden : Quantity
+        Wear that a wedge may hide.
+    removed : tuple of int
+        Heights that are missing or left out in each.
+    mirrored : bool
+        Whether the second trace was mirrored.
+    gain : float or None
+        Heights after over heights before, where they differ by a factor alone.
+    change : Change or None
+        Of two scans.
+    visible : float or None
+        Depth [m] from which a track would have been found, where none was.
+    open : str
+        Readings that explain both traces alike, "" where there is one.
     """
 
     before: Profile | Areal
@@ -60,18 +99,16 @@ class Comparison:
     worn: Worn
     amplitude_ratio: Quantity
     slope_ratio: Quantity
-    abbott: Quantity | None
     sizes: tuple
-    registration: Registration | None = None
+    registration: Alignment | None = None
     flanks: Flanks | None = None
     notes: tuple = field(default=())
     exchanged: bool = False
     tracks: Tracks = field(default=Tracks(()))
-    carried: Carried | None = None
-    hidden: Quantity = field(default_factory=lambda: hidden_wear(None, None))
+    reference_by: Reference | None = None
+    hidden: Quantity = field(default_factory=lambda: limit_hidden_wear(None, None))
     removed: tuple = (0, 0)
     mirrored: bool = False
-    turned: bool = False
     gain: float | None = None
     change: Change | None = None
     visible: float | None = None
@@ -96,20 +133,35 @@ class Comparison:
         out |= _named(self.tracks.sizes)
         if isinstance(self.before, Profile):
             out["hidden_wear"] = self.hidden
-        return out if self.abbott is None else {**out, "worn_depth_mean_from_abbott": self.abbott}
+        return out
 
 
 def compared(before: Profile, after: Profile, direction: str = "", band: tuple = BAND, shift: float | None = None,
              keep_spikes: bool = False, straight: bool = False) -> Comparison:
     """Compare two traces of a surface.
 
-    Spikes, dropouts and dust are left out unless keep_spikes. Where valleys or parts of both traces agree
-    beyond chance (`same`), as they are, mirrored or turned over, they are registered on each other (`registration`) and
-    the worn depth is what is missing, where unworn parts or valleys carry that (`carried`). Else the worn depth counts
-    from unworn flanks of the trace after (`flanks`), or is refused and the guess from the Abbott curves stands beside
-    it. band [m]: waves of the amplitude ratio. shift [m]: where it is known, a place at x of the one is taken to stand
-    at x + shift of the other, give or take half a wave. straight: the datum is known to be straight, so no bow is taken
-    out. PatchfemError for traces that cannot show the band.
+    Spikes, dropouts and dust are left out first. Traces that share a place, as they are or mirrored, are
+    aligned on the heights that did not wear, and the worn depth is what is missing. Else the worn depth
+    counts from unworn flanks of the second trace, or there is none.
+
+    Parameters
+    ----------
+    before, after : Profile
+    direction : str
+    band : tuple
+        Shortest and longest wave [m] of the amplitude ratio.
+    shift : float, optional
+        Known shift [m]: a place at x of the first trace is at x + shift of the second, give or take half
+        a wave.
+    keep_spikes : bool
+        Whether spikes stay.
+    straight : bool
+        Whether the datum is known to be straight, so that no bow is subtracted.
+
+    Raises
+    ------
+    PatchfemError
+        If a trace is too short for the band.
     """
     sides = (before, after) if keep_spikes else (despiked(before), despiked(after))
     place = found_place(*sides, shift, not straight)
@@ -139,7 +191,7 @@ def _without_specks(place: Place, bow: bool) -> Place:
         if before is place.before and after is place.after:
             break
         try:
-            found = register(before, after, place.found.shift, bow=bow)
+            found = align(before, after, place.found.shift, is_straight=not bow)
         except PatchfemError:
             break
         place = place._replace(before=before, after=after, found=found)
@@ -150,57 +202,82 @@ def _placed(place: Place, direction: str, band: tuple, removed: tuple) -> Compar
     """The comparison of two traces of one place."""
     before, after, found = place.before, place.after, place.found
     if identical(before, after):  # but for round-off the fit finds no shift and no tilt
-        found = replace(found, shift=0.0, slope=0.0)
-    by, visible = carried(found), None
-    opened, why = readings(found, by, before, after)
-    if opened:
+        found = replace(found, state=frozen_array(np.zeros(5)))
+    section = section_of(found)
+    by = find_reference(found, section)
+    grew = has_grown(found, section)
+    reading = find_readings(found, bool(by.by), bool(by.by) or grew)
+    if reading.headline:
         by = by._replace(by="")
-    elif not by.by and not raised(found):
-        visible = shallow_of(found)
-        if visible is not None and visible.span is not None:
-            found, by = on_flanks(found, visible.span)
-            opened, why = readings(found, by, before, after)
-            by = by._replace(by="") if opened else by
-    hidden = hidden_wear(found, by)
+    tracks = measure_tracks(found, section, band[1]) if by.by else Tracks(())
+    worn = measure_worn(found, section, tracks)
+    gone = worn.deposited > (worn.area.high or 0.0)
+    if by.by and not worn.mean.low > 0 and gone:
+        by = by._replace(by="")
+    hidden = limit_hidden_wear(found, by)
+    if not by.by:
+        tracks = Tracks(())
+        why = (
+            "no part of the traces is known to be unworn, so uniform, wedge-shaped or bow-shaped wear cannot be "
+            "told from no wear"
+        )
+        worn = unknown_worn(reading.reason or why, worn.deposited if grew else 0.0)
     notes, step = _steps(before, after)
-    gain = gain_of(found) if not (by.by or raised(found)) else None
-    notes += _told(found)
-    worn, tracks = worn_depth.of_registration(found), Tracks(())
-    if by.by:
-        tracks = tracks_of(found, worn_depth.neighbours(found), band[1])
-        worn = replace(worn, largest=_deepest(found, worn.largest, tracks.sizes.get("depth_floor")))
-    else:
-        worn = worn_depth.nowhere(
-            why if opened else "no part of the traces is known to be unworn, so uniform, "
-            "wedge-shaped or bow-shaped wear cannot be told from no wear", worn.deposited if raised(found) else 0.0)
+    notes += _note_stretch(found)
+    ratios, sizes = _ratios(found, tracks, step, band)
+    by = cut_at_wear(by, worn.extent)
+    shift = around(found.shift, found.error_of(Parameter.SHIFT), "m", SHIFT)
+    tilt = around(found.slope, found.error_of(Parameter.SLOPE) / found.half, "rad", TILT)
+    stretch = around(1 + found.stretch, found.error_of(Parameter.STRETCH), "1", STRETCH)
+    grown = not reading.headline and gone and grew and not (worn.mean.low or 0.0) > 0
+    return Comparison(
+        before=before,
+        after=after,
+        direction=direction,
+        reference="place",
+        match=place.match,
+        shift=shift,
+        stretch=stretch,
+        tilt=tilt,
+        worn=worn,
+        amplitude_ratio=ratios[0],
+        slope_ratio=ratios[1],
+        sizes=sizes,
+        registration=found,
+        notes=tuple(notes),
+        exchanged=grown,
+        tracks=tracks,
+        reference_by=by,
+        hidden=hidden,
+        removed=removed,
+        mirrored=place.mirrored,
+        gain=None if by.by or grew else find_gain(found),
+        visible=None if by.by or grew or reading.headline else found.visible,
+        open=reading.headline,
+    )
+
+
+def _ratios(found: Alignment, tracks: Tracks, step: float, band: tuple) -> tuple:
+    """Ratios of amplitude and slope of aligned traces without the edges of the tracks, and the sizes of both sides."""
     pieces = pieces_of(found, tracks, band[1])
     flat = pieces_of(found, tracks, band[1], True)
-    by = outside(by, worn.extent)
-    ratios, sizes = [], [tuple(_pooled(side, step, band) for side in zip(*one)) for one in (flat, pieces)]
-    for name, text, alike, noise in zip(("amplitude", "slope"), (AMPLITUDE, SLOPE), _alike(flat, step, band),
-                                        of_noise(sizes[0], float(np.sqrt(np.mean(found.scatter**2))), step, band)):
+    sizes = [tuple(_pooled(side, step, band) for side in zip(*one)) for one in (flat, pieces)]
+    noise_rms = float(np.sqrt(np.mean(found.noise_at**2)))
+    shares = of_noise(sizes[0], noise_rms, step, band)
+    ratios = []
+    for name, text, alike, noise in zip(("amplitude", "slope"), (AMPLITUDE, SLOPE), _alike(flat, step, band), shares):
+        if noise >= LOUD:
+            why = (
+                f"the noise of the measurement, {say(found.noise)} between the traces, has a larger {name} than "
+                "the surface, so this ratio tells nothing of the surface; measure with less noise, or smooth both "
+                "traces alike"
+            )
+            ratios.append(refused("1", text, why))
+            continue
         one, other = (ratio(name, text, *pair[::-1], alike) for pair in sizes)
         off = abs(np.log(one.value / other.value)) if one.value and other.value else 0.0
-        ratios.append(loose(one, float(np.hypot(np.hypot(BEYOND, noise), off))) if noise < LOUD else refused(
-            "1", text, f"the noise of the measurement, {say(found.noise)} between the traces, has a larger {name} than "
-                       "the surface, so this ratio tells nothing of the surface; measure with less noise, or smooth "
-                       "both traces alike"))
-    stretch = around(1 + found.stretch[0], found.stretch[1], "1", STRETCH) if np.isfinite(found.stretch[0]) \
-        else refused("1", STRETCH, "too few heights are unworn")
-    grew = not opened and worn.deposited > (worn.area.high or 0.0) and not (worn.mean.low or 0.0) > 0
-    return Comparison(before, after, direction, "place", place.match, around(found.shift, found.errors[2], "m", SHIFT),
-                      stretch, around(found.slope, found.errors[1], "rad", TILT), worn, *ratios, None, sizes[0], found,
-                      None, tuple(notes), grew, tracks, by, hidden, removed, place.mirrored, place.turned, gain,
-                      visible=None if visible is None or by.by or opened else visible.least, open=opened)
-
-
-def _deepest(found: Registration, largest: Quantity, floor: Quantity | None) -> Quantity:
-    """The largest worn depth, which is not less than the floor of a track: both are told with their errors."""
-    if floor is None or (found.track is None and floor.value <= largest.value):
-        return largest
-    if found.track is not None:  # no single height stands out, only the floor does
-        return floor._replace(text=worn_depth.MAX)
-    return largest._replace(value=floor.value, low=min(largest.low, floor.value), high=max(largest.high, floor.high))
+        ratios.append(loose(one, float(np.hypot(np.hypot(BEYOND, noise), off))))
+    return ratios, sizes[0]
 
 
 def _apart(place: Place, direction: str, band: tuple, removed: tuple) -> Comparison:
@@ -213,9 +290,8 @@ def _apart(place: Place, direction: str, band: tuple, removed: tuple) -> Compari
     flanks = flanks_of(before, after)
     if place.order and flanks is not None:
         notes.append(why)
-    abbott = None if flanks is not None else worn_depth.abbott_estimate(before, after)
     sides = [[before], [after] if flanks is None else beside_flanks(after, flanks, band[1])]
-    worn = worn_depth.of_flanks(flanks) if flanks is not None else worn_depth.nowhere(why if place.order else
+    worn = worn_of_flanks(flanks) if flanks is not None else unknown_worn(why if place.order else
         f"{why}; the second trace shows no track between unworn flanks either; a worn depth needs one of the two")
     sizes = tuple(_pooled(side, step, band) for side in sides)
     freedom = [[scattered(one, step, band) for one in side] for side in sides]
@@ -224,8 +300,8 @@ def _apart(place: Place, direction: str, band: tuple, removed: tuple) -> Compari
     ratios = [ratio(name, text, sizes[1], sizes[0]) for name, text in (("amplitude", AMPLITUDE), ("slope", SLOPE))]
     blank = [refused(unit, text, why) for unit, text in (("m", SHIFT), ("1", STRETCH), ("rad", TILT))]
     return Comparison(before, after, direction, "" if flanks is None else "flanks", place.match, *blank, worn, *ratios,
-                      abbott, sizes, None, flanks, tuple(notes), place.order,
-                      of_flanks(flanks) if flanks is not None else Tracks(()), removed=removed)
+                      sizes, None, flanks, tuple(notes), place.order,
+                      tracks_of_flanks(flanks) if flanks is not None else Tracks(()), removed=removed)
 
 
 def _flanked(one: Comparison, straight: bool, shift: float | None) -> Comparison:
@@ -236,8 +312,8 @@ def _flanked(one: Comparison, straight: bool, shift: float | None) -> Comparison
         shift = match.shift
     if one.flanks is None or shift is None:
         return one
-    why = flanks_differ(one.before, one.after, shift, one.flanks, straight)
-    return one if not why else replace(one, reference="", worn=worn_depth.nowhere(why), tracks=Tracks(()),
+    why = find_worn_flanks(one.before, one.after, shift, one.flanks, straight)
+    return one if not why else replace(one, reference="", worn=unknown_worn(why), tracks=Tracks(()),
                                        flanks=None, open="" if straight else BENT)
 
 
@@ -272,13 +348,15 @@ def _shares(pieces) -> np.ndarray:
     return length / length.sum()
 
 
-def _told(found: Registration) -> list:
-    value, error, out = found.stretch
-    if not np.isfinite(value) or abs(value) < max(SIDE * 2 * error, 1e-4):
+def _note_stretch(found: Alignment) -> list:
+    """Note that the traces differ in length, as a sentence; nothing where they do not for sure."""
+    value, error = found.stretch, found.error_of(Parameter.STRETCH)
+    if not abs(value) >= max(SIDE * 2 * error, MIN_STRETCH):
         return []
-    text = (f"the same stretch of surface is {1 + value:.5g} (+- {SIDE * error:.1g}) times as long in the second trace "
-            "(after wear) as in the first")
-    return [text + ("; this difference in length is corrected" if out else "; calibrate x of the instrument")]
+    return [
+        f"the same stretch of surface is {1 + value:.5g} (+- {SIDE * error:.1g}) times as long in the second trace "
+        "(after wear) as in the first; this difference in length is corrected"
+    ]
 
 
 def compared_scans(before: Areal, after: Areal, first: str = "x", keep_spikes: bool = False) -> list[Comparison]:
@@ -299,7 +377,7 @@ def _waves(before: Areal, after: Areal, flat: tuple, direction: str) -> Comparis
     except PatchfemError as error:  # a scan too short for the waves of the band
         sizes, ratios = (), [refused("1", text, str(error)) for text in (AMPLITUDE, SLOPE)]
     blank = [refused(unit, text, why) for unit, text in (("m", SHIFT), ("1", STRETCH), ("rad", TILT))]
-    return Comparison(before, after, direction, "", None, *blank, worn_depth.nowhere(why), *ratios, None, sizes)
+    return Comparison(before, after, direction, "", None, *blank, unknown_worn(why), *ratios, sizes)
 
 
 def directions_of(parts: list) -> list:

@@ -8,10 +8,9 @@ from ..areal import Areal
 from ..profile import Profile
 from ..quantity import SIDE, Quantity
 from ..scans import change as scans
-from .carried import bow_as_wear, may_hide, told
 from .compare import Comparison, compared_files, directions_of, identical
-from .rivals import other_reading
-from .shallow import would_show
+from .readings import describe_other
+from .reference import area_of_bow, describe_hidden_wear, describe_reference
 
 EXCHANGED, ELSEWHERE = scans.GREW, scans.ELSEWHERE
 DEPOSITED = 0.05  # of the worn area, what may stand above without a word
@@ -33,7 +32,7 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
     headline is "worn", where a depth is shown, then "reduced", "increased" or "no change shown", by the amplitude of
     the band in each direction; the first sentence says where and how deep. Unchanged surfaces are called "reduced" in
     2.5 of 100 cases, and as often "increased". Before it stands that traces of other places are compared, or, where no
-    depth is shown, that material stands above the trace before; behind it that a trace is mirrored or turned over.
+    depth is shown, that material stands above the trace before; behind it that a trace is mirrored.
     """
     words = [changed(one.amplitude_ratio) for one in parts]
     names = [f" along {one.direction}" if one.direction else "" for one in parts]
@@ -68,7 +67,7 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
     for one, word, name in zip(parts, words, names):
         if not isinstance(one.before, Areal):
             out += [*_variant(one, name), _worn(one, name), *_no_place(one, name), *_reference(one),
-                    *_other_tracks(one), *([] if one.open else other_reading(one.registration))]
+                    *_other_tracks(one), *([] if one.open else describe_other(one.registration))]
         if one.sizes or not isinstance(one.before, Areal):
             out += [_amplitude(one.amplitude_ratio, word, name), _slope(one.slope_ratio, name), *_gain(one, name)]
         else:
@@ -153,22 +152,16 @@ def _no_place(one: Comparison, name: str) -> list:
 
 
 def _over(parts: list) -> str:
-    """What was mirrored or turned over, for the headline."""
-    names = [word for word, any_one in (("mirrored", any(one.mirrored for one in parts)),
-                                        ("turned over", any(one.turned for one in parts))) if any_one]
-    return f"one trace is {' and '.join(names)} relative to the other" if names else ""
+    """What was mirrored, for the headline."""
+    return "one trace is mirrored relative to the other" if any(one.mirrored for one in parts) else ""
 
 
 def _variant(one: Comparison, name: str) -> list:
-    """What was turned for the comparison, as a sentence."""
+    """What was mirrored for the comparison, as a sentence."""
     out = []
     if one.mirrored:
         out.append(f"The second trace{name} was measured in the opposite direction; the trace was mirrored here, so "
                    "its x counts from the other end.")
-    if one.turned:
-        out.append(f"In one trace{name} the heights point out of the material, in the other trace into the material. "
-                   "One trace was inverted here: the one with which wear counts as missing material. Check in which "
-                   "file the heights point into the material.")
     return out
 
 
@@ -182,17 +175,11 @@ def _worn(one: Comparison, name: str) -> str:
                  "are deposits, or the two files are in the wrong order." if one.exchanged else
                  f" {1e12 * one.worn.deposited:.3g} um^2 of material lie above the first trace (before wear): there "
                  "are deposits or pile-up.")
-    if one.reference == "place" and not one.carried.by and not one.open:
+    if one.reference == "place" and not one.reference_by.by and not one.open:
         seen = "" if one.visible is None else f" {would_show(one.visible)}"
-        return f"Worn depth{name}: no wear detected.{above}{seen} {may_hide(one.registration, one.hidden)}"
+        return f"Worn depth{name}: no wear detected.{above}{seen} {describe_hidden_wear(one.registration, one.hidden)}"
     if mean.value is None:
-        text = f"Worn depth{name}: not available; {mean.reason}."
-        if one.abbott is not None and one.abbott.value is not None:
-            text += (f" The valley tails of the Abbott curves suggest a mean worn depth of {_length(one.abbott)}, if "
-                     "the surface is uniform and its valleys are unworn." if one.abbott.low > 0 else
-                     " The valley tails of the Abbott curves show no wear: their mean worn depth of "
-                     f"{_length(one.abbott)} is not above zero beyond its interval.")
-        return text
+        return f"Worn depth{name}: not available; {mean.reason}."
     if not _sure(mean):
         return f"Worn depth{name}: no wear detected; at most {say(mean.high)} on average.{above}"
     what = "over the track, measured from its unworn flanks" if one.reference == "flanks" else \
@@ -209,12 +196,12 @@ def _worn(one: Comparison, name: str) -> str:
 
 def _reference(one: Comparison) -> list:
     """What the depth counts from, and a bow that was taken out, as sentences."""
-    if one.registration is None or not one.carried.by:
+    if one.registration is None or not one.reference_by.by:
         return []
-    out, bend = [told(one.carried)], one.registration.bend
+    out, bend = [describe_reference(one.reference_by)], one.registration.bend
     if bend:
         out.append(f"A curvature (bow) of {say(abs(bend), 3)} over the common length was subtracted, because a bent "
-                   f"datum and wear of that shape{bow_as_wear(one.registration)} look alike.")
+                   f"datum and wear of that shape{area_of_bow(one.registration)} look alike.")
     return out
 
 
@@ -279,3 +266,9 @@ def _direction(when: str, amplitude: Quantity, slope: Quantity) -> str:
         parts.append(f"{name} along x divided by that along y = {_range(one)}: {shown}")
     whole = "anisotropic" if changed(amplitude) in ("reduced", "increased") else "no anisotropy shown"
     return f"{when[0].upper() + when[1:]}: {whole}; " + "; ".join(parts) + "."
+
+
+def would_show(least: float) -> str:
+    """How deep a track would have been found, as a sentence."""
+    return ("A track over the middle third of the common length, with both of its flanks unworn, would have been found "
+            f"from a mean depth of {say(least, 2)} on.")

@@ -13,7 +13,7 @@ from worn_kinds import made
 
 from patchfem.core import frozen_array
 from patchfem.surface.compare.compare import compared
-from patchfem.surface.compare.depth import widths
+from patchfem.surface.compare.section import widths_of
 from patchfem.surface.compare.verdict import EXCHANGED, verdicts
 from patchfem.surface.profile import Profile, despiked
 
@@ -48,11 +48,10 @@ def faults(kind: str, seed: int) -> tuple:
              kind == "scale" and ("reduced" in headline or "increased" in headline) and "calibrate z" not in text,
              kind not in GROWN and headline.startswith(EXCHANGED),
              one.mirrored != (kind == "mirrored" and one.registration is not None),
-             one.turned != (kind == "turned" and one.registration is not None),
              (one.registration is None) != headline.startswith("not comparable") and not one.exchanged]
     if one.registration is not None and one.worn.mean.value is not None:
         x = one.registration.x
-        there, width = np.interp(x, after.x, worn), widths(x)
+        there, width = np.interp(x, after.x, worn), widths_of(x)
         held = [q.low <= true <= q.high for q, true in ((one.worn.mean, width @ there / width.sum()),
                                                         (one.worn.largest, there.max()))]
         false.append("at most" in text and one.worn.mean.high < there.mean())

@@ -9,9 +9,9 @@ from pairs import UM, pair, surface
 from synthetic import report_area
 
 from patchfem.core import PatchfemError, frozen_array
+from patchfem.surface.compare.alignment import align
 from patchfem.surface.compare.compare import compared
 from patchfem.surface.compare.place import matched
-from patchfem.surface.compare.registration import register
 from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile, level
 from patchfem.wear.asperities import rub
@@ -54,12 +54,11 @@ def test_always_200_pairs_hold_the_truth_in_95_of_100_intervals():
 @pytest.mark.parametrize("seed", range(4))
 def test_exact_without_noise(seed):
     p = pair(seed, noise=0.0)
-    found = register(p.before, p.after, matched(p.before, p.after).shift)
+    found = align(p.before, p.after, matched(p.before, p.after).shift)
     worn = np.interp(found.x, p.after.x, p.worn)
     assert abs(found.shift - p.shift) < 5e-11
-    assert abs(found.rest.mean() - worn.mean()) < 2e-11
-    assert found.slope == pytest.approx(p.slope, abs=1e-8)
-    assert found.offset - found.slope * found.middle == pytest.approx(p.offset, abs=1e-11)
+    assert abs(found.depth.mean() - worn.mean()) < 2e-11
+    assert found.slope == pytest.approx(p.slope, abs=3e-8)
 
 
 def test_exact_a_trace_on_itself_shows_no_change():
@@ -85,18 +84,12 @@ def test_always_levelling_both_traces_takes_the_wear_away():
     assert found == pytest.approx(p.worn.mean(), abs=0.005 * UM)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("count", [5, pytest.param(24, marks=pytest.mark.slow)])
-def test_always_traces_of_two_places_have_no_depth_but_a_guess(count):
-    held, guesses = [], []
+@pytest.mark.parametrize("count", [2, pytest.param(24, marks=pytest.mark.slow)])
+def test_always_traces_of_two_places_have_no_depth(count):
     for seed in range(count):
         found = compared(pair(seed + 40000, share=0.0).before, pair(seed + 50000, share=0.0).after)
         assert found.reference == "" and found.worn.mean.value is found.shift.value is None
         assert "no common part" in found.worn.mean.reason and "unworn flanks" in found.worn.mean.reason
-        held.append(found.abbott.low <= 0 <= found.abbott.high)
-        guesses.append(found.abbott.value)
-    assert sum(held) >= count * 5 // 6
-    assert 0.5 * UM < np.sqrt(np.mean(np.square(guesses))) < 2 * UM  # about 1 um, as for other programs' traces
 
 
 @pytest.mark.parametrize("count", [3, pytest.param(8, marks=pytest.mark.slow)])
@@ -105,7 +98,7 @@ def test_always_unworn_traces_of_one_place_show_no_wear(count):
         p = pair(seed, share=0.0)
         found = compared(p.before, p.after)
         assert found.reference == "place"
-        assert found.worn.mean.value is None and abs(found.registration.rest.mean()) < 0.004 * UM
+        assert found.worn.mean.value is None and abs(found.registration.depth.mean()) < 0.004 * UM
         assert "no wear detected" in verdicts([found])[1][0] and "at most" not in verdicts([found])[1][0]
 
 

@@ -50,8 +50,8 @@ def test_always_flanks_too_short_to_tell_leave_both_readings_with_their_numbers(
     assert found.worn.area.value is None and found.worn.extent is None and not found.tracks.sizes
     headline, said = verdicts([found])
     assert headline.startswith("a scar or a bent datum, both are possible")
-    line = found.registration.rival.found
-    assert line.rest.mean() * np.ptp(line.x) == pytest.approx(true, rel=0.05)
+    line = found.registration.rival
+    assert line.depth.mean() * np.ptp(line.x) == pytest.approx(true, rel=0.05)
     told = re.search(r"datum bent by ([\d.]+) nm .* trace ([\d.]+) um\^2 wore off, ([\d.]+) nm on average", said[0])
     assert float(told[1]) == pytest.approx(found.registration.bend * 1e9, rel=0.01)
     assert float(told[2]) == pytest.approx(true * 1e12, rel=0.05)
@@ -71,8 +71,8 @@ def test_always_a_flat_floor_beside_short_flanks_has_both_readings_told():
     headline, said = verdicts([found])
     assert headline.startswith("a scar or material that grew at the ends") and found.worn.area.value is None
     assert "of material grew at the ends" in said[0] and "or the ends are unworn and in a scar" in said[0]
-    line = found.registration.rival.found
-    assert line.rest.mean() * np.ptp(line.x) == pytest.approx(true, rel=0.05)
+    line = found.registration.rival
+    assert line.depth.mean() * np.ptp(line.x) == pytest.approx(true, rel=0.05)
 
 
 @pytest.mark.parametrize("depth, bow", [(lambda x: 0 * x, 0.5 * UM), (lambda x: 0 * x, 0.0),

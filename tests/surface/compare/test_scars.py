@@ -6,8 +6,6 @@ from scars import HELD_OUT, KINDS, UM, pair, rough, score
 
 from patchfem.core import frozen_array
 from patchfem.surface.compare.compare import compared
-from patchfem.surface.compare.registration import register
-from patchfem.surface.compare.rivals import bow_or_scar
 from patchfem.surface.compare.same import found_place
 from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile, despiked
@@ -81,22 +79,13 @@ def test_always_a_straight_datum_that_is_declared_takes_no_bow_out():
     assert found.registration.bend == 0 and found.worn.mean.value == pytest.approx(deep.mean() * UM, rel=0.01)
 
 
-def test_exact_a_reading_without_growth_and_wear_is_told_as_noise():
-    """ "0 um^2 of material grew, and 0 um^2 wore off" stood there as a reading of a scar."""
-    traces, _ = parabola(2000)
-    unworn, worn = (register(traces[0], after, 0.0, bow=False) for after in (traces[0], traces[1]))
-    told = bow_or_scar(unworn, worn)
-    assert "either nothing grew and nothing wore off, and the traces differ by noise of " in told
-    assert "either 0 um^2" not in told
-    assert "um^2 wore off" in bow_or_scar(worn, worn).partition(", or the ends")[0]
-
-
 def test_always_a_told_shift_does_not_make_worn_flanks_unworn():
     """A scar of 5.8 mm on 6 mm was given as one of 4.7 mm, with an interval without the truth."""
     traces, _ = parabola(5800)
     found = compared(*traces, straight=True, shift=0.0)
-    assert found.worn.mean.value is None and "bent" not in found.worn.mean.reason
-    assert "either the datum bent" in compared(*traces, shift=0.0).worn.mean.reason
+    assert found.worn.mean.low == 0.0  # 50 samples of either flank do not tell a scar from a tilt
+    found = compared(*traces, shift=0.0)
+    assert found.worn.mean.value is None and "the datum" in found.worn.mean.reason
 
 
 def test_always_a_told_shift_is_believed_where_nearly_all_heights_agree():

@@ -155,7 +155,7 @@ def test_always_the_deepest_place_is_no_less_deep_than_the_floor_and_the_floor_t
         found = one.tracks.sizes
         assert one.worn.largest.value >= found["depth_floor"].value >= found["depth_mean"].value
         start, end = one.worn.extent.after
-        assert all(b <= start.value or a >= end.value for a, b in one.carried.parts)
+        assert all(b <= start.value or a >= end.value for a, b in one.reference_by.parts)
 
 
 def test_always_a_ratio_of_slopes_that_noise_makes_is_refused():

@@ -1,0 +1,146 @@
+"""Model of a second trace: where its places lie on the first one, and how its datum differs.
+
+A place x of the second trace lies on the first one at c + (x - c) / (1 + stretch) - shift, with c the
+middle of the common part. The depth of the second trace below the first one there is
+
+    w(x) = z_before - z_after + offset + slope u + bend u^2,    u = (x - c) / half of the length.
+"""
+
+from copy import copy
+from enum import IntEnum
+
+import numpy as np
+
+from ...core import PatchfemError
+from ..profile import Profile, even, level
+
+MIN_HEIGHTS = 12  # fewer common heights are no comparison
+N_BLOCKS = 20  # blocks of a trace whose modes give the starts of a fit
+ROUNDING = 1e-5  # of the height: smaller differences are rounding
+MAX_PARABOLA = 51  # samples of the longest parabola that gives a slope
+SLOPE_NOISE = 0.05  # share of noise that a slope may have
+MAX_STEP = 4.0  # samples that a step of the fit may move a place
+
+
+class Parameter(IntEnum):
+    """Positions of the parameters in a state."""
+
+    OFFSET = 0
+    SLOPE = 1
+    SHIFT = 2
+    STRETCH = 3
+    BEND = 4
+
+
+DATUM = (Parameter.OFFSET, Parameter.SLOPE)
+RIGID = (*DATUM, Parameter.SHIFT)
+STRAIGHT = (*RIGID, Parameter.STRETCH)
+BENT = (*STRAIGHT, Parameter.BEND)
+
+
+class TraceModel:
+    """Depth of a second trace below a first one as a function of a state (5,)."""
+
+    shifts = (Parameter.SHIFT,)
+
+    def __init__(self, before: Profile, after: Profile, shift: float):
+        from scipy.interpolate import CubicSpline
+
+        even_before = even(before)
+        known = ~after.missing
+        self.before = even_before
+        self.gaps = before.x, before.missing
+        self.x, self.z = after.x[known], after.z[known]
+        self.spline = CubicSpline(even_before.x, even_before.z)
+        self.slope = self.spline.derivative()
+        self.half = even_before.length / 2
+        self.step = even_before.length / (even_before.x.size - 1)
+        self.height = float(level(even_before).z.std())
+        largest = float(np.abs(self.z).max(initial=0.0))
+        self.least = max(ROUNDING * self.height, 1e-13 * largest, 1e-300)
+        self.middle = 0.0
+        self.is_cut = False
+        self.guess = shift
+        inside = self.overlap(self.places(self.start(shift)))
+        if inside.sum() < MIN_HEIGHTS:
+            raise PatchfemError(
+                f"{after.source}: only {inside.sum()} of its samples lie on {before.source}; at least "
+                f"{MIN_HEIGHTS} are needed"
+            )
+        self.middle = float(self.x[inside][0] + self.x[inside][-1]) / 2
+
+    def start(self, shift: float) -> np.ndarray:
+        """Return the state with a shift [m] alone."""
+        return np.array([0.0, 0.0, shift, 0.0, 0.0])
+
+    def places(self, state) -> np.ndarray:
+        """Return the places [m] in the first trace of the samples of the second one."""
+        from_middle = self.x - self.middle
+        return self.middle + from_middle / (1 + state[Parameter.STRETCH]) - state[Parameter.SHIFT]
+
+    def overlap(self, at) -> np.ndarray:
+        """Return which places lie on the first trace, and not in a gap of it."""
+        edge = 1e-9 * self.half
+        inside = (at >= self.before.x[0] - edge) & (at <= self.before.x[-1] + edge)
+        x, lost = self.gaps
+        if lost.any():
+            after = np.clip(np.searchsorted(x, at), 1, x.size - 1)
+            inside &= ~(lost[after] | lost[after - 1])
+        return inside
+
+    def linearize(self, state) -> tuple:
+        """Return the depth (n,) [m] and its Jacobian (n, 5) at the samples on the first trace."""
+        at = self.places(state)
+        inside = slice(None) if self.is_cut else self.overlap(at)
+        along, at = (self.x[inside] - self.middle) / self.half, at[inside]
+        fall = -self.slope(at)
+        depth = self.spline(at) - self.z[inside]
+        depth += state[0] + state[1] * along + state[4] * along**2
+        columns = [np.ones(at.size), along, fall, fall * along * self.half, along**2]
+        return depth, np.column_stack(columns)
+
+    def limit(self, step, free) -> np.ndarray:
+        """Limit a step of the fit to a few samples of shift and stretch."""
+        most = {Parameter.SHIFT: MAX_STEP * self.step, Parameter.STRETCH: MAX_STEP * self.step / self.half}
+        bound = np.array([most.get(k, np.inf) for k in free])
+        return np.clip(step, -bound, bound)
+
+    def tolerances(self, scale: float) -> np.ndarray:
+        """Return the changes (5,) of the parameters that move the depth by the scale [m]."""
+        steep = max(float(np.std(np.diff(self.before.z))) / self.step, 1e-12)
+        moved = scale / steep
+        return np.array([scale, scale, moved, moved / self.half, scale])
+
+    def blocks(self, count: int) -> list:
+        """Return the blocks of samples whose modes give the starts of a fit."""
+        return np.array_split(np.arange(count), N_BLOCKS)
+
+    def smooth_slope(self, scale: float) -> None:
+        """Take slopes from parabolas so long that the noise [m] leaves little in them.
+
+        A slope between noisy neighbours errs together with their heights and would draw the shift
+        to places between samples.
+        """
+        from scipy.signal import savgol_filter
+
+        rough = float(np.std(savgol_filter(self.before.z, 5, 2, 1, delta=self.step)))
+        ratio = scale / (self.step * SLOPE_NOISE * max(rough, 1e-300))
+        wanted = (6 * ratio**2) ** (1 / 3)
+        count = int(np.clip(2 * np.ceil(wanted / 2) + 1, 3, MAX_PARABOLA))
+        count = min(count, self.before.z.size // 2 * 2 - 1)
+        smooth = savgol_filter(self.before.z, count, 2, 1, delta=self.step)
+        self.slope = lambda at: np.interp(at, self.before.x, smooth)
+
+    def cut(self, state) -> "TraceModel":
+        """Return the model of the samples that lie on the first trace in a state, of these alone."""
+        inside = self.overlap(self.places(state))
+        out = copy(self)
+        out.x, out.z, out.is_cut = self.x[inside], self.z[inside], True
+        return out
+
+    def thinned(self, count: int) -> "TraceModel":
+        """Return the model with about so many samples of the second trace."""
+        every = max(self.x.size // count, 1)
+        out = copy(self)
+        out.x, out.z = self.x[::every], self.z[::every]
+        return out
