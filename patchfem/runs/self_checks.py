@@ -218,7 +218,10 @@ class Evidence:
         if self.result.outcome in (Outcome.EXCEEDS_TRAVEL, Outcome.GROWS, Outcome.NOT_CONVERGED):
             return None
         size = self.number("drive", "acceleration")
-        drive = size if size is not None else self.number("drive", "force") / modes.mass
+        force = self.number("drive", "force")
+        if size is None and force is None:  # of another kind, such as a displacement of the base
+            return None
+        drive = force / modes.mass if size is None else size
         return balance_of(modes, window, drive, 2 * np.pi * self.frequency)
 
 

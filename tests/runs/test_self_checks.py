@@ -64,3 +64,14 @@ def test_a_wrong_measure_ends_as_not_converged(monkeypatch):
     assert result.outcome is Outcome.NOT_CONVERGED
     assert any("loop_area" in text for text in result.warnings)
     assert any("equivalent_stiffness" in text for text in result.warnings)
+
+
+def test_always_a_displacement_of_the_base_is_checked_without_a_fault():
+    """The check of the force balance asked for the acceleration of the drive, which this scene does not name."""
+    text = (
+        '[normal]\nload = "275 N"\n[friction]\nlaw = "bouc-wen"\nstatic = 0.8\nstiffness = "9e6 N/m"\n'
+        '[structure]\nmoving_mass = "0.8 kg"\n[[structure.mode]]\nname = "axial"\nfrequency = "40 Hz"\n'
+        'damping = 0.003\nslide = 1.0\nbase = 0.8\n[drive]\nkind = "base"\ndisplacement = "0.2 mm"\n'
+        'frequency = "77 Hz"\ncycles = 6\n[accuracy]\ntolerance = 0.01\nmethod = "harmonic"\n'
+    )
+    assert pf.run(text).measures["loop_area"].value > 0
