@@ -278,9 +278,8 @@ class Row(NamedTuple):
     of: its function of the solution, None where a run of another kind or an engine alone has it; grain: samples of a
     cycle that its reading may be off by; group: of measures that a reader looks at together, motion, friction, energy,
     patch or wear; term: of a measure that is a difference of larger terms, what these are in words, and the size of
-    them from the values of the same interface by name; the tolerance times it is a floor as well. halves: what it may
-    be off by where it is read off the samples of a motion that is exact: times its change by every second of them, and
-    of a sample's share of the cycle. A reading of first order is off by its change, one of second order by a third.
+    them from the values of the same interface by name; the tolerance times it is a floor as well. order: at which
+    its error falls with the distance of the samples where it is read off those of a motion that is exact.
     needs_run: it is read off the histories of the whole run, which the runs behind its error then keep too.
     minimum: the smallest value that it can have.
     """
@@ -293,7 +292,7 @@ class Row(NamedTuple):
     grain: float = 0.0
     group: str = "motion"
     term: tuple[str, Callable] | None = None
-    halves: tuple[float, float] = (1.5, 0.0)
+    order: float = 1.0
     needs_run: bool = False
     minimum: float = -np.inf
 

@@ -51,11 +51,9 @@ SAMPLE, LAW_STEP, PATH_STEP, PATH_STRIP, PATH_POINT = 1e-7, 6e-5, 1.2e-3, 2e-6, 
 
 # of a patch with its fields, and of these alone; per predicted second of condensing it, and of pieces beyond the
 # interface, whose predicted seconds are those of any cells already; of the frames of one that moves, and per node of
-# the finest grids; of cells of order 4 at a tolerance of 1e-4, and times that where a contact ends inside or under a
-# coating
+# the finest grids
 PRESSED, FIELDS, CONDENSED, OUTLINED = 0.15, 0.1, 3.0, 2.2
 MOVING, MOVING_NODE = 0.35, 3e-5
-SHARPER, EDGED = 0.09, 3.0
 
 OURS = 0.0214  # of the work of `speed` on the machine of the table
 

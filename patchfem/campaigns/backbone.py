@@ -31,7 +31,7 @@ from ..model.model import Model
 from ..model.slide import SlidePath
 from ..model.source import placed
 from ..response.decay_curve import DecayCurve, curve_of, of_turns, turns, turns_from_outside
-from ..response.errors import OF_MODES, with_errors
+from ..response.errors import error_of_change, finer_errors, with_errors
 from ..runs.bench import bench
 from ..runs.bench.engine import steps_of
 from ..runs.bench.errors import errors_of
@@ -47,13 +47,12 @@ from ..structure.drive_sizes import decay_rate
 
 WAYS = ("balance", "decay", "quasi-static")
 LADDER = (9, 19, 39)  # harmonics that are tried, each time with four times the samples of a cycle
-LEFT, MOST = 3.0, 65536  # changes at twice the harmonics that count as the error; samples of a cycle
+MOST = 65536  # samples of a cycle
 DECADE = 8  # amplitudes a decade, unless given
 LOW, HIGH = 1e-2, 15.0  # their ends over the slide at which all of the contact slips
 MICRO, GROSS = 0.3, 3.0  # shares of that slide, below which the contact is in micro-slip, above which all of it slips
 SOFT, HARD = 0.7, 3.0  # of the amplitude at which a cubic spring has the mode's stiffness, the largest by default
 FREE = 2.0  # the first of rigid friction, over what friction deflects the mode by at rest
-CELLS = 4.0  # by which the change at four cells in one is divided, some 15 times the error
 RESOLVED = 4.0  # times its error, a loss that counts for an exponent
 FEW = 6  # amplitudes that are named one by one
 SMALL = 1e-5  # of the slide at which all of the contact slips, one in which nothing slips
@@ -206,10 +205,14 @@ def _beside(curve: Curve, other: Curve) -> Curve:
     if not curve.amplitude.size:
         raise NotConverged("the check by a computation with more modes of the structure found no free motion at these "
                            "amplitudes; raise structure.reduced.modes")
-    frequency, damping = (OF_MODES * np.abs(np.interp(curve.amplitude, other.amplitude, theirs) - own) for own, theirs
-                          in ((curve.frequency, other.frequency), (curve.damping, other.damping)))
-    return curve._replace(frequency_error=curve.frequency_error + frequency,
-                          damping_error=curve.damping_error + damping)
+    values = finer_errors(_at(curve.amplitude, curve), _at(curve.amplitude, other))
+    return curve._replace(frequency_error=curve.frequency_error + values["frequency"],
+                          damping_error=curve.damping_error + values["damping"])
+
+
+def _at(amplitudes, curve: Curve) -> dict:
+    """Frequencies [Hz] and damping ratios by name of a curve at amplitudes (k,) [m]."""
+    return {name: np.interp(amplitudes, curve.amplitude, getattr(curve, name)) for name in ("frequency", "damping")}
 
 
 def _joint(model: Model, name: str) -> Joint:
@@ -372,7 +375,7 @@ def _balanced(joint: Joint, amplitudes) -> Curve:
         if not count:
             raise NotConverged("no free motion of these amplitudes was found")
         better = _free(group, joint, amplitudes, harmonics, count)
-        error, found = _undipped(LEFT * np.abs(better - found)) + ROUND * np.abs(better), better
+        error, found = error_of_change(better - found) + ROUND * np.abs(better), better
         known = np.isfinite(error[0])
         if (error[:2] <= model.accuracy.tolerance * np.abs(found[:2]))[:, known].all():
             break
@@ -384,13 +387,6 @@ def _balanced(joint: Joint, amplitudes) -> Curve:
     if not swings.any():
         raise NotConverged("the mode does not oscillate at these amplitudes: its damping ratio is above 1")
     return Curve(amplitudes, found[0], error[0], found[1], error[1], found[2]).at(swings)
-
-
-def _undipped(error) -> np.ndarray:
-    """Errors (3, k) at rising amplitudes, none below those of both its neighbours: a change of sign tells no error."""
-    beside = np.minimum(error[:, :-2], error[:, 2:])
-    return np.concatenate([error[:, :1], np.fmax(error[:, 1:-1], beside), error[:, -1:]], axis=1) \
-        if error.shape[1] > 2 else error
 
 
 def _refuse(joint: Joint, way: str) -> None:
@@ -420,10 +416,7 @@ def _group(joint: Joint, patch, meshed: tuple = ()) -> Group:
 
 
 def _in_space(joint: Joint, read) -> np.ndarray:
-    """Errors of what read(Group) gives: of a patch that slips part by part what a coarser mesh changes, or what the
-    grain of its nodes or the change of its stiffness would (`slip.grain`), where that is more; of a density of sliders
-    the largest change where four of its cells are one, which is some 15 times the error, and a share of the usual one,
-    as a motion that turns where both have a border changes nothing."""
+    """Return the errors of what read(Group) gives by coarser meshes and by fewer cells of a density of sliders."""
     model, error = joint.model, 0.0
     celled = any(has(one.numbers.law, "cells") for one in model.rig.interfaces)
     soft = model.soft or model.rig.soft
@@ -435,10 +428,7 @@ def _in_space(joint: Joint, read) -> np.ndarray:
         error = error + decays.mesh_error(fine, decays.rough_laws(model, joint.coarse), read)
     if celled:
         apart = [np.abs(read(fine.remade(partial(cells_joined, *one))) - best) for one in JOINED]
-        gap = np.max(apart, axis=0) / CELLS
-        share = (gap / np.maximum(np.abs(best), 1e-300))[:, np.isfinite(gap).all(axis=0)]
-        usual = np.median(share, axis=1, keepdims=True) if share.size else 0.0
-        error = error + np.maximum(gap, usual * np.abs(best))
+        error = error + error_of_change(np.max(apart, axis=0), ratio=4.0, order=2.0)
     return error
 
 
@@ -1035,7 +1025,7 @@ def _unworn(model: Model) -> tuple:
 
 
 def _unmeshed(joint: Joint) -> tuple:
-    """That no coarser mesh tells the error of a contact which slips part by part; its grain alone tells too little."""
+    """That no coarser mesh tells the error of a contact which slips part by part."""
     model = joint.model
     if joint.linear or not model.soft or joint.coarse is not None:
         return () if joint.linear or not model.rig.soft or faces.known(model) else (SPARSE + faces.UNKNOWN,)

@@ -17,7 +17,7 @@ from ..inputs.cells import text_of
 from ..inputs.columns import read_columns
 from ..model.model import build
 from ..model.source import placed
-from ..response.errors import OF_MODES
+from ..response.errors import error_of_change
 from ..runs import joint
 from ..scene.changed import Base
 from ..scene.ranges import Range, ranges
@@ -217,8 +217,8 @@ def _widened(found: Fit, box, richer, moved, own, names) -> tuple:
     """
     if isinstance(richer, str):
         return found, (f"the intervals do not contain the error of the modes left out of the structure: {richer}",)
-    change = np.nan_to_num(OF_MODES * (richer - own))
-    by = moved(change)
+    change = np.nan_to_num(richer - own)
+    by = moved(error_of_change(change, ratio=0.5, order=2.0))
     ends = found.intervals + by[:, None] * [-1, 1]
     shares = ", ".join(f"{name} by {_share_of(part, value)}" for name, part, value in zip(names, by, found.values))
     return replace(found, intervals=frozen_array(np.clip(ends, box.low[:, None], box.high[:, None]))), (

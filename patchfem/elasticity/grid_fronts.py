@@ -4,13 +4,12 @@ The grid is halved again and again by lines of nodes, always across its longer s
 What a part leaves behind when its inside is gone, its update, lives on the ring of nodes around it; two updates are
 added along the line that parts them and that line is eliminated (multifrontal elimination, Duff and Reid 1983). Parts
 of one shape are alike but for their numbers, so they are handled as one stack. The first row, the interface, is always
-kept; the last is held; the first column is kept where asked. Cells of high order have several nodes along a side; then
-a "cell" here is the box between neighbouring nodes, and lines that part run along sides of whole cells.
+kept; the last is held; the first column is kept where asked.
 """
 
 from collections import Counter
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -25,17 +24,13 @@ WORD = 8  # bytes of a number
 
 
 class Shape(NamedTuple):
-    """A part of `columns` x `rows` cells; left, right, bottom: whether its nodes there are kept (else free or held).
-
-    order: boxes between nodes along the side of a cell; beyond 1 a single cell is the part that is not halved.
-    """
+    """A part of `columns` x `rows` cells; left, right, bottom: whether its nodes there are kept (else free or held)."""
 
     columns: int
     rows: int
     left: bool
     right: bool
     bottom: bool
-    order: int = 1
 
     @property
     def lines(self) -> int:
@@ -44,14 +39,13 @@ class Shape(NamedTuple):
 
     def halves(self) -> tuple | None:
         """The two Shapes and the (column, row) where the second begins; None for a part that is not halved."""
-        most = LEAF if self.order == 1 else self.order**2
-        if self.columns * self.rows <= most or max(self.columns, self.rows) < 2:
+        if self.columns * self.rows <= LEAF or max(self.columns, self.rows) < 2:
             return None
         if self.columns >= self.rows:
-            cut = self.columns // (2 * self.order) * self.order
+            cut = self.columns // 2
             return (self._replace(columns=cut, right=True),
                     self._replace(columns=self.columns - cut, left=True), (cut, 0))
-        cut = self.rows // (2 * self.order) * self.order
+        cut = self.rows // 2
         return self._replace(rows=cut, bottom=True), self._replace(rows=self.rows - cut), (0, cut)
 
 
@@ -185,22 +179,14 @@ def eliminate(stencil, left: bool = False) -> GridFactor:
     is kept, then along the first row. NotConverged where the stiffness is not positive definite.
     """
     columns, rows = stencil.shape[:2]
-    return eliminate_parts(Shape(columns - 1, rows, left, False, False), partial(_leaves, stencil))
-
-
-def eliminate_parts(root: Shape, leaves) -> GridFactor:
-    """Eliminate all nodes of the grid `root` but its first row and, where kept, its first column.
-
-    leaves(shape, corners (g, 2)) -> stiffness (top, side, rest) [N/m per m] of parts that are not halved, as `Stack` is
-    to eliminate them: own with own (g, 2o, 2o), own with ring (g, 2o, 2b), ring with ring (g, 2b, 2b).
-    """
-    rows, stacks, below = root.lines, [], {}
+    root = Shape(columns - 1, rows, left, False, False)
+    lines, stacks, below = root.lines, [], {}
     for level in reversed(_levels(root)):
         here = {}
         for shape, (corner, halves) in level.items():
             top, side, rest = _joined(shape, [below[half][part] for half, part in halves]) if halves else \
-                leaves(shape, corner)
-            own, ring = ((corner[:, :1] + part[:, 0]) * rows + corner[:, 1:] + part[:, 1]
+                _leaves(stencil, shape, corner)
+            own, ring = ((corner[:, :1] + part[:, 0]) * lines + corner[:, 1:] + part[:, 1]
                          for part in (plan(shape).own, plan(shape).ring))
             if own.size:
                 _factorise(top, side)
@@ -278,14 +264,14 @@ def _factorise(top, side) -> None:
         dtrsm(1.0, one.T, beside.T, side=1, lower=1, trans_a=1, overwrite_b=1)
 
 
-def predicted_seconds(nx: int, ny: int, mirrored: bool, order: int = 1) -> float:
+def predicted_seconds(nx: int, ny: int, mirrored: bool) -> float:
     """CPU seconds [s] of assembling and condensing one piece of nx columns and ny rows of nodes, the far face with
     them.
 
-    mirrored: whether the piece is its own mirror image in x; order: of its cells. The machine is not asked how fast it
+    mirrored: whether the piece is its own mirror image in x. The machine is not asked how fast it
     is; memory that a process touches for the first time takes up to as long again.
     """
-    shapes, fronts, entries, operations, _ = counts(nx, ny, mirrored, order)
+    shapes, fronts, entries, operations, _ = counts(nx, ny, mirrored)
     return rates.PER_CALL + rates.PER_SHAPE * shapes + rates.PER_FRONT * fronts + rates.PER_ENTRY * entries + \
         rates.PER_OPERATION * operations
 
@@ -297,11 +283,11 @@ def predicted_bytes(nx: int, ny: int, mirrored: bool) -> float:
 
 
 @lru_cache(maxsize=1024)
-def counts(nx: int, ny: int, mirrored: bool, order: int = 1) -> tuple:
+def counts(nx: int, ny: int, mirrored: bool) -> tuple:
     """Shapes, fronts, entries of the factors, floating-point operations, and entries of all that is not factors."""
     half = mirrored and nx > 3
     columns = (nx + 1) // 2 if half else nx
-    level = Counter({Shape(columns - 1, ny - 1, half, False, False, order): 1})
+    level = Counter({Shape(columns - 1, ny - 1, half, False, False): 1})
     shapes = fronts = entries = most = 0
     operations = 0.0
     while level:

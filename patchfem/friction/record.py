@@ -15,13 +15,6 @@ def law_from(friction, load: float = 1.0):
     return import_module(LAWS[friction.law].module).from_keys(friction, load)
 
 
-def can_overshoot(friction) -> bool:
-    """Whether the force of a law may exceed that of a steady slide for a short time while the slide turns."""
-    weakens = friction.kinetic is not None and friction.kinetic < friction.static
-    is_damped = bool(friction.micro_damping or friction.viscous)
-    return not has(friction.law, "set-valued") and (weakens or is_damped)
-
-
 def held_stiffness(friction, load: float) -> float:
     """Tangential stiffness [N/m] of a law under a load [N] while nothing slips: infinite where it sticks rigidly, 0
     where it creeps."""

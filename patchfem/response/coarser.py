@@ -5,10 +5,11 @@ Each says which runs it takes and how their measures become an error. A run that
 """
 
 from collections.abc import Callable
+from functools import partial
 from time import perf_counter
 from typing import NamedTuple
 
-from .errors import change, orders
+from .errors import coarser_errors, orders
 
 
 class Coarser(NamedTuple):
@@ -58,8 +59,8 @@ def left_open(kinds, errors, runs) -> dict:
 
 
 def coarser_space(coarser, beside=None, of: str = "mesh") -> Coarser:
-    """The `Coarser` whose one run has a coarser mesh, or fewer modes, and whose change is the error.
+    """Return the `Coarser` whose one run has a mesh twice as coarse, or fewer modes, at second order.
 
     coarser, beside, of: as in `Coarser`.
     """
-    return Coarser((coarser,), change, beside, of)
+    return Coarser((coarser,), partial(coarser_errors, order=2.0), beside, of)

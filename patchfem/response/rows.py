@@ -235,7 +235,7 @@ def _shaken(name: str, unit: str, floor: float, words: str, group: str = "motion
 # Measures that only single runs compute. While there are any, a sweep runs each case of a rig by itself, because its
 # batches compute no others than the shipped measures.
 SINGLE_RUN_ROWS: tuple[Row, ...] = ()
-FOURTH = 0.2, 0.0  # of the change by half the samples: what is read off cubics between them is of fourth order
+CUBIC = 4.0  # order of what is read off cubics between the samples
 ROWS = (
     Row("relative_displacement_amplitude", "m", 1e-10, "half the peak-to-peak displacement at the output, relative to "
                                                        "the base; of a release, that of the last whole cycle of the "
@@ -263,7 +263,7 @@ ROWS = (
         "first cycle of the window)/(number of cycles between these two cycles); if the interface slides in a plane, "
         "the length of this vector; null if the drive is not periodic at the end of the run",
         lambda s: drift_of(s) if s.own.drift is None else s.own.drift,
-        term=("slip amplitude (without slip: amplitude of the motion)", _moved), halves=FOURTH),
+        term=("slip amplitude (without slip: amplitude of the motion)", _moved), order=CUBIC),
     Row("slip_amplitude", "m", 1e-10,
         "half the peak-to-peak value of the irreversible part of the slide; for a patch, the mean over its points, "
         "weighted by the pressure; for law 'iwan', the mean over the sliders, weighted by their slip forces; if the "
@@ -274,14 +274,12 @@ ROWS = (
         "as a "
         "whole while more than half of the change of the slide (weighted as in `slip_amplitude`) is elastic; part of a "
         "patch, or some sliders of law 'iwan', may slip during this time",
-        lambda s: s.slip.get("stick_fraction"), 0.35, group="friction", term=("1", lambda _: 1.0),
-        halves=(2.5, 0.5)),
+        lambda s: s.slip.get("stick_fraction"), 0.35, group="friction", term=("1", lambda _: 1.0)),
     Row("slip_start_phase", "rad", 1e-3,
         "phase of the drive (of the base displacement, or of the force) at which slip starts after stick, modulo pi; "
         "slip is the weighted mean defined under `slip_amplitude`; the phase is printed in degrees; null if slip "
         "starts at different phases of a half cycle",
-        lambda s: s.slip.get("slip_start_phase"), 1.0, group="friction", term=("pi", lambda _: np.pi),
-        halves=(2.5, 1.0)),
+        lambda s: s.slip.get("slip_start_phase"), 1.0, group="friction", term=("pi", lambda _: np.pi)),
     Row("normal_load", "N", 0.0, "normal load on the interface, summed over all equal patches (key `pairs`)",
         lambda s: s.load, group="friction"),
     Row("loop_area", "J", 1e-10,
@@ -298,12 +296,12 @@ ROWS = (
         "friction force at the largest slide of a cycle minus friction force at the smallest slide, divided by the "
         "range of the slide; if the force jumps at the largest or the smallest slide, the mean of the forces "
         "before and after the jump is used; null if rigid friction sticks there, where the force takes many values",
-        lambda s: s.cycle.get("secant_stiffness"), group="friction", halves=FOURTH),
+        lambda s: s.cycle.get("secant_stiffness"), group="friction", order=CUBIC),
     Row("equivalent_damping", "1", 1e-8,
         "equivalent damping ratio of friction in the first mode that is not rigid, averaged over the last cycles: "
         "loop_area/(2 pi K A^2), where K = moving_mass omega_1^2 and A = (half the range of the slide in a "
         "cycle)/(value of the key `slide` of this mode); null if other modes contribute more than 5 % of the slide",
-        lambda s: s.cycle.get("equivalent_damping"), group="friction", halves=FOURTH),
+        lambda s: s.cycle.get("equivalent_damping"), group="friction", order=CUBIC),
     Row("friction_work", "J", 1e-10, "work done on all interfaces together over the whole run; with method `harmonic`, "
                                      "over two cycles",
         lambda s: s.energies.get("friction_work"), group="energy"),

@@ -10,7 +10,7 @@ from ..core import say
 from ..effects import has
 from ..response import rows
 from ..scales import plain
-from .patch import faces, high_order, ladder, press
+from .patch import faces, ladder, press
 from .results import notes, patch_rows
 from .rig import costs, engines
 
@@ -122,9 +122,6 @@ def _finer_mesh(seen, wide: dict, coarse) -> str:
         return f"leave out {SIZE}"
     if not wide.keys() - set(patch_rows.DECISIVE):
         return f"a mesh finer than {nodes} interface nodes would take too long; {wider}"
-    if asked.chosen and _locks(seen, wide):
-        return ("with this Poisson's ratio in plane strain every mesh has this error; use the value with its stated "
-                "error")
     tighter = _climbing(seen, coarse)
     if tighter is None:
         finer = f"points less than {say(seen.patch.averaging, 3)} apart" if seen.patch.averaging and \
@@ -133,12 +130,6 @@ def _finer_mesh(seen, wide: dict, coarse) -> str:
                 f"{'these values with their stated errors' if len(wide) > 1 else 'this value with its stated error'}")
     return (f"the mesh ({nodes} interface nodes) was not refined for this measure; set accuracy.tolerance = "
             f"{tighter:.3g} for a finer mesh")
-
-
-def _locks(seen, wide: dict) -> bool:
-    """Whether the measures that speak for `wide` are known as well as Poisson's ratio allows."""
-    share, known = high_order.locked(seen.model.patch), seen.measures
-    return all(known[name].error <= share * abs(known[name].value) for name in _first(seen, wide))
 
 
 def _more_strips(asked, wide: dict) -> str:
@@ -174,8 +165,6 @@ def _finer_motion(seen, wide: dict, coarse) -> str:
     order asks for. A looser tolerance is no cure: it chooses coarser steps and meshes.
     """
     name = max(_first(seen, wide), key=wide.get)
-    if name in (rings := seen.extra.get("still_rings", {})):
-        return rings[name]
     steps, cause = seen.extra.get("steps_per_cycle") or seen.extra.get("steps"), _cause(seen, name)
     if cause == "steps" and steps is not None:
         return _more_steps(seen, name, wide, int(steps))

@@ -9,7 +9,6 @@ yield slides, which its neighbours bound; the change by going over that range is
 import numpy as np
 
 SPREAD_FACTOR = 1.5  # times the change by `spread`, as an error (tests/README.md)
-STIFFER_FACTOR = 0.5  # times the change by `stiffer`, as an error
 PARTS = 4  # of an element, and of each halving of the first one
 OCTAVES = 8  # of the first element: slides down to a 256th of it are told
 TOGETHER = 1e-6  # of a yield slide, within which nodes at both ends of a contact count as one
@@ -38,13 +37,3 @@ def spread(stiffness, yield_slide) -> tuple:
     part = np.concatenate([k[0] * share, np.repeat(k[1:] / PARTS, PARTS)])
     order = np.argsort(at, kind="stable")
     return part[order], at[order]
-
-
-def stiffer(stiffness: float, coarse: float):
-    """Function of the (stiffness [N/m], yield slide [m]) of elements -> those of a patch that is stiffer by as much as
-    a coarser mesh differs; both [N/m] of the whole patch. The friction limit stays.
-
-    Shortly after all of it slips, the work is a small difference, which hangs on the stiffness more than on the mesh.
-    """
-    factor = 1 + abs(coarse / stiffness - 1)
-    return lambda k, y: (k * factor, y / factor)

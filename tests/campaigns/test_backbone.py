@@ -80,13 +80,6 @@ def test_exact_a_motion_of_the_amplitude_asked_for_comes_back_after_a_cycle():
         assert end[0] / start == pytest.approx(1, abs=1e-9)
 
 
-def test_exact_an_error_between_two_larger_ones_is_no_smaller_than_the_smaller():
-    error = np.array([[3.0, 0.1, 2.0, 5.0, 4.0, 1.0], [1.0, 2.0, np.nan, 3.0, 0.0, np.nan]])
-    assert backbone_module._undipped(error) == pytest.approx(
-        np.array([[3.0, 2.0, 2.0, 5.0, 4.0, 1.0], [1.0, 2.0, 2.0, 3.0, 0.0, np.nan]]), nan_ok=True)
-    assert (backbone_module._undipped(error[:, :2]) == error[:, :2]).all()
-
-
 def test_a_decay_whose_force_turns_between_two_samples_keeps_its_bars():
     """The coarser run has as many samples, so what they leave open of the frequency was no part of its error."""
     found = backbone(model('law = "tanh"\nreference_speed = "3 mm/s"'), "", np.geomspace(3e-3, 6e-3, 9), ("decay",))

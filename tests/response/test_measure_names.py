@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from patchfem.core import Measure
-from patchfem.response.errors import SURE, step_error, with_errors
+from patchfem.response.errors import SAFETY, step_errors, with_errors
 from patchfem.response.rows import TABLE, floor_of, judged, of_first, row_of
 from patchfem.response.settling import steady_amplitude
 
@@ -18,9 +18,10 @@ def test_exact_a_number_behind_a_name_changes_no_row(name):
 
 def test_exact_further_interfaces_have_errors_by_the_same_rule():
     fine, half, quarter = ({"stick_fraction_2": v, "slip_amplitude_2": 2 * v} for v in (0.5, 0.502, 0.51))
-    found = with_errors(fine, step_error(fine, half, quarter, 400))
-    assert found["stick_fraction_2"].error == pytest.approx(0.002 + 0.35 / 400)  # it can jump by all that it changed
-    assert found["slip_amplitude_2"].error == pytest.approx(SURE * 0.004 / 3) and found["slip_amplitude_2"].unit == "m"
+    found = with_errors(fine, step_errors(fine, half, quarter, steps=400))
+    assert found["stick_fraction_2"].error == pytest.approx(SAFETY * 0.002 / 3 + 0.35 / 400)
+    slip = found["slip_amplitude_2"]
+    assert slip.error == pytest.approx(SAFETY * 0.004 / 3) and slip.unit == "m"
 
 
 def test_exact_a_motion_that_stands_still_has_its_own_amplitude():
@@ -51,6 +52,6 @@ def test_exact_a_load_that_never_comes_near_zero_opens_no_contact():
     """The resolution of the samples, 4/steps, was its error; it is where the load comes near."""
     def error(least, coarser):
         runs = [{"open_fraction": 0.0, "normal_load_least": one} for one in (least, coarser, coarser)]
-        return step_error(*runs, 400)["open_fraction"]
+        return step_errors(*runs, steps=400)["open_fraction"]
 
     assert error(100.0, 101.0) == 0.0 and error(1.0, 2.0) == pytest.approx(4 / 400)

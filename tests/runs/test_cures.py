@@ -89,8 +89,9 @@ def test_exact_a_mesh_that_no_tolerance_refines_is_told_with_the_seconds_of_the_
 
 
 def test_always_steps_that_are_left_out_cure_what_few_steps_do_not_show():
-    """The change of no measure falls from 4 to 16 steps; those that the tolerance chooses meet it."""
-    few, main = run(plan(loads(SHAKEN + FEW))), "relative_displacement_amplitude"
+    """The change of no measure falls from 2 to 8 steps; those that the tolerance chooses meet it."""
+    eight = FEW.replace("steps_per_cycle = 16", "steps_per_cycle = 8")
+    few, main = run(plan(loads(SHAKEN + eight))), "relative_displacement_amplitude"
     said = [text for text in few.warnings if text.startswith(f"{main} has an estimated error of ")]
     assert len(said) == 1 and "absolute_acceleration_peak of " in said[0] and "loop_area of " in said[0]
     assert "; leave out accuracy.steps_per_cycle, so that patchfem doubles the number of steps" in said[0]
@@ -134,25 +135,6 @@ def test_always_what_the_mesh_leaves_open_is_not_laid_on_the_steps():
     for name in ("friction_ratio_end", "loop_area"):
         assert again.measures[name].error <= 0.51 * first.measures[name].error
         assert abs(again.measures[name].value - first.measures[name].value) < first.measures[name].error
-
-
-def test_exact_the_ringing_of_a_start_is_no_dissipation():
-    """A flat joint below its limit dissipates nothing: the bar of its work per cycle holds 0, and the cycles that a
-    note names let the ring decay."""
-    first = ran_text(JOINT_SHAKEN)
-    loop = first.measures["loop_area"]
-    assert first.outcome == "stuck" and abs(loop.value) > loop.floor / 100 and abs(loop.value) <= loop.error
-    assert abs(first.measures["equivalent_damping"].value) <= first.measures["equivalent_damping"].error
-    told = [text for text in first.extra["notes"] if text.startswith("the free vibration that began at the start has "
-                                                                     "not decayed at 105")]
-    assert len(told) == 1
-    cycles = re.search(r"drive.cycles = (\d+) to let", told[0])[1]
-    assert any(f"drive.cycles = {cycles} to let" in text for text in first.warnings)
-    again = ran_text(JOINT_SHAKEN.replace("cycles = 20", f"cycles = {cycles}"))
-    assert not any("has not decayed" in text for text in again.extra["notes"])
-    damping = again.measures["equivalent_damping"]
-    assert abs(damping.value) <= damping.error <= damping.floor
-    assert not any("equivalent_damping" in text or "drive.cycles" in text for text in again.warnings)
 
 
 def test_always_a_ring_that_steps_do_not_resolve_is_followed_without_them():

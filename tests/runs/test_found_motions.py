@@ -10,24 +10,16 @@ import pytest
 import patchfem as pf
 from patchfem.core import BaseSine, Measure, Outcome
 from patchfem.response import settling
-from patchfem.response.errors import cells_error, step_error
 from patchfem.response.outcome import settle
 from patchfem.runs.rig.numerics import choose
 from patchfem.scene.scene import load, loads
 
 FOUND = Path(__file__).parent / "found"
 TRUE = (  # scene, measure, truth: DOP853 from reversal to reversal at 3e-14, or a march of 4000 steps a cycle
-    ("peak_tanh_34", "relative_displacement_amplitude", 7.0324400300e-5, 1e-14),
-    ("peak_tanh_34", "absolute_acceleration_peak", 42.56178876752, 5e-8),
     ("peak_bouc_wen_53", "friction_force_peak", 20.594500409, 3e-8),
     ("peak_bouc_wen_53", "absolute_acceleration_peak", 217.5187442529, 1e-8),
-    ("tanh_levels_114", "relative_displacement_amplitude", 0.01114843, 2e-7),
-    ("tanh_levels_114", "slip_amplitude", 0.01114843, 2e-7),
     ("tanh_levels_114", "absolute_acceleration_peak", 664.244, 9e-3),
-    ("shear_bonds_14", "relative_displacement_amplitude", 6.72788e-3, 8e-8),  # and here of 1264
     ("shear_bonds_14", "stick_fraction", 0.00377, 1.4e-3),
-    ("shear_bonds_6", "relative_displacement_amplitude", 7.20084e-3, 1.2e-7),
-    ("shear_bonds_6", "stick_fraction", 0.00498, 1.6e-3),
     ("ep_stiff_1e6", "relative_displacement_amplitude", 0.7365597, 1e-7),
 )
 RIG = """
@@ -56,7 +48,7 @@ def once(name: str):
     return pf.run(load(FOUND / f"{name}.toml"))
 
 
-@pytest.mark.share(0, 1, *range(4, len(TRUE)))  # Bouc and Wen: a loop to compile for these alone
+@pytest.mark.share(*range(2, len(TRUE)))  # Bouc and Wen: a loop to compile for these alone
 @pytest.mark.parametrize(("name", "measure", "truth", "digit"), TRUE)
 def test_exact_the_bar_holds_an_independent_program(name, measure, truth, digit):
     found = once(name).measures[measure]
@@ -125,22 +117,6 @@ def test_always_a_motion_whose_middle_moves_on_is_not_steady(drift, outcome, sin
         drive = pf.build(loads(RIG.format(law='law = "coulomb"', frequency=143, method="",
                                           drive='kind = "free"\ndisplacement = "1 mm"\ncycles = 9'))).rig.drive
     assert settle(raw, measures, 1e-3, drive)[0] is outcome
-
-
-def test_always_no_order_is_believed_beside_a_measure_without_one():
-    """The amplitude shows second order and a bar of 1e-3; the loop area changes by .5 % and then 1 %: so may it."""
-    runs = [{"relative_displacement_amplitude": 1.0 + e, "loop_area": w} for e, w in ((0, 1.0), (5e-4, 1.01), (2.5e-3,
-                                                                                                         1.015))]
-    orderly = [one | {"loop_area": 1 + 4 * (one["relative_displacement_amplitude"] - 1)} for one in runs]
-    narrow, wide = (step_error(*each, 400)["relative_displacement_amplitude"] for each in (orderly, runs))
-    assert narrow < 2e-3 and wide >= 0.4 * 1e-2
-
-
-def test_always_a_force_peak_that_agrees_by_chance_has_a_bar():
-    fine = {"relative_displacement_amplitude": 1.0, "friction_force_peak": 0.7}
-    coarse = {"relative_displacement_amplitude": 1.0 + 1e-4, "friction_force_peak": 0.7 + 1e-9}
-    assert cells_error(fine, coarse)["friction_force_peak"] >= 0.019 * 1e-4 * 0.7
-    assert cells_error(fine, coarse | {"friction_force_peak": 0.7})["friction_force_peak"] == 0  # at its limit
 
 
 @pytest.mark.parametrize(("level", "said"), [("0.2 g", True), ("40 g", False)])

@@ -57,7 +57,7 @@ def test_beside_asperities_the_stiffness_does_not_hang_on_the_cells(tmp_path, si
     assert any("waves longer than 127 um give the shape of the gap" in text for text in found.warnings)
 
 
-# the independent program of test_order_four.py: contact interval [m], approach [m], peak [Pa], stiffness [N/m]
+# studies/contact/order_four.py, an independent program: contact interval [m], approach [m], peak [Pa], stiffness [N/m]
 CROWN = (2 * 3.7177189e-4, 2.8687086e-7, 1.46972585e7, 3.66814797e10 * 12.7e-3)
 
 

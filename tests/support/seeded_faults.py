@@ -104,7 +104,7 @@ SCENES = {
 # link of the chain -> files of the package that make it, scene that runs them
 LINKS = {
     "mesh": (("mesh/grading.py", "mesh/tensor.py", "mesh/ends.py", "mesh/pairs.py", "mesh/nested.py"), "static"),
-    "assembly": (("elasticity/tensor_stiffness.py", "elasticity/elasticity.py", "elasticity/high_order.py"), "static"),
+    "assembly": (("elasticity/tensor_stiffness.py", "elasticity/elasticity.py"), "static"),
     "condensation": (("elasticity/condense.py", "elasticity/fronts.py", "elasticity/grid_fronts.py",
                       "elasticity/substructure.py"), "static"),
     "contact": (("contact/unilateral.py", "contact/active_set.py", "contact/gaps.py", "contact/edges.py",

@@ -2,15 +2,14 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from ...effects import has, listed
-from ...friction.record import can_overshoot
 from ...response.coarser import Coarser, coarser_space, estimate, left_open
-from ...response.errors import StepScales, change, step_error
-from ...response.grid_convergence import convergence_errors
+from ...response.errors import convergence_errors, finer_errors, step_errors
 from ...slip import shear_modes
 from . import bench, rigid, shear
 from .engine import ELEMENTS, LIST, LISTS, PLANE, STEPPED, slips_by_elements
@@ -19,7 +18,6 @@ from .ledger import Watch
 
 MESH_TOL = 1e-2  # tolerance whose steps show what a mesh changes; elements follow any path exactly
 FINER = 0.5  # merge width of the run that shows what merging does
-MERGED = 2.0  # times its change: where merging is of second order 4/3 would do
 
 
 class Pass(NamedTuple):
@@ -56,15 +54,8 @@ def ladder_of(model, patches: list, fine, steps: int) -> list:
     bonds narrower strips. Parallel elements run on all coarser meshes, at steps that no tolerance changes."""
     choice = fine.engine.choice
     half, few = Pass(max(4, steps // 8 * 4), 0, choice), Pass(max(4, steps // 16 * 4), 0, choice)
-    times = 2.0 if model.load_varies else 1.0  # first order
-    scales = StepScales(overshoots=frozenset(["friction_force_peak", "friction_ratio_peak"] * can_overshoot(
-        model.friction)))
-
-    def rule(*values) -> dict:
-        if slips_by_elements(model):  # these follow any path exactly; samples of it change harmonics alone
-            return convergence_errors(*values)
-        return {name: times * error for name, error in step_error(*values, steps, scales).items()}
-
+    # elements follow any path exactly, so samples of it change harmonics alone
+    rule = convergence_errors if slips_by_elements(model) else partial(step_errors, steps=steps)
     out, meshed, patch = [Coarser((half, few), rule, of="steps")], len(patches) > 1, patches[0]
     if meshed and slips_by_elements(model):
         length = model.friction.bond_length
@@ -79,8 +70,7 @@ def ladder_of(model, patches: list, fine, steps: int) -> list:
         out.append(rigid.coarser_cells(few))
     if fine.engine.kind in (LIST, LISTS) and choice.merge > 0:
         narrow = few._replace(choice=replace(choice, merge=FINER * choice.merge))
-        out.append(Coarser((narrow,), lambda a, b: {name: MERGED * gap for name, gap in change(a, b).items()}, few,
-                        "bonds"))
+        out.append(Coarser((narrow,), finer_errors, few, "bonds"))
     return out
 
 

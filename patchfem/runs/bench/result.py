@@ -6,7 +6,7 @@ import numpy as np
 
 from ...core import Outcome
 from ...effects import has
-from ...response.errors import unseen, with_errors
+from ...response.errors import with_errors
 from ...response.rows import judged
 from ...scales import short
 from ..results.notes import climbing_as_one, of_growth, unbounded_bonds, unripe, warming, work_check_warning
@@ -57,7 +57,7 @@ def prescribed(what, patch, coarse, seconds, warnings, say, progress, per_point,
     notes = [*notes, *climbing_as_one(model, patch)]
     known = estimate and on_a_mesh_of_known_error(model, patch, coarse)
     found = without_errors(found, known)
-    found = judged(unseen(found, model.slide.cycles or 1.0) if model.soft else found, model.accuracy.tolerance)
+    found = judged(found, model.accuracy.tolerance)
     count = shear.modes_of(model, patch) if model.soft else None
     return Result(what, outcome, found, fine, fine, patch, fields, seconds, warnings,
                   {"engine": fine.engine.name, "steps": steps, "notes": notes, "left_open": left}

@@ -18,7 +18,7 @@ from ...friction import grooves
 from ...friction.laws.elastic_plastic import parallel
 from ...friction.record import law_from
 from ...response.coarser import Coarser
-from ...response.errors import cells_error
+from ...response.errors import merged_cell_errors
 from .engine import ELEMENTS, BenchEngine
 from .follow import follow_path
 from .law import pressure_of
@@ -85,4 +85,4 @@ def coarser_cells(few) -> Coarser:
     """The passes of a bench in which each four cells of a density of sliders are one; few: variant of `errors` beside
     them."""
     runs = tuple(few._replace(springs=partial(cells_joined, *one)) for one in JOINED)
-    return Coarser(runs, cells_error, few, "cells")
+    return Coarser(runs, merged_cell_errors, few, "cells")

@@ -1,5 +1,5 @@
-"""A slide behind the pieces' own shear: the exact set of elements, or bond points behind the shear modes; what the mesh
-leaves open of the former: its change, its grain and its stiffness."""
+"""A slide behind the pieces' own shear: the exact set of elements, or bond points behind the shear modes, and the
+error of the mesh of the former."""
 
 import numpy as np
 
@@ -8,8 +8,7 @@ from ...dynamics.march.models import jenkins_model, lists_model, points_model, u
 from ...effects import has
 from ...friction.record import law_from
 from ...response.coarser import Coarser
-from ...response.errors import GAPS, change
-from ...response.grid_convergence import convergence_errors
+from ...response.errors import GAPS, change, convergence_errors
 from ...slip.fields import element_fields, point_fields, shear_of
 from ..patch.kept import elements
 from .follow import follow_path

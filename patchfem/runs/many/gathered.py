@@ -24,7 +24,7 @@ from ...model.model import Model
 from ...model.source import placed
 from ...response import run_events
 from ...response.coarser import left_open
-from ...response.errors import StepScales, change, step_error
+from ...response.errors import coarser_errors, step_errors
 from ...response.measures import energy_balance
 from ...response.reasons import SHARED
 from ...response.ringing import LEAST_PERIODS, SHORT
@@ -247,13 +247,12 @@ def _with_errors(models: list, held: list, reads: tuple, counts: tuple) -> tuple
         amplitude = (last[:, :, 1].max(axis=1) - last[:, :, 0].min(axis=1)) / 2
         whole.append(one.values | {MAIN: amplitude, "energy_balance": energy_balance(one.book)})
     errors, parts = {name: np.zeros(n) for name in whole[0]}, []
-    for case, model in enumerate(models):
+    for case in range(n):
         a, b, c, d = ({name: float(part[case]) for name, part in one.items() if not np.isnan(part[case])}
                       for one in whole)
         few = _left_out(a, TWICE * held[case].error, held[case].fine, fine.book["passed"][case])
         own = fine.own[case]
-        scales = StepScales(model.rig.displacement, model.friction.bond_length)
-        parts.append((step_error(a, b, c, steps, scales), change(c, d), few, own))
+        parts.append((step_errors(a, b, c, steps=steps), coarser_errors(c, d, order=2.0), few, own))
         for name, value in a.items():
             errors[name][case] = sum(part.get(name, abs(value)) for part in parts[-1][:3]) + own.get(name, 0.0)
     ends = np.arange(cycles - 1, -1, -window)[::-1]

@@ -1,7 +1,7 @@
 """The static patch: condense, press, estimate errors on coarser meshes.
 
 In: a `PatchModel`. Out: patches on nested meshes and static measures with errors. `grids` owns the mesh, for plans and
-runs alike; `condensed` has the pieces, `press` the pressure. `high_order` has sharper measures for tight tolerances,
-`fine` for traces. `meshes` and `static` serve the patches of a sweep together, `kept` what runs of one patch share.
+runs alike; `condensed` has the pieces, `press` the pressure. `fine` has sharper measures for
+traces. `meshes` and `static` serve the patches of a sweep together, `kept` what runs of one patch share.
 Read `press` first, then `grids`, `ladder` and `measures`.
 """

@@ -7,15 +7,13 @@ from ...core import NotConverged, Outcome
 from ...mesh import anymesh
 from ...mesh.nested import coarser, finer, plan_of
 from ...model.pieces import bodies_of
-from . import fine, high_order, slip_zones
+from . import fine, slip_zones
 from .condensed import Keyed, condensed, shared_pairs
 from .grids import LEAST_LEVELS, SPENT, Search, base_grids, seconds_of
 from .kept import KEPT, by_content, shares
-from .measures import measures, met, missed
+from .measures import measures, met
 from .press import pressed, solve
 
-FINE = 1e-3  # tolerance that bilinear meshes meet cheaply
-HELPED = 3.0  # times nearer to the tolerance, from which cells of order 4 end the climb even if they miss it
 TOL_OF_SPENT = 1e-3  # tolerance up to which a slip has the seconds of a mesh that moves; ten times tighter, 3.2 times
 MOST_DECADES = 6  # below a tolerance, in which another is looked for
 
@@ -111,12 +109,12 @@ def meshes_beside(low, high) -> list:
 def climb(asked, tolerance: float, estimate: bool = True, fresh: bool = False, search: Search | None = None) -> tuple:
     """A patch on the coarsest mesh of the ladder that meets its tolerance, and on all coarser ones, fine to coarse.
 
-    Where the tolerance is below FINE, or the next mesh is dear, cells of order 4 add sharper measures if they can, or
-    points as fine as a trace; then the mesh serves fields and motion. The climb ends where the next mesh would take
-    more than the work that is spent on a patch. With a prescribed slip it also has to show the work of that. Without an
-    estimate it is the third mesh, and nothing is solved on the others. search: as of `base_grids`.
+    Where the next mesh is dear, points as fine as a trace add sharper measures; then the mesh serves fields and motion.
+    The climb ends where the next mesh would take more than the work that is spent on a patch. With a prescribed slip it
+    also has to show the work of that. Without an estimate it is the third mesh, and nothing is solved on the others.
+    search: as of `base_grids`.
     """
-    grids, out, sharp, sharpened, on_points = base_grids(asked, search), [], None, False, None
+    grids, out, on_points = base_grids(asked, search), [], None
     while True:
         try:
             wanted = estimate or len(out) == LEAST_LEVELS - 1
@@ -131,22 +129,16 @@ def climb(asked, tolerance: float, estimate: bool = True, fresh: bool = False, s
         nothing = out[0].pressure.outcome is Outcome.NO_CONTACT
         if not estimate or nothing:
             return tuple(out)
-        out[0], dear = replace(out[0], sharper=sharp or {}), seconds_of(grids)
+        dear = seconds_of(grids)
         if on_points is not None:  # the solution on points of the trace serves finer meshes as well
-            out[0] = replace(out[0], averaging=on_points.averaging, fine=on_points.fine, stretches=on_points.stretches)
+            out[0] = replace(out[0], sharper=on_points.sharper, averaging=on_points.averaging, fine=on_points.fine,
+                             stretches=on_points.stretches)
         found, shows_slip = measures(*out, tolerance=tolerance), _shows_slip(asked, out, tolerance)
         if dear > SPENT[False] and not met(found, tolerance) and _finer(asked):
             on_points = out[0] = _on_points(asked, out, tolerance)
-            sharp, sharpened = on_points.sharper, bool(on_points.sharper)
             found = measures(*out, tolerance=tolerance)
-        if sharp is None and not met(found, tolerance) and high_order.takes_cells(asked) and \
-                (dear > SPENT[False] or (asked.still and met(found, FINE))):
-            before = missed(found, tolerance)
-            sharp = high_order.sharper_by_cells(asked, out[0], partial(_enough, out, tolerance))
-            out[0] = replace(out[0], sharper=sharp)
-            found = measures(*out, tolerance=tolerance)
-            sharpened = missed(found, tolerance) <= before / HELPED
-        if dear > most_seconds(asked, tolerance) or (shows_slip and (sharpened or met(found, tolerance))):
+        enough = bool(out[0].sharper) or met(found, tolerance)
+        if dear > most_seconds(asked, tolerance) or (shows_slip and enough):
             return tuple(out)
 
 
@@ -227,5 +219,5 @@ def _grids(patch) -> tuple:
 
 
 def _enough(patches: list, tolerance: float, sharp: dict) -> bool:
-    """Whether patches, fine to coarse, meet the tolerance with the measures that cells of order 4 add."""
+    """Whether patches, fine to coarse, meet the tolerance with the measures that points of a trace add."""
     return met(measures(replace(patches[0], sharper=sharp), *patches[1:], tolerance=tolerance), tolerance)

@@ -26,23 +26,6 @@ class Limit(NamedTuple):
     left: np.ndarray
 
 
-def edge_limit(values, nested: bool = True) -> Limit:
-    """`limit` of values that hang on where edges lie between nodes.
-
-    Beside its second order such a place has a part that comes and goes with the share of the cell that the edge has
-    passed. So no ratio takes it further than second order does, and it is held to half or all of the rest.
-    """
-    seen, values = limit(values, nested), np.asarray(values)
-    if len(values) < 3 or not nested:
-        return seen
-    rest, last = seen.extrapolated - seen.value, values[-1] - values[-2]
-    rest = np.where(np.abs(rest) < np.abs(last) / (REGULAR[0] - 1), last / (SECOND - 1), rest)
-    least = np.abs(rest) / (1 if len(values) == 3 else 2)
-    further = seen.extrapolated != seen.value
-    return seen._replace(extrapolated=np.where(further, values[-1] + rest, seen.value),
-                         left=np.where(further, np.maximum(least, seen.left if len(values) > 3 else 0.0), seen.left))
-
-
 def limit(values, nested: bool = True) -> Limit:
     """Limit of a series of two values or more, each on a mesh whose cells are half as long as those of the one before;
     of many series at once where values (n, ...) are arrays.

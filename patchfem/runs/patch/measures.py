@@ -9,11 +9,12 @@ import numpy as np
 from ...contact import edges
 from ...core import Measure, PatchfemError, allowed, say
 from ...mesh.nested import plan_of
+from ...response import errors
 from ...scene.keys.contact import outermost
 from ..results import patch_rows
 from ..results.patch_rows import DECISIVE, TABLE
 from .condensed import pair_beside
-from .limits import Limit, edge_limit, limit
+from .limits import limit
 from .press import Patch, pressed
 from .values import edge_cells, open_ends, unresolved_rounding, values
 
@@ -25,7 +26,6 @@ ALIKE = 1e-9  # relative error that nobody asks to be below
 OFFSET = 0.012  # cells by which an edge found between nodes may lie off
 RISING = 4.0  # times the last change of the pressure at a corner: what it may still rise by
 CORNER = 0.15  # largest share of the pressure at the corner of a coating that cells coarser than it leave out
-EDGED = ("contact_fraction", "contact_half_width")  # what hangs on where edges are found between nodes
 EXTRAPOLATED = 2.0  # of what meshes hide, in 4/3 of a value less 1/3 of one on cells twice as long
 BANDED = ("pressure_peak", "normal_stiffness", "tangential_stiffness")
 
@@ -75,27 +75,30 @@ def band_words(asked, mine: dict, theirs: dict) -> list:
 def strip_error(asked, patch: Patch, found: dict) -> dict:
     """Measures `found` with what the number of strips adds to their errors; those without a value stay as they are.
 
-    That is the change to half as many strips on the mesh of `patch`, three times what second order leaves of it; four
-    times the change to twice as many where half as many would not reach to the load line.
+    That is the change to another number of strips on the mesh of `patch`, at second order.
     """
-    other, share = other_strips(asked)
-    if not share:
+    other, ratio = other_strips(asked)
+    if other is asked:
         return found
     beside, here = values(pressed(other, patch.pair)), values(patch)
-    return {name: m if m.value is None else replace(m, error=m.error + share * abs(here[name] - beside[name]))
+    added = {name: errors.error_of_change(here[name] - beside[name], ratio, errors.MAX_ORDER) for name in here}
+    return {name: m if m.value is None else replace(m, error=float(m.error + added[name]))
             for name, m in found.items()}
 
 
 def other_strips(asked) -> tuple:
-    """(the `PatchModel` in half as many strips, times that the change to it counts as the error of the strips); in
-    twice as many where half as many would not reach to the load line; (itself, 0) without strips to halve."""
+    """Return the `PatchModel` in another number of strips, and how many times as coarse it is.
+
+    It has half as many strips, or twice as many where half as many would not reach to the load line. Without strips to
+    halve it is the model itself.
+    """
     count, roll, offset = asked.strips or (1, 0.0, None)
     if count < 2:
-        return asked, 0.0
-    other, share = count // 2, 1.0
+        return asked, 2.0
+    other, ratio = count // 2, 2.0
     if offset is not None and abs(offset) >= outermost(asked.width, other):
-        other, share = 2 * count, 4.0
-    return replace(asked, strips=(other, roll, offset)), share
+        other, ratio = 2 * count, 0.5
+    return replace(asked, strips=(other, roll, offset)), ratio
 
 
 def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None) -> dict:
@@ -108,38 +111,18 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
     series, mine = [one for one in coarse if one is not None], values(fine)
     if not series:
         return _bounded(_unbounded(fine), combined([mine], {}))
-    missed_peak, series = unresolved_rounding(fine), _alike(fine, series)
+    missed_peak = unresolved_rounding(fine)
     found = [values(one) for one in reversed(series)]
-    nested = all(cells_halved(a.pair, b.pair) and _stretches(a) == _stretches(b) for a, b in pairwise((fine, *series)))
+    nested = all(cells_halved(a.pair, b.pair) for a, b in pairwise((fine, *series)))
     rough = 2.0 if missed_peak else 1.0  # of meshes that pass over a rounding none shows what it does
     least = least_of(_hidden(fine, missed_peak), mine) if mine["normal_load"] > 0 else {}
-    edged = tuple(mine) if fine.jumps else EDGED
-    out = combined([*found, mine], least, nested, tolerance, max(ALIKE, fine.pair.rounding), rough, edged)
-    sigma = fine.pressure.sigma_n if fine.strips is None else fine.strips.pressure.max(axis=0)
-    if 0 < (top := int(np.argmax(sigma))) < sigma.size - 1:
-        out = reaching(out, float(sigma[top]))
+    out = combined([*found, mine], least, nested, tolerance, max(ALIKE, fine.pair.rounding), rough)
     if fine.averaging is not None:
         out = _cornered(out, fine, series[0])
     for name, (value, error) in fine.sharper.items():
         if error < out[name].error:
-            engine = patch_rows.SPECTRAL if fine.averaging is None else patch_rows.ON_POINTS
-            out[name] = replace(out[name], value=value, error=error, engine=engine)
+            out[name] = replace(out[name], value=value, error=error, engine=patch_rows.ON_POINTS)
     return _bounded(_unbounded(fine), out)
-
-
-def _alike(fine: Patch, series: list) -> list:
-    """Of the coarser patches, fine to coarse, those whose contact falls into as many stretches beside a step as that of
-    the finest, from it on, two at least: another stretch says nothing of how the others settle."""
-    count = 0
-    while count < len(series) and _stretches(series[count]) == _stretches(fine):
-        count += 1
-    return series[:max(count, 2)]
-
-
-def _stretches(patch: Patch) -> tuple:
-    """How many stretches bear, of a patch beside a step and of its two parts; () of others."""
-    parts = [patch.active, *(one.active for _, one in patch.either)] if patch.jumps and patch.strips is None else []
-    return tuple(int(np.count_nonzero(np.diff(bears.astype(int)) > 0) + bears[0]) for bears in parts)
 
 
 def _cornered(found: dict, fine: Patch, coarse: Patch) -> dict:
@@ -158,12 +141,11 @@ def _cornered(found: dict, fine: Patch, coarse: Patch) -> dict:
 
 
 def combined(series: list, least: dict, nested: bool = True, tolerance: float | None = None, alike: float = ALIKE,
-             rough: float = 1.0, edged: tuple = EDGED) -> dict:
+             rough: float = 1.0) -> dict:
     """Measures by name from their values on meshes, coarse to fine, each a dict by name.
 
     least: errors that the meshes may agree to hide; nested, tolerance: as `measures` has them; alike: relative error
-    that stays; rough: factor of the errors; edged: names of what hangs on edges. Without a coarser mesh there are no
-    errors, without a load they are 0.
+    that stays; rough: factor of the errors. Without a coarser mesh there are no errors, without a load they are 0.
     """
     mine, floors, names = series[-1], _floors(), list(series[-1])
     if len(series) == 1 or not mine["normal_load"] > 0:
@@ -173,7 +155,7 @@ def combined(series: list, least: dict, nested: bool = True, tolerance: float | 
     known, (hidden, floor) = np.array([[one[name] for name in names] for one in series]), \
         np.array([(least.get(name, 0.0), floors[name]) for name in names]).T
     wanted = np.inf if tolerance is None else allowed(tolerance, known[-1], floor)
-    best, error = settled(known, hidden, wanted, nested, rough, np.isin(names, edged))
+    best, error = settled(known, hidden, wanted, nested, rough)
     out = {name: Measure(value, TABLE[name].unit, wide, floors[name], engine=mesh_engine(value, mine[name]))
            for name, value, wide in
            zip(names, best.tolist(), np.maximum(error, alike * np.abs(known[-1])).tolist())}
@@ -187,32 +169,27 @@ def mesh_engine(value: float, finest: float) -> str:
     return patch_rows.ON_FINEST_MESH if value == finest else patch_rows.EXTRAPOLATED
 
 
-def settled(known, hidden, wanted, nested: bool = True, rough: float = 1.0, edged=False) -> tuple:
-    """(values, errors) (n, ...) of n measures by their values on meshes, known (levels, n, ...) coarse to fine, as
-    their `limit` has them.
+def settled(known, hidden, wanted, nested: bool = True, rough: float = 1.0) -> tuple:
+    """Return values (n, ...) and errors (n, ...) of n measures from their values on meshes.
 
-    Each is that of fewer meshes where their error is smaller and holds the finest, so that no further mesh widens a
-    bar. hidden: least errors on the finest mesh, which fall with its cells; wanted: errors up to which nothing is
-    extrapolated, (n, ...) or a number; rough: factor of the errors; edged (n,): whether a measure hangs on edges.
+    Parameters
+    ----------
+    known : (levels, n, ...)
+        Values on the meshes, coarse to fine.
+    hidden : (n, ...)
+        Least errors on the finest mesh.
+    wanted : float or (n, ...)
+        Errors up to which nothing is extrapolated.
+    nested : bool
+        Whether every mesh halves the cells of the one before.
+    rough : float
+        Factor of the errors.
     """
-    def of(count: int) -> tuple:
-        """Values and errors as they are, and extrapolated; the errors of these are infinite where nothing is."""
-        seen, ends = (one(known[:count], nested) for one in (limit, edge_limit))
-        seen = Limit(*(np.where(edge, theirs, mine) for mine, theirs in zip(seen, ends)))
-        hides = hidden * 2.0**(len(known) - count)
-        twice = np.where(seen.extrapolated != seen.value, EXTRAPOLATED, 1.0)
-        plain, left = np.maximum(rough * seen.error, hides), np.maximum(rough * seen.left, twice * hides)
-        return seen.value, plain, seen.extrapolated, np.where(plain <= wanted, np.inf, left)
-
-    edge = np.reshape(edged, np.shape(edged) + (1,) * (known.ndim - 1 - np.ndim(edged)))
-    value, error, further, left = of(len(known))
-    out = np.where(left < error, further, value), np.minimum(left, error)
-    for count in range(3, len(known)):
-        first, wide, *more = of(count)
-        for best, bar in ((first, wide), more):
-            better = (np.abs(known[-1] - best) <= bar) & (bar < out[1])
-            out = np.where(better, best, out[0]), np.where(better, bar, out[1])
-    return out
+    seen = limit(known, nested)
+    plain = np.maximum(rough * seen.error, hidden)
+    further = (seen.extrapolated != seen.value) & (plain > wanted)
+    left = np.where(further, np.maximum(rough * seen.left, EXTRAPOLATED * hidden), np.inf)
+    return np.where(left < plain, seen.extrapolated, seen.value), np.minimum(left, plain)
 
 
 def met(found: dict, tolerance: float) -> bool:
@@ -261,14 +238,6 @@ def of_peak(fraction, error, share):
 
 def _of_peak(fraction: Measure, peak: Measure) -> Measure:
     return replace(fraction, error=float(of_peak(fraction.value, fraction.error, peak.error / peak.value)))
-
-
-def reaching(found: dict, top: float) -> dict:
-    """Measures whose peak has a bar down to the largest nodal pressure `top` [Pa], of a node inside: one at a border of
-    the interface holds the mean over half a cell."""
-    peak = found["pressure_peak"]
-    peak = replace(peak, error=max(peak.error, peak.value - top))
-    return found | {"pressure_peak": peak, "loaded_fraction": _of_peak(found["loaded_fraction"], peak)}
 
 
 def cells_halved(fine, coarse) -> bool:

@@ -1,6 +1,6 @@
 """Sizes, stiffness and groups of a patch, before it is pressed."""
 
-from math import log10, sqrt
+from math import sqrt
 
 from ... import rates
 from ...core import say
@@ -8,12 +8,9 @@ from ...model.model import Model
 from ...model.patch import bars, block_shear
 from . import skin
 from .grids import Sizes, expected_grids
-from .high_order import takes_cells
 
 # bytes of packages; per predicted byte of condensing; per node: of pieces beyond the interface, of frames
 PACKAGES, CONDENSED, OUTLINED_NODE, FRAMES_NODE = 2e7, 0.8, 4.6e3, 3.5e3
-SHARPER_BYTES = 1.2e7  # of cells of order 4 at a tolerance of 1e-4
-SHARP_FROM = 5e-4  # tolerance from which cells of order 4 are wanted
 FULL = 0.7  # of the tilt at which bars open: elastic pieces, seen at height/length 0.08 to 4, open from 0.77 on
 
 
@@ -30,9 +27,6 @@ def effort(asked, found: Sizes, tolerance: float) -> tuple:
     """
     seconds = rates.PRESSED + (rates.OUTLINED if found.outlined else rates.CONDENSED) * found.seconds
     size = PACKAGES + (OUTLINED_NODE * found.nodes if found.outlined else CONDENSED * found.bytes)
-    if tolerance < SHARP_FROM and takes_cells(asked):
-        decades = log10(1e-3 / tolerance) * (1 if found.ends == 0 and not asked.lower.thickness else sqrt(rates.EDGED))
-        seconds, size = seconds + rates.SHARPER * decades**2, size + SHARPER_BYTES * decades**2
     if not asked.still:
         seconds, size = seconds + _frames(found), size + FRAMES_NODE * found.nodes
     return seconds, size

@@ -43,7 +43,7 @@ class Patch:
     whose means over the width then stand in `pressure`, else None; tangential_ratio: k_t/k_n of the skin, None where it
     is rigid in shear; skinned: a skin of asperities lies between the pieces; jumps: places [m] where the gap steps;
     sharp: an end of the interface is a corner that meets a face which goes on; notes: sentences for the warnings;
-    sharper: static measures by name as (value, error) that cells of order 4 or points of a trace gave in addition, {}
+    sharper: static measures by name as (value, error) that points of a trace gave in addition, {}
     without any; averaging [m]: the length that a profile is averaged over where it bears, None without one; either: a
     step of the gap ends at a node, half of which lies below it and half above: (weight, Patch) with the whole node
     below, and the same with it above; () without such a node. fine: the Surface on the points of a trace, None where

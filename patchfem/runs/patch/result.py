@@ -134,14 +134,10 @@ def left_out(model, patch, coarse) -> list:
     out = [text for text in patch.notes if nodes.is_note(text)]
     out += [f"scikit-fem assembles the stiffness of the {' and the '.join(by_forms)} piece"] if by_forms else []
     out += [*drawn_otherwise(patch.pair), *slender(asked, patch.pressure.load / patch.pieces.interface.weight.sum())]
-    if patch.sharper and patch.averaging is not None:
+    if patch.sharper:
         out.append(f"each static measure is computed on the mesh and on points {say(patch.averaging, 3)} apart, and "
                    "the value with the smaller error is given; on these points short waves are treated as in infinite "
                    f"layers; {_of_mesh(model, patch)}")
-    elif patch.sharper:
-        out.append("each static measure is computed on the mesh and on Gauss-Lobatto cells of order 4, and the value "
-                   "with the smaller error is given; "
-                   f"fields and motion are computed on the bilinear mesh of {patch.x.size} interface points")
     elif patch.averaging is not None and not asked.gap.rough:
         out.append("where the profile is in contact, its heights are averaged over a length of "
                    f"{say(patch.averaging, 3)}; the errors include the effect of the choice of this length")

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...core import Measure
-from ...response.grid_convergence import convergence_errors
+from ...response.errors import convergence_errors
 from ...response.rows import floor_of
 from ...slip.shear_modes import JenkinsSet
 from .kept import elements

@@ -60,8 +60,8 @@ class Asked(NamedTuple):
 class LevelValues(NamedTuple):
     """What q patches have on one level: values: name -> (q,); first, stop: (q,) the nodes in contact; ends: (2, q) [m]
     cells in which the contact ends on the left and on the right, 0 where it reaches the border; spread, corner: (q,) as
-    `Hidden` has them; top: (q,) largest nodal pressure [Pa]; inside: (q,) whether no border of the interface bears as
-    much; good: (q,) whether it was solved; force (q, m) [N] and opening (q, m) [m] of the nodes; x: (m,) [m]."""
+    `Hidden` has them; top: (q,) largest nodal pressure [Pa]; good: (q,) whether it was solved; force (q, m) [N] and
+    opening (q, m) [m] of the nodes; x: (m,) [m]."""
 
     values: dict
     first: np.ndarray
@@ -70,7 +70,6 @@ class LevelValues(NamedTuple):
     spread: np.ndarray
     corner: np.ndarray
     top: np.ndarray
-    inside: np.ndarray
     good: np.ndarray
     force: np.ndarray
     opening: np.ndarray
@@ -222,13 +221,10 @@ def pressed_together(asked: Asked, tolerance: float, pieces: list | None = None)
     wanted = allowed(first.mesh_tolerance or tolerance, known[-1], floors) if first.chosen else np.inf
     with np.errstate(invalid="ignore", divide="ignore"):
         best, error = settled(known, np.array([np.broadcast_to(least.get(name, 0.0), cell.shape) for name in names]),
-                              wanted, nested, edged=np.isin(names, one_by_one.EDGED))
+                              wanted, nested)
         error = np.maximum(error, max(one_by_one.ALIKE, pair.rounding) * np.abs(known[-1]))
         values, errors = dict(zip(names, best)), dict(zip(names, error))
         peak, fraction = values["pressure_peak"], values["loaded_fraction"]
-        errors["loaded_fraction"] = one_by_one.of_peak(fraction, errors["loaded_fraction"],
-                                                       errors["pressure_peak"] / peak)
-        errors["pressure_peak"] = np.maximum(errors["pressure_peak"], np.where(fine.inside, peak - fine.top, 0.0))
         errors["loaded_fraction"] = one_by_one.of_peak(fraction, errors["loaded_fraction"],
                                                        errors["pressure_peak"] / peak)
     return Together(values, errors, good, fine.top, mine["approach"],
@@ -284,8 +280,8 @@ def pressed_on(asked: Asked, pair: Pair, coarse: LevelValues | None = None) -> L
                      np.where(found.stop < m, cells[np.clip(found.stop - 1, 0, m - 2)], 0.0)])
     corner = np.zeros(total.size) if first.skin is not None else \
         corner_layers(pair, sigma[:, [0, -1]].T, cells[[0, -1]])  # a skin evens it out
-    return LevelValues(values, found.first, found.stop, ends, wide + moved, corner, top,
-                       (sigma[:, 0] < top) & (sigma[:, -1] < top), found.flaw <= SOLVED, found.force, found.opening, x)
+    return LevelValues(values, found.first, found.stop, ends, wide + moved, corner, top, found.flaw <= SOLVED,
+                       found.force, found.opening, x)
 
 
 def _about(x, coarse: LevelValues) -> tuple:

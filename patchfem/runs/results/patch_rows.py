@@ -60,7 +60,6 @@ ROWS = (
 # what computes a static measure, as `numerics.measures` of summary.json names it
 ON_FINEST_MESH = "finite elements, finest mesh"
 EXTRAPOLATED = "finite elements, extrapolated over nested meshes"  # or of a coarser one of them, whose error is smaller
-SPECTRAL = "spectral elements of order 4"
 ON_POINTS = "points on layered half-spaces"
 WORN = "wear in jumps of cycles"
 # what a mesh is chosen for

@@ -1,7 +1,7 @@
 """Frequency and damping of a released rig over its amplitude, with the errors of its coarser runs and of its mesh.
 
 Where the nodes of a mesh and of a coarser one hold, their decays are alike, and both leave out the loss of micro-slip.
-What the mesh leaves open is read off the static loops of its elements instead (`slip.grain`).
+So the error of the mesh is read off the static loops of its elements at the same amplitudes (`slip.grain`).
 """
 
 from dataclasses import replace
@@ -13,7 +13,8 @@ from ...core import NotConverged, PatchfemError
 from ...dynamics.harmonic import forces, quasi_static
 from ...dynamics.march import models
 from ...response.decay_curve import FAINT, DecayCurve, curve_of, of_turns, turns
-from ...slip.grain import SPREAD_FACTOR, STIFFER_FACTOR, spread, stiffer
+from ...response.errors import MAX_ORDER, error_of_change
+from ...slip.grain import SPREAD_FACTOR, spread
 from ..patch import faces
 from . import interface, numerics
 from .solution import Solution
@@ -76,10 +77,10 @@ def laws_on(model, patch, meshed: tuple = ()):
 
 
 def rough_laws(model, coarse) -> list:
-    """(number of the interface, Group) of the laws on coarser meshes; coarse: the Patch of a coarser one of its
+    """Groups of the laws with a coarser mesh of one patch after the other; coarse: the Patch of a coarser mesh of its
     [contact] or None."""
-    return [*([] if coarse is None else [(0, laws_on(model, coarse))]),
-            *((one[0], laws_on(model, None, one)) for one in faces.meshed(model))]
+    return [*([] if coarse is None else [laws_on(model, coarse)]),
+            *(laws_on(model, None, numbers) for numbers in faces.meshed(model))]
 
 
 def steadily(model):
@@ -103,16 +104,24 @@ def rows_of(modes, found: list) -> np.ndarray:
 
 
 def mesh_error(fine, rough, read) -> np.ndarray:
-    """Error of what read(Group) gives by the mesh of a patch that slips part by part: what a coarser mesh changes, or
-    what the grain of its nodes or the change of its stiffness would (`slip.grain`), where that is more.
+    """Return the error by the mesh of what read(Group) gives of a patch that slips part by part.
 
-    rough: of (number of the interface, Group on its coarser mesh).
+    It is the change by a coarser mesh at second order, and no less than what the elements change when they spread over
+    the yield slides between the nodes (`slip.grain`): a slide in which no node slips shows no change at all.
+
+    Parameters
+    ----------
+    fine : Group
+        Laws on the mesh of the run.
+    rough : list of Group
+        Laws with a coarser mesh of one patch after the other.
+    read : callable
+        Function of a Group that returns an array.
     """
-    best, apart = read(fine), 0.0
-    for k, other in rough:
-        stiff = stiffer(float(fine.stiffness()[k]), float(other.stiffness()[k]))
-        apart = apart + np.fmax(np.abs(read(other) - best), STIFFER_FACTOR * np.abs(read(fine.remade(stiff)) - best))
-    return np.fmax(SPREAD_FACTOR * np.abs(read(fine.remade(_spread)) - best), apart)
+    best = read(fine)
+    changes = (read(other) - best for other in rough)
+    by_meshes = sum(error_of_change(one, order=MAX_ORDER) for one in changes)
+    return np.fmax(SPREAD_FACTOR * np.abs(read(fine.remade(_spread)) - best), by_meshes)
 
 
 def _spread(stiffness, slide) -> tuple:

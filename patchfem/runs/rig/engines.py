@@ -7,7 +7,7 @@ compile seconds of each stand in `runs.memory`.
 
 from collections.abc import Callable
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 from importlib import import_module
 from math import inf
 from typing import Any, NamedTuple
@@ -16,19 +16,9 @@ import numpy as np
 
 from ...dynamics.events.elements import JOINED
 from ...effects import NO_WAVEFORM, has
-from ...friction import record
 from ...model.model import Model
 from ...response.coarser import Coarser, coarser_space
-from ...response.errors import (
-    StepScales,
-    cells_error,
-    change,
-    modes_error,
-    pieces_error,
-    step_error,
-    tolerance_error,
-)
-from ...response.rows import of_number
+from ...response.errors import coarser_errors, finer_errors, merged_cell_errors, step_errors
 from ...scene.rules import methods
 from ...scene.rules.draft import acts, pinned
 from ...slip import shear_modes
@@ -36,7 +26,7 @@ from ..patch import faces
 from .costs import dear_elements, dear_events, not_smooth, pieces_per_cycle
 from .solution import gauged
 
-FINER, MERGED = 0.5, 2.0  # merge width of the run that shows what merging does, and times its change
+FINER = 0.5  # merge width of the run that shows what merging does
 LOOSE = 1e-2  # tail over the tolerance from which it is checked by a run with less; unpinned it is a tenth of that
 LESS = 0.1  # tail of that run
 MOST_PIECES = 1e5  # of a period, up to which a steady motion is found by the map of its yields
@@ -99,7 +89,7 @@ class Engine(NamedTuple):
             return []
         few = _fewer(numerics, 4) if self.in_time is _march_in_time else numerics
         beside = None if few is numerics else Variant(few, patch)
-        return [Coarser((Variant(replace(few, richer=True), patch),), modes_error, beside, "reduced")]
+        return [Coarser((Variant(replace(few, richer=True), patch),), finer_errors, beside, "reduced")]
 
     @property
     def run(self) -> Callable:
@@ -194,13 +184,15 @@ def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
 def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     """The coarser runs of the engine of pieces: the mesh, where its nodes make the elements, and fewer cells of
     a density."""
-    out = [Coarser((Variant(numerics, coarse),), pieces_error, of="mesh")] if coarse is not None and model.soft else []
-    out += [Coarser((Variant(one, patch),), pieces_error, of="mesh") for one in _meshed(model, numerics)]
+    meshes = [Variant(one, patch) for one in _meshed(model, numerics)]
+    if coarse is not None and model.soft:
+        meshes = [Variant(numerics, coarse), *meshes]
+    out = [Coarser((variant,), coarser_errors, of="mesh") for variant in meshes]
     cells = any(has(one.numbers.law, "cells") for one in model.rig.interfaces)
     if not cells:
         return out
-    return [*out, Coarser(tuple(Variant(replace(numerics, joined=one), patch) for one in JOINED), cells_error,
-                          of="cells")]
+    merged = tuple(Variant(replace(numerics, joined=one), patch) for one in JOINED)
+    return [*out, Coarser(merged, merged_cell_errors, of="cells")]
 
 
 def _meshed(model: Model, numerics) -> list:
@@ -215,12 +207,7 @@ def _fewer(numerics, share: int):
 
 def _march_in_time(model: Model, numerics, patch) -> list:
     """The coarser runs of the march in time: half and a quarter of the steps."""
-    f = model.friction
-    turn = f.bond_length if f is not None and has(f.law, "bonds") else 0.0
-    overshoots = frozenset(of_number("friction_force_peak", number) for number, one in enumerate(model.rig.interfaces)
-                           if record.can_overshoot(one.numbers))
-    scales = StepScales(model.rig.displacement, turn, overshoots)
-    return [Coarser(_halves(numerics, patch), lambda *values: step_error(*values, numerics.steps, scales), of="steps")]
+    return [Coarser(_halves(numerics, patch), partial(step_errors, steps=numerics.steps), of="steps")]
 
 
 def _halves(numerics, patch) -> tuple:
@@ -255,8 +242,7 @@ def _summed(model: Model, few, patch, solution) -> list:
     if choice.merge > 0 or choice.tail > LOOSE * model.accuracy.tolerance:
         finer = replace(choice, merge=FINER * choice.merge, tail=LESS * choice.tail)
         same, narrow = (Variant(replace(few, choice=one), patch) for one in (choice, finer))
-        out.append(Coarser((narrow,), lambda wide, fine: {name: MERGED * gap for name, gap in
-                                                          change(wide, fine).items()}, same, "bonds"))
+        out.append(Coarser((narrow,), finer_errors, same, "bonds"))
     return out
 
 
@@ -290,15 +276,16 @@ def _steady_in_space(model: Model, numerics, patch, coarse, solution) -> list:
 
 
 COARSER = 30.0  # times the error of a step
+WIDER_TOLERANCE = partial(coarser_errors, ratio=COARSER)
 
 
 def _smooth_in_time(model: Model, numerics, patch) -> list:
     """The coarser runs of the smooth engine: a run whose steps may make COARSER times the error.
 
-    The error of a run follows that of its steps, `response.errors.tolerance_error`.
+    The error of a run follows that of its steps.
     """
     wider = Variant(replace(numerics, local=numerics.local * COARSER), patch)
-    return [Coarser((wider,), lambda *values: tolerance_error(*values, model.rig.displacement))]
+    return [Coarser((wider,), WIDER_TOLERANCE)]
 
 
 EXACT = Engine("exact", "exact", "pieces run_exact", _none, _exact_in_space, "costs exact_cost",

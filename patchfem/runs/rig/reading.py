@@ -9,7 +9,7 @@ from ...dynamics.integrated import Integrated
 from ...dynamics.work_check import sampled_work
 from ...effects import has
 from ...response import run_events
-from ...response.errors import GAPS, change
+from ...response.errors import GAPS, change, error_of_change
 from ...response.levels import KEPT, Level
 from ...response.loops import at_turns
 from ...response.measures import slip_noise, window_amplitudes, window_ends
@@ -83,7 +83,7 @@ class Reader:
         fewer = self.values(self.fewer(run), drive, ledger=run.response.extra.get("ledger"))
         own = self.integrated(run, drive)
         apart = {name: gap for name, gap in change(values, fewer).items() if gap > 0 and name not in GAPS}
-        return {name: row_of(name).halves[0] * gap + row_of(name).halves[1] / self.steps
+        return {name: error_of_change(gap, order=row_of(name).order) + row_of(name).grain / self.steps
                 for name, gap in apart.items()} if own.loops or hasattr(drive, "band") else {}
 
     def whole_run(self, run, drive):
@@ -105,7 +105,7 @@ class Reader:
         for parity in (0, 1):
             fewer = self.values(replace(run, response=_between_reversals(run.response, parity)), drive)
             for row in rows:
-                out[row.name] += row.halves[0] * abs(values[row.name] - fewer[row.name])
+                out[row.name] += error_of_change(values[row.name] - fewer[row.name], order=row.order)
         return out
 
     def solution(self, run, seconds: float, drive=None, **more) -> Solution:

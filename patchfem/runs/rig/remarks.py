@@ -91,14 +91,14 @@ def notes_of(run) -> list:
     ended = [*_across(run), *([raw.message] if raw.message and raw.outcome is Outcome.LEAVES_GROOVES else [])]
     if run.patch is not None and run.patch.strips is not None and model.soft:
         return ["strips that slip part by part have no common shear stress, so the fields contain only the pressure",
-                *run.rings.notes, *ended]
+                *ended]
     out, f = [*_of_bonds(model, run.patch, raw), *climbing_as_one(model, run.patch)], model.friction
     if len(rig.interfaces):
         out += ENGINES[run.numerics.engine].call("notes", model, run.numerics, run.patch, raw) or []
     if raw.levels and rig.onset[0] == "slip" and raw.held > 0:
         out.append(f"onset_level: slip counts only if its amplitude is above {length(raw.held)}, a thousandth of the "
                    "elastic range of the interface; a part of the interface may slip earlier")
-    return [*rig.kept, *out, *creeping_note(f), *run.rings.notes, *_of_release(run), *ended]
+    return [*rig.kept, *out, *creeping_note(f), *_of_release(run), *ended]
 
 
 def _of_release(run) -> list:

@@ -10,7 +10,7 @@ from ...effects import has
 from ...model.rig import BEYOND
 from ...response import reasons, run_events, stationary
 from ...response.coarser import estimate, left_open
-from ...response.errors import unseen, with_errors
+from ...response.errors import with_errors
 from ...response.outcome import settle, without_bars
 from ...response.rows import NEEDS_RUN, judged
 from ...response.settling import slip_period
@@ -18,7 +18,7 @@ from ...structure.drive_sizes import decay_rate, is_periodic
 from ..patch import faces
 from ..results.result import FRAMES, Result, on_a_mesh_of_known_error, without_errors
 from ..results.travel import outcome_on_piece
-from . import decays, flutter, levels, lists, remarks, start_ring
+from . import decays, flutter, levels, lists, remarks
 from .costs import MOST_STEPS
 from .engines import ENGINES, Variant, unbalanced
 from .fields import fields_of
@@ -35,7 +35,7 @@ class Coupled:
     """A coupled run as far as its passes have come.
 
     model, numerics, patch; raw: the Solution of its engine; drive: of the motion that is shown; estimated: whether its
-    errors are known; measures: by name; outcome; rings: what the ringing of the start leaves open.
+    errors are known; measures: by name; outcome.
     """
 
     model: object
@@ -46,7 +46,6 @@ class Coupled:
     estimated: bool
     measures: dict
     outcome: Outcome | None = None
-    rings: "start_ring.StartRing | None" = None
 
     @property
     def rubs(self) -> bool:
@@ -69,7 +68,7 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     known = estimate and raw.outcome is not Outcome.NOT_CONVERGED and \
         on_a_mesh_of_known_error(model, patch, coarse) and (not rig.soft or faces.known(model))
     run = Coupled(model, numerics, patch, raw, raw.extra.get("at", rig.drive), known, measures)
-    for go in (_levelled, _settled, _started, _reasoned):
+    for go in (_levelled, _settled, _reasoned):
         run = go(run)
     run, decay, left_out = _decayed(run, coarse[0])
     warned = [*remarks.warnings_of(run), *remarks.peak_at_an_end(run, lambda: what.modes(what.chain))]
@@ -104,15 +103,6 @@ def _settled(run: Coupled) -> Coupled:
     if outcome is Outcome.EXCEEDS_TRAVEL and rig.travel == BEYOND:  # no stop, but nothing holds it
         outcome, found = Outcome.GROWS, without_bars(found)
     return replace(run, outcome=outcome, measures=found)
-
-
-def _started(run: Coupled) -> Coupled:
-    """With what the ringing of the start leaves open behind a patch that holds."""
-    rings = start_ring.StartRing(run.measures, {}, [])
-    if (run.patch is not None or run.model.rig.soft) and not run.raw.levels:
-        rings = start_ring.start_ring(run.outcome, run.measures, run.raw.window, run.drive, run.numerics.cycles,
-                           run.model.accuracy.tolerance)
-    return replace(run, measures=rings.measures, rings=rings)
 
 
 def _reasoned(run: Coupled) -> Coupled:
@@ -151,9 +141,7 @@ def _decayed(run: Coupled, coarse) -> tuple:
 
 def _judged(run: Coupled) -> Coupled:
     """With the final floors of its measures; a steady motion that does not exist has none."""
-    soft = run.rubs and (run.model.soft or run.model.rig.soft)
-    found = unseen(run.measures, run.numerics.cycles) if soft else run.measures
-    found = judged(found, run.model.accuracy.tolerance)
+    found = judged(run.measures, run.model.accuracy.tolerance)
     if ENGINES[run.numerics.engine].steady and run.outcome is Outcome.GROWS:
         found = reasons.unbounded(found)
     return replace(run, measures=found)
@@ -182,7 +170,7 @@ def _extra(run: Coupled, notes: list) -> dict:
     if rig.waveform.is_random:
         out["spectra"] = stationary.spectra(raw.window, rig.drive)
         notes = [*notes, *stationary.short(run.measures, raw.window)]
-    return out | {"still_rings": run.rings.remedies, "book": raw.book, "period": run.drive.period, "notes": notes}
+    return out | {"book": raw.book, "period": run.drive.period, "notes": notes}
 
 
 def _solved(model, numerics, patch, coarse, seconds, say, progress, estimated) -> tuple:

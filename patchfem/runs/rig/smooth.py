@@ -62,7 +62,7 @@ class SmoothReader(Reader):
         found = self.sampled(run, self.model.rig.drive, values)
         size = values.get("relative_displacement_amplitude", 0.0)
         for name in ("stick_fraction", "slip_start_phase"):
-            found[name] = LOCATED if _clear(run) else found.get(name, row_of(name).halves[1] / self.steps)
+            found[name] = LOCATED if _clear(run) else found.get(name, row_of(name).grain / self.steps)
         return {name: found.get(name, 0.0) + run.unsure.get(name, 0.0)
                 + run.unlike * (size if name == "drift_per_cycle" else abs(value)) for name, value in values.items()}
 

@@ -150,8 +150,8 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
             progress(state.cycle / wear.cycles)
     others = [one for one in coarse if one is not None]
     worn, depths = zip(*(_on(model.patch, model, patch, other, moments) for other in others)) if others else ((), ())
-    other, share = other_strips(model.patch)
-    stripped = _on(other, model, patch, patch, moments) if share and others else None
+    other, _ = other_strips(model.patch)
+    stripped = _on(other, model, patch, patch, moments) if other is not model.patch and others else None
     return Evolved(patch, (*worn, *(None for one in coarse if one is None)), state, moments, depths, stripped,
                    moments[-1].miss, perf_counter() - clock, stopped)
 

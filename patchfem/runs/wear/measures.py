@@ -6,7 +6,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...core import Measure, Outcome, frozen_array, say
-from ..patch.limits import limit
+from ...response.errors import convergence_errors, error_of_change
 from ..patch.measures import other_strips
 from ..patch.press import areas, pressed
 from ..patch.values import values
@@ -15,7 +15,6 @@ from .evolve import THIN, mean_depth, worn_through
 from .slip import UNBOUNDED, of_point
 
 FRAMES = 24  # of the interface on the way
-STRIPS = 1.5  # the wear of a corner settles with the strips a little slower than to first order
 EDGE_PEAK, BESIDE = "pressure_peak_at_edge", 2  # and nodes beside an edge of the contact that the peak may stand on
 HOLDER = {"closing": "approach", "rotation": "rotation"}
 
@@ -80,16 +79,15 @@ def _ended(model, found, gone: dict) -> list:
 def jumped(model, found, measures: dict) -> dict:
     """Measures of the worn patch with what the length of the jumps adds to their errors.
 
-    That is twice the change to the depth by the same jumps undivided, of few jumps more, four times of two and of a
-    single one: in a long jump a moving contact edge leaves the nodes it has just taken too high, on both. Strips add
-    what other strips change.
+    That is the change to the depth by the same jumps undivided, and to another number of strips, at first order: a
+    contact edge that moves during a jump leaves the nodes that it has just taken too high.
     """
-    times = min(2 + (4 / model.wear.jumps if model.wear.jumps else 0), 4)
     rough = values(pressed(model.patch, found.patch.pair, frozen_array(found.state.rough)))
     here = values(found.patch)
-    other, share = values(found.stripped[0]) if found.stripped else here, STRIPS * other_strips(model.patch)[1]
-    added = {name: times * abs(here[name] - rough[name]) + share * abs(here[name] - other[name]) for name in here}
-    return {name: replace(m, error=m.error + added[name]) for name, m in measures.items()
+    other, ratio = values(found.stripped[0]) if found.stripped else here, other_strips(model.patch)[1]
+    added = {name: error_of_change(here[name] - rough[name]) + error_of_change(here[name] - other[name], ratio)
+             for name in here}
+    return {name: replace(m, error=float(m.error + added[name])) for name, m in measures.items()
             if name in here and m.error is not None}
 
 
@@ -128,17 +126,17 @@ def of_patch(model, found, motion: dict, estimate: bool = True) -> dict:
     share = found.miss + slip_miss(motion) + _coarser(found, motion)
     mine, *others = [_lost(model.patch, *one) for one in [(found.patch, state.depth),
                                                           *zip(found.coarse, found.depths)]]
-    asked, times = other_strips(model.patch)
+    asked, ratio = other_strips(model.patch)
     strips = _lost(asked, *found.stripped) if found.stripped else mine
     jumps = {"worn_volume": float(np.vdot(np.abs(state.depth - state.rough), area)) + state.strayed * float(area.sum()),
              "worn_depth_max": state.error}
     out, before, first = {}, found.moments[0].values, model.wear.start
+    meshes = convergence_errors(mine, *others) if others else {}
     for name, value in mine.items():
         error, more = None, 0.0 if first is None else first.missing(name, before[name])
         if others and estimate and more is not None:
-            meshes = limit([*(one[name] for one in reversed(others)), value])
-            error = jumps[name] + share * max(value - before[name], 0.0) + float(meshes.error) + 1e-12 * value + \
-                more + STRIPS * times * abs(strips[name] - value)
+            error = jumps[name] + share * max(value - before[name], 0.0) + float(meshes[name]) + 1e-12 * value + \
+                more + float(error_of_change(strips[name] - value, ratio))
         out[name] = Measure(value, TABLE[name].unit, error, TABLE[name].floor, engine=WORN)
     left = found.moments[-1].values.get("groove_amplitude")
     if left is not None:

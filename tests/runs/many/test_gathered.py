@@ -1,5 +1,6 @@
 """Patches with bonds behind shear, few points in place of all their nodes, beside the same cases run by themselves."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -47,8 +48,14 @@ def held(seed: int, count: int) -> tuple:
     cases = models(seed, count)
     assert all(many.batch_of(one, 32).name == "gathered" and many.batch_of(one, 31) is None for one in cases)
     found, real = gathered.solve(cases), one_by_one.solve(cases)
-    assert (found.outcome == real.outcome).all() and not found.messages and found.warnings == real.warnings
+    assert (found.outcome == real.outcome).all() and not found.messages
+    assert without_sizes(found.warnings) == without_sizes(real.warnings)
     return beside(found, real)
+
+
+def without_sizes(warnings: dict) -> dict:
+    """Warnings by case without the sizes of errors, which hang on the last digits of values."""
+    return {case: [re.sub(r"error of \S+", "error", text) for text in texts] for case, texts in warnings.items()}
 
 
 def test_always_few_points_are_within_the_bars_of_all():

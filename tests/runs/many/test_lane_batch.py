@@ -9,6 +9,7 @@ from lane_bars import LAWS, SCENE, drawn, rows
 from lane_bars import held as within
 
 from patchfem.api import base_of, build, load, run, run_many
+from patchfem.response.errors import convergence_errors
 from patchfem.runs.many import many, one_by_one
 from patchfem.runs.many.answers import Answers
 from patchfem.runs.many.lumped import lanes, lumped
@@ -37,7 +38,9 @@ def held(law: str, seed: int, count: int, most: int | None = None) -> None:
     mine = mine[:most]
     some = [cases[case] for case in mine]
     ones = lumped_answers(some) if law in EXACT else one_by_one.solve(some)
-    assert missed(found.some(np.array(mine)), ones) <= 0.03 * len(mine)
+    lanes_of = found.some(np.array(mine))
+    assert (lanes_of.outcome == ones.outcome).all()
+    assert np.mean([within(row) for some in rows(lanes_of, ones) for row in some]) >= 0.97
 
 
 def lumped_answers(cases):
@@ -52,14 +55,14 @@ def lumped_answers(cases):
 
 @pytest.mark.share(0, 1, 2, 4, 5)  # each other law is a loop in lanes and one of single runs to compile
 @pytest.mark.parametrize("law", LAWS)
-def test_always_97_of_100_cases_lie_within_both_bars(law):
+def test_always_97_of_100_measures_lie_within_both_errors(law):
     few = law not in EXACT[:3]  # what stands beside Iwan or in single runs takes seconds
     held(law, 1, 64 if few else 150, 20 if few else None)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("law", LAWS)
-def test_always_97_of_100_cases_lie_within_both_bars_many(law):
+def test_always_97_of_100_measures_lie_within_both_errors_many(law):
     held(law, 2, 1000)
 
 
@@ -79,14 +82,6 @@ def test_exact_chunks_of_a_study_are_its_whole():
     for name, values in whole.values.items():
         joined = np.concatenate([part.values.get(name, np.full(len(part), np.nan)) for part in parts])
         np.testing.assert_array_equal(joined, values)
-
-
-@pytest.mark.filterwarnings("error")
-def test_always_measures_of_nothing_have_the_bar_of_their_change():
-    """A share of a value that is 0 has no end; it is no chance of a change that is small."""
-    zero = {name: np.zeros(2) for name in (*lanes.MAIN, "friction_force_peak", "equivalent_damping")}
-    found = lanes.bars(zero, {name: np.array([0.5, 0.0]) for name in zero})
-    assert all(one[0] == 1.0 and one[1] == 0.0 for one in found.values())
 
 
 def test_always_a_batch_that_is_contradicted_is_exact(monkeypatch):
@@ -110,7 +105,7 @@ def test_always_a_batch_that_is_contradicted_is_exact(monkeypatch):
 
 def test_always_a_case_that_is_contradicted_by_itself_is_exact_by_itself(monkeypatch):
     """One of all that are checked: the others stay what they are."""
-    cases = models("coulomb", 5, 64)
+    cases = models("coulomb", 7, 64)
     real, clean = lanes.contradicted, many.answers(cases)
     one = []
 
@@ -222,14 +217,13 @@ def test_exact_a_motion_that_marches_on_until_it_settles_is_that_of_ten_times_it
 
 
 @pytest.mark.filterwarnings("error")
-def test_always_a_march_that_runs_away_by_half_the_steps_has_an_endless_bar_and_says_nothing():
-    values = {name: np.array([1.0, 2.0]) for name in (*lanes.MAIN, "drift_per_cycle", "friction_force_peak",
-                                                      "loop_area", "equivalent_damping", "equivalent_stiffness",
-                                                      "slip_start_phase")}
-    coarse = {name: np.array([1.001, 1e308]) for name in values}
-    for law in ("friction.laws.tanh_kernels", "rigid"):
-        found = lanes.bars(values, lanes.changed(values, [coarse]), law)
-        assert np.isinf(found[lanes.MAIN[0]][1]) and found[lanes.MAIN[0]][0] > 1e-3
+def test_always_cases_have_the_errors_of_single_runs_of_the_same_values():
+    """By two runs and by three; a march that runs away by half the steps has an infinite error and warns of nothing."""
+    runs = [{lanes.AMPLITUDE: np.array(row)} for row in ([1.0, 2.0, 0.0], [1.001, 1e308, 0.0], [1.003, -1e308, 0.0])]
+    for coarser in (runs[1:2], runs[1:]):
+        error = lanes.bars(runs[0], coarser)[lanes.AMPLITUDE]
+        alone = convergence_errors(*({name: float(row[0]) for name, row in one.items()} for one in [runs[0], *coarser]))
+        assert error[0] == pytest.approx(alone[lanes.AMPLITUDE]) and np.isinf(error[1]) and error[2] == 0.0
 
 
 def test_exact_a_yield_that_settles_across_the_end_of_a_cycle_is_found():

@@ -25,10 +25,10 @@ from ....effects import has, listed
 from ....friction.laws.iwan import largest as largest_slide
 from ....model.alike import Alike, columns_of, some
 from ....model.model import Model
-from ....response.errors import APART, GAPS, MAIN, ROUND, pieces_error
+from ....response.errors import ROUND, coarser_errors, convergence_error, signed
 from ....response.measures import energy_balance
 from ....response.ringing import FAINT, PER_PERIOD, WIDEST, ringing
-from ....response.rows import TABLE, first_harmonic, larger_term
+from ....response.rows import larger_term
 from ....response.settling import steady_amplitudes, windows_of
 from ....scene.rules.draft import pinned
 from ....structure.drive_sizes import largest
@@ -40,6 +40,7 @@ from . import lumped
 from .columns import ENDS, Runs, batch_answers
 from .pieces import LONGEST, SHORTEST
 
+AMPLITUDE = "relative_displacement_amplitude"
 LEAST = 64  # cases of a study that lanes serve
 TIGHTEST = 1e-4  # tolerance that lanes serve
 TOGETHER = 4096  # cases of one compiled call
@@ -54,19 +55,9 @@ PASSES = 0.75  # of the time in which a slide that turns passes the speed of Str
 RINGING = 512  # steps of a cycle under a law of a stretch from which a ring that is not found is none
 RATES = ((5.0, 96), (10.0, 192), (20.0, 384))  # fastest motion over the drive, and the steps of a cycle it asks for
 OF_TABLE = ((10.0, 96), (20.0, 192), (40.0, 384), (80.0, 768))  # the same behind sliders that are a patch
-# of the change at half the steps, of that of the main measures, and of the measure itself, as both marches can miss an
-# event alike: 2 of 4077 random cases had an error beyond
-OF_CHANGE, OF_TYPICAL, OF_SIZE = 2.0, 1.0, 2e-5
-# of the change under a law of a stretch but bonds: by 2, 12 of 500 tanh cases erred more, by 1.6 in the middle, 1 of
-# 900 with bonds
-OF_STRETCH = 3.0
 OF_FIT = 5.0  # of the error of the fit of a ring, whose samples err alike by the steps of the march
-HELD = 1e-12  # relative change of a force that its limit holds
-NO_LOOP, OF_A_LOOP = 1e-6, ("slip_amplitude", "loop_area", "friction_work")  # of the largest force times slide: a case
-# with less of a loop sticks, and how it changes says nothing of the amplitude and the force
-OF_LOOP = 4e-10  # least error of the area of a loop over its largest force and slide, what round-off leaves of none
-OF_MIDDLE = 1e-6  # of the amplitude, by which its middle errs but under Coulomb's law: no other event is missed
-ORDERLY, SHOWN = 10.0, 0.25  # a change at half the steps that falls by this shows a high order, and is so much of it
+LEAST_ERROR = 1e-6  # relative error that stays, a hundredth of TIGHTEST: both marches can miss the same event
+NO_LOOP = 1e-6  # of the largest force times slide: a case with less of a loop sticks
 MORE, SETTLED = 10, 1e-5  # times its cycles marches what has not settled; change over a tenth of these that is left
 LATE = 100  # times that change may be left at last
 PACES = 0.25, 0.25, 0.5, *(MORE - 1) * (1.0,)  # of its cycles, after which it is asked whether it has
@@ -418,7 +409,7 @@ def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tup
     law, cycles, (cases, c, meshed), (values, book, found, extremes, rise) = kind_of(models[0]), group(models[0])[0], \
         cases, seen
     window = window_of(cycles)
-    errors = bars(values, changed(values, coarser), law)
+    errors = bars(values, coarser)
     errors |= {name: errors[name] + error for name, error in (meshed or {}).items() if name in errors}
     slips = found.shown[:, at.SLIP_HIGH - at.SHOW] - found.shown[:, at.SLIP_LOW - at.SHOW]
     stuck = slips / 2 <= np.maximum(c["held"], ROUND * np.abs(found.history[:, :, :2]).max(axis=(1, 2)))
@@ -435,8 +426,8 @@ def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tup
     ends = np.arange(cycles - 1, -1, -window)[::-1][-ENDS:]
     nowhere = np.zeros(len(models), bool)  # what is lost goes elsewhere
     tolerance, = columns_of(models, lambda model: (model.accuracy.tolerance,))
-    runs = Runs(cycles, window, values | rings, book, extremes, phasors[:, ends], stuck, nowhere, errors, 1e-9, np.inf,
-                stuck & (rise > tolerance * values["friction_force_peak"]), steady, again=False)
+    runs = Runs(cycles, window, values | rings, book, extremes, phasors[:, ends], stuck, nowhere, errors, LEAST_ERROR,
+                np.inf, stuck & (rise > tolerance * values["friction_force_peak"]), steady, again=False)
     ended = np.isfinite(found.motion[:, at.X] + coarser[0]["friction_work"])
     return runs, exact, faint | ~ended
 
@@ -614,7 +605,7 @@ def _of_mesh(fine: dict, rough: dict) -> dict:
     as it is large."""
     with np.errstate(all="ignore"):
         return {name: np.where(np.isnan(error), np.abs(fine[name]), error)
-                for name, error in pieces_error(fine, rough).items()}
+                for name, error in coarser_errors(fine, rough).items()}
 
 
 def window_of(cycles: int) -> int:
@@ -636,67 +627,25 @@ def _measured(law: str, cases, c: dict, cycles: int, steps: int) -> tuple:
     return values, book, found, extremes, seen.rise
 
 
-def changed(values: dict, coarser: list) -> dict:
-    """Changes by name, (n,) each, of values at half the steps; where a quarter of them, the last of `coarser`, shows
-    that they fall with the step as those of a high order do, a share of them."""
-    changes = []
-    for fine, coarse in pairwise([values, *coarser]):
-        changes.append({name: np.abs(fine[name] - coarse[name]) for name in values})
-        changes[-1]["slip_start_phase"] = np.minimum(changes[-1]["slip_start_phase"],
-                                                     np.pi - changes[-1]["slip_start_phase"])
-    if len(changes) == 1:
-        return changes[0]
-    last, before = changes
-    with np.errstate(all="ignore"):
-        falls = np.array([before[name] >= ORDERLY * last[name] for name in MAIN]).sum(axis=0) > len(MAIN) / 2
-        return {name: np.where(falls & (before[name] >= ORDERLY * last[name]) & np.isfinite(before[name]),
-                               np.fmax(SHOWN * last[name], SHOWN**2 * before[name]), last[name]) for name in values}
+def bars(values: dict, coarser: list) -> dict:
+    """Return the error of each measure (n,) of cases from their values at half and a quarter of the steps.
 
-
-def bars(values: dict, changes: dict, law: str = "") -> dict:
-    """Errors by name, (n,) each, of values whose changes at half the steps are known: the change, and a share of the
-    median relative change of the main measures, as one change can be small by chance, and OF_SIZE of the value.
-
-    law: as of `dynamics.lanes`; one of sliders or of a stretch misses no event, and no limit holds its force.
+    Parameters
+    ----------
+    values : dict
+        Measures by name, (n,) each.
+    coarser : list of dict
+        The same at half the steps and, if it is known, at a quarter of them.
     """
-    with np.errstate(all="ignore"):
-        loops = _loops(values)
-        shares = np.array([np.where((changes[name] > 0) & (loops | (name not in OF_A_LOOP)),
-                                    changes[name] / np.abs(values[name]), np.nan) for name in MAIN if name in values])
-        shares[:, np.isnan(shares).all(axis=0)] = 0.0
-        typical = np.nanmedian(shares, axis=0)
-    out, smooth = {}, law in march.MASING or march.flows(law)
-    times = OF_STRETCH if march.flows(law) and law != KINDS["nonlocal"] else OF_CHANGE
-    for name, change in changes.items():
-        size = first_harmonic(values) if name == "equivalent_stiffness" else 1.0 if TABLE[name].term is not None \
-            and name not in GAPS and name != "drift_per_cycle" else np.abs(values[name])
-        if name == "acceleration_distortion":  # a small part of the acceleration
-            size = np.maximum(size, 1e-3 if law in march.MASING else 1e-4)
-        if name == "drift_per_cycle":
-            size = np.abs(values[MAIN[0]])
-        least = OF_MIDDLE if law not in ("", "rigid") and name == "drift_per_cycle" else OF_SIZE
-        with np.errstate(invalid="ignore"):  # a share of nothing is no chance
-            chance = 0.0 if name in ("normal_load", *GAPS) else np.nan_to_num((OF_TYPICAL * typical + least) * size,
-                                                                              posinf=np.inf)
-        if name == APART[0] and not smooth:  # the limit holds it
-            chance = np.where(change <= HELD * size, 0.0, chance)
-        with np.errstate(over="ignore"):  # of a march that ran away by half the steps
-            out[name] = np.maximum(times * np.nan_to_num(change), chance)
-    for name in ("loop_area", "equivalent_damping"):  # a small difference is as unsure as it is large
-        out[name] = np.where(loops, out[name], np.fmax(out[name], np.abs(values[name])))
-    return out | _rounded(values, out)
-
-
-def _rounded(values: dict, errors: dict) -> dict:
-    """Errors of the measures of a loop of no area, which are no smaller than those that round-off leaves."""
-    least = OF_LOOP * values["friction_force_peak"] * np.abs(values[MAIN[0]])
-    return {name: np.fmax(errors[name], least * part) for name, part in (("loop_area", 1.0),
-                                                                         ("equivalent_damping", _of_loop(values)))}
+    with np.errstate(over="ignore", invalid="ignore"):  # of a march that ran away by half the steps
+        changes = [signed(fine, coarse) for fine, coarse in pairwise([values, *coarser])]
+        return {name: np.nan_to_num(convergence_error(*(gaps[name] for gaps in changes)), posinf=np.inf)
+                for name in values}
 
 
 def _loops(values: dict) -> np.ndarray:
     """(n,) whether a case has a loop, and not a small difference of what goes to and fro as it sticks."""
-    return np.abs(values["loop_area"]) > NO_LOOP * values["friction_force_peak"] * np.abs(values[MAIN[0]])
+    return np.abs(values["loop_area"]) > NO_LOOP * values["friction_force_peak"] * np.abs(values[AMPLITUDE])
 
 
 def _of_loop(values: dict) -> np.ndarray:

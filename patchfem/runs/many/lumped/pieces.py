@@ -12,7 +12,7 @@ from ....dynamics.events.reading import joined
 from ....effects import has
 from ....friction.record import law_from
 from ....response import run_events
-from ....response.errors import cells_error
+from ....response.errors import merged_cell_errors
 from ....response.measures import ROUND, energy_balance
 from ....response.ringing import held_ring
 from ....structure.drive_sizes import largest, slowest
@@ -77,7 +77,7 @@ def runs_of(models, cycles: int, window: int, say=None, pairs: int = 0) -> Runs:
         fewer = [[case._replace(groups=tuple(merged(part, *joined) for part in case.groups)) for case in cases]
                  for joined in JOINED]
         return with_coarser_errors(out, [runs_of_cases(part, cycles, window, say, steady=False) for part in fewer],
-                                   cells_error)
+                                   merged_cell_errors)
     return out
 
 

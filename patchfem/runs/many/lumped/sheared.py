@@ -16,7 +16,7 @@ from ....core import Outcome
 from ....effects import has
 from ....model.model import Model
 from ....model.source import placed
-from ....response.errors import pieces_error
+from ....response.errors import coarser_errors
 from ...patch import result as of_patch
 from ...remedies import Finding, beyond_tolerance
 from ...results.result import without_folders
@@ -123,7 +123,7 @@ def moved(models, held: list, say) -> tuple:
     coarse = pieces.runs_of_cases(coarser, cycles, window, say, LEAST, steady=False)
     chosen = tuple({"elements": int(one.fine.contact.reduction.stiffness.size),
                     "interface_nodes": int(one.patch.x.size)} for one in held)
-    runs = replace(pieces.with_coarser_errors(fine, [coarse], pieces_error), chosen=chosen, again=False)
+    runs = replace(pieces.with_coarser_errors(fine, [coarse], coarser_errors), chosen=chosen, again=False)
     found, alone, _ = batch_answers(models, runs, {"engine": PIECES.name, "window_cycles": window})
     alone = alone | runs.stuck | coarse.lost
     for case in np.flatnonzero(~alone).tolist():

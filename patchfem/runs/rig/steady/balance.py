@@ -19,7 +19,7 @@ from ....dynamics.harmonic.point import point as periodic_point
 from ....dynamics.harmonic.stability import with_stability
 from ....dynamics.integrated import Integrated, Run
 from ....dynamics.march.march import march
-from ....response.errors import finer_error
+from ....response.errors import finer_errors
 from ....response.measures import acceleration_peak
 from ....response.spectrum import odd_harmonics, wave_measures
 from ..interface import contact_model, contact_of, flank_of
@@ -138,7 +138,7 @@ class BalanceFinder:
             return out
         left = max(found.left, better.left)
         better = read(better, drive) if np.isfinite(better.error) else {}
-        return out | {name: error + abs(values[name]) * left for name, error in finer_error(values, better).items()}
+        return out | {name: error + abs(values[name]) * left for name, error in finer_errors(values, better).items()}
 
     def _left(self, drive, start=None) -> Solution | None:
         """As of `left_grooves`."""
