@@ -1,4 +1,4 @@
-"""Tagged meshes from text: Abaqus and CalculiX decks (.inp) and universal files (.unv), read line by line.
+"""Tagged meshes from Abaqus and CalculiX decks (.inp), read line by line.
 
 Names are compared without case, as Abaqus writes them in capitals.
 """
@@ -11,13 +11,8 @@ from ..core import PatchfemError
 from .anymesh import CELLS, EDGES, Tagged
 
 INP = ("for the cells, names of *ELSET; for `interface` and `far`, names of *NSET or of *ELSET made of line elements")
-UNV = ("for the cells, names of groups of elements; for `interface` and `far`, names of groups of nodes or of line "
-       "elements")
 FLAT = re.compile(r"(?:CPE|CPS|CPEG|CAX|S|STRI|M3D|R3D|SFM3D)([34])(?:R|H|I|RH|IH|RS|RSW|R5)?$")
 LINE = re.compile(r"(?:T2D2|T3D2|B21|B31|R2D2|RAX2|SAX1)H?$")
-UNV_SIZES = {11: 2, 21: 2, 41: 3, 51: 3, 61: 3, 81: 3, 91: 3, 44: 4, 54: 4, 64: 4, 84: 4, 94: 4}
-UNV_BEAMS = (11, 21, 22, 23, 24)  # these carry one more record
-UNV_GROUPS = {2429: 2, 2430: 2, 2432: 2, 2435: 4, 2452: 4, 2467: 4, 2477: 4}
 
 
 def read_inp(text: str) -> Tagged:
@@ -94,76 +89,6 @@ def _inp_members(given: dict, lines, known: dict, nodes: dict, elements: dict) -
         else:
             raise PatchfemError(f"a set names the unknown set {word}")
     return out
-
-
-def read_unv(text: str) -> Tagged:
-    """Read a universal file of a tagged mesh.
-
-    Datasets: nodes (2411, 781, 15), elements (2412, 780), groups (2467 and its kin), length unit (164). PatchfemError
-    or ValueError for what it cannot be.
-    """
-    nodes, elements, sets, unit = {}, {}, ({}, {}), 1.0
-    for number, lines in _unv_datasets(text):
-        if number in (2411, 781):
-            for head, place in zip(lines[::2], lines[1::2], strict=True):
-                nodes[int(head.split()[0])] = [float(v.replace("D", "E").replace("d", "e")) for v in place.split()]
-        elif number == 15:
-            for line in lines:
-                nodes[int(line.split()[0])] = [float(v.replace("D", "E")) for v in line.split()[4:7]]
-        elif number in (2412, 780):
-            elements |= _unv_elements(lines)
-        elif number in UNV_GROUPS:
-            _unv_groups(lines, UNV_GROUPS[number], *sets)
-        elif number == 164:
-            unit = float(lines[1].split()[0].replace("D", "E"))
-            if not unit > 0:
-                raise PatchfemError("the length unit of dataset 164 is not positive")
-    nodes = {key: [v / unit for v in place] for key, place in nodes.items()}
-    return _tagged(nodes, elements, *sets, UNV)
-
-
-def _unv_datasets(text: str):
-    lines = iter(text.splitlines())
-    for line in lines:
-        if line.strip() != "-1":
-            continue
-        number, held = next(lines, "").strip(), []
-        for inner in lines:
-            if inner.strip() == "-1":
-                break
-            held.append(inner)
-        else:
-            raise PatchfemError(f"dataset {number[:20]} has no end mark")
-        if number.isdigit():
-            yield int(number), held
-
-
-def _unv_elements(lines) -> dict:
-    out, lines = {}, iter(lines)
-    for head in lines:
-        words = [int(word) for word in head.split()]
-        size = UNV_SIZES.get(words[1], 0)
-        if size != words[-1]:
-            raise PatchfemError(f"elements of kind {words[1]} with {words[-1]} nodes; only linear triangles, quads and "
-                                "line elements can be used")
-        if words[1] in UNV_BEAMS:
-            next(lines)
-        out[words[0]] = [int(word) for word in next(lines).split()]
-        if len(out[words[0]]) != size:
-            raise PatchfemError(f"element {words[0]} has {len(out[words[0]])} nodes, but elements of its kind have "
-                                f"{size}")
-    return out
-
-
-def _unv_groups(lines, width: int, node_sets: dict, element_sets: dict) -> None:
-    lines = iter(lines)
-    for head in lines:
-        count, name = int(head.split()[-1]), next(lines).strip()
-        values = []
-        while len(values) < width * count:
-            values += [int(word) for word in next(lines).split()]
-        for kind, where in ((7, node_sets), (8, element_sets)):
-            _gather(where, name, [tag for code, tag in zip(values[::width], values[1::width]) if code == kind])
 
 
 def _gather(sets: dict, name: str | None, members: list) -> None:

@@ -6,6 +6,7 @@ upper_far, lower_far. The lower piece lies at y <= 0, the upper one at y >= 0, a
 
 import re
 from contextlib import redirect_stderr, redirect_stdout
+from importlib.util import find_spec
 from io import StringIO
 from pathlib import Path
 
@@ -14,7 +15,7 @@ import numpy as np
 from ..core import PatchfemError
 from ..disk.whole import whole
 from .anymesh import PairMesh, Tagged, pieces
-from .decks import read_inp, read_unv
+from .decks import read_inp
 from .pairs import blocks
 from .recognise import grids
 
@@ -65,7 +66,7 @@ def read_bodies(path: Path) -> tuple:
 
 
 def read_pieces(path: Path) -> PairMesh:
-    """Read both pieces of any tagged mesh of triangles and quads: .msh, .vtu, .inp or .unv.
+    """Read both pieces of any tagged mesh of triangles and quads: .msh, .vtu, .inp or .med.
 
     The interfaces need the same ends; their nodes between may differ (`PairMesh.matching`). PatchfemError names what is
     missing or wrong, as `mesh.anymesh.pieces` lists it.
@@ -75,26 +76,31 @@ def read_pieces(path: Path) -> PairMesh:
         raise PatchfemError(f"{path}: no such mesh file")
     if path.stat().st_size > LARGEST:
         raise PatchfemError(f"{path}: more than {LARGEST >> 20} MiB; a mesh of two plane pieces is smaller")
-    if path.suffix in (".inp", ".unv"):
+    if path.suffix == ".inp":
         try:
-            raw = (read_inp if path.suffix == ".inp" else read_unv)(path.read_text("utf-8", "replace"))
+            raw = read_inp(path.read_text("utf-8", "replace"))
         except PatchfemError as error:
             raise PatchfemError(f"{path}: {error}") from None
         except (ValueError, IndexError, StopIteration, OverflowError) as error:
             fault = f"{type(error).__name__}: {error}"
             raise PatchfemError(f"{path}: not a readable {path.suffix} file ({fault})") from None
-    elif path.suffix in (".msh", ".vtu"):
+    elif path.suffix in (".msh", ".vtu", ".med"):
         raw = _tagged(path, _load(path))
+    elif path.suffix == ".unv":
+        raise PatchfemError(f"{path}: the reader of .unv meshes was removed in patchfem 1.0; use .med or .msh")
     else:
-        raise PatchfemError(f"{path}: a mesh can be read only from .msh, .vtu, .inp or .unv")
+        raise PatchfemError(f"{path}: a mesh can be read only from .msh, .vtu, .inp or .med")
     return pieces(raw, path)
 
 
 def _tagged(path: Path, mesh) -> Tagged:
-    """Triangles, quads and edge nodes of a meshio mesh by tag: physical names in .msh, the array `tag` in .vtu."""
+    """Triangles, quads and edge nodes of a meshio mesh by tag: physical names in .msh, groups in .med, the array `tag` in .vtu."""
     if path.suffix == ".msh":
         names = {(int(v[1]), int(v[0])): name for name, v in mesh.field_data.items() if len(v) == 2}
         codes, how = mesh.cell_data.get("gmsh:physical"), "names of physical groups"
+    elif path.suffix == ".med":
+        names = {(of, family): _known_group(groups) for family, groups in mesh.cell_tags.items() for of in (1, 2)}
+        codes, how = mesh.cell_data.get("cell_tags"), "names of groups of faces and of edges"
     else:
         names = {(2, v): k for k, v in CELL_TAGS.items()} | {(1, v): k for k, v in EDGE_TAGS.items()}
         codes = mesh.cell_data.get("tag", mesh.cell_data.get("gmsh:physical"))
@@ -119,12 +125,20 @@ def _tagged(path: Path, mesh) -> Tagged:
     return Tagged(np.asarray(mesh.points, float), *(part.astype(np.int64) for part in parts), label, nodes, how)
 
 
+def _known_group(groups: list) -> str:
+    """Return the group of a family that is a tag of a piece, else its first group."""
+    names = [name.strip().lower() for name in groups]
+    return next((name for name in names if name in CELL_TAGS | EDGE_TAGS), names[0])
+
+
 def _load(path: Path):
     """Read a file by meshio; what meshio prints is kept from stdout, and its sys.exit is caught."""
     import meshio
 
     if path.suffix == ".msh":
         _plausible(path)
+    if path.suffix == ".med" and find_spec("h5py") is None:
+        raise PatchfemError(f"{path}: .med files need h5py; install it by: pip install 'patchfem[med]'")
     try:
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
             return meshio.read(path)

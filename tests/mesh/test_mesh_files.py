@@ -131,7 +131,7 @@ def test_refuses_a_missing_file_and_a_foreign_ending(tmp_path):
     with pytest.raises(PatchfemError, match="no such mesh file"):
         read_grid(tmp_path / "nowhere.msh")
     (tmp_path / "pair.stl").write_text("solid")
-    with pytest.raises(PatchfemError, match=r"from \.msh, \.vtu, \.inp or \.unv"):
+    with pytest.raises(PatchfemError, match=r"from \.msh, \.vtu, \.inp or \.med"):
         read_bodies(tmp_path / "pair.stl")
     with pytest.raises(PatchfemError, match=r"\.msh or \.vtu"):
         write_mesh(SMALL, tmp_path / "pair.stl")

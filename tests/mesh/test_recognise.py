@@ -47,7 +47,7 @@ def test_exact_a_far_face_held_in_part_is_no_grid_in_any_format(form, tmp_path):
     assert held_share(high) == pytest.approx((2e-3, 2e-3), rel=1e-12)
 
 
-@pytest.mark.parametrize("form", ["gmsh 2.2 binary", "vtu", "inp lines", "unv"])
+@pytest.mark.parametrize("form", ["gmsh 2.2 binary", "vtu", "inp lines", "med"])
 def test_refuses_twin_nodes_and_tags_of_the_wrong_piece_or_inside_it_in_every_format(form, tmp_path):
     m = drawn("quads")
     m.edges[far_edges(m)[3]] = m.edges[far_edges(m, "upper")[3]]

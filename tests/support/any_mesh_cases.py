@@ -142,34 +142,22 @@ def write_inp(m, path, lines=True, capitals=True):
     path.write_text("\n".join([*text, "*STEP", "*STATIC", "*END STEP", ""]))
 
 
-def write_unv(m, path, unit=1.0):
-    """A universal file in metres, or in 1/unit of a metre where dataset 164 says so."""
-    text = ["    -1", "   164", f"         1  SI  {2:10d}", f"  {unit:.16E}  1.0  1.0".replace("E", "D"), "  2.73D+2"]
-    text += ["    -1", "    -1", "  2411"]
-    for k, (x, y) in enumerate(m.points.tolist()):
-        text += [f"{k + 1:10d}{1:10d}{1:10d}{11:10d}", f"  {x * unit:.16E}  {y * unit:.16E}  0.0".replace("E", "D")]
-    text += ["    -1", "    -1", "  2412"]
-    number, groups = 0, {}
-    for kind, cells, tags in blocks(m):
-        code = dict(line=11, triangle=41, quad=44)[kind]
-        for cell, tag in zip(cells, tags):
-            number += 1
-            groups.setdefault(NAMES[int(tag)], []).append(number)
-            text.append("".join(f"{v:10d}" for v in (number, code, 2, 1, 7, len(cell))))
-            text += ["         0         1         1"] * (kind == "line")
-            text.append("".join(f"{n + 1:10d}" for n in cell))
-    text += ["    -1"] * 2 + ["  2467"]
-    for k, (name, members) in enumerate(groups.items()):
-        text += ["".join(f"{v:10d}" for v in (k + 1, 0, 0, 0, 0, 0, 0, len(members))), name]
-        text += ["".join(f"{8:10d}{n:10d}{0:10d}{0:10d}" for n in members[j:j + 2]) for j in range(0, len(members), 2)]
-    path.write_text("\n".join([*text, "    -1", ""]))
+def write_med(m, path):
+    """A MED file, whose families of cells have one group each."""
+    import meshio
+
+    found = blocks(m)
+    names = sorted({int(tag) for _, _, tags in found for tag in tags})
+    mesh = meshio.Mesh(m.points, [(kind, cells) for kind, cells, _ in found])
+    mesh.cell_data = {"cell_tags": [-np.asarray(tags, int) for _, _, tags in found]}
+    mesh.cell_tags = {-tag: [NAMES[tag]] for tag in names}
+    meshio.write(path, mesh)
 
 
 FORMATS = {
     "gmsh 2.2 binary": (".msh", write_msh22), "gmsh 2.2 text": (".msh", lambda m, p: write_msh22(m, p, False)),
     "gmsh 4.1": (".msh", write_msh41), "vtu": (".vtu", write_vtu), "inp lines": (".inp", write_inp),
-    "inp nodes": (".inp", lambda m, p: write_inp(m, p, False, False)), "unv": (".unv", write_unv),
-    "unv in mm": (".unv", lambda m, p: write_unv(m, p, 1e3)),
+    "inp nodes": (".inp", lambda m, p: write_inp(m, p, False, False)), "med": (".med", write_med),
 }
 
 

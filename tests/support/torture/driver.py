@@ -41,7 +41,6 @@ CAMPAIGNS = {
     "msh-binary": Campaign(1000, "meshes.binary_msh", "meshes of Gmsh in binary"),
     "vtu": Campaign(1000, "meshes.vtu", "meshes of VTK"),
     "inp": Campaign(1000, "meshes.inp", "decks of Abaqus and CalculiX"),
-    "unv": Campaign(1000, "meshes.unv", "meshes as universal files"),
     "energy": Campaign(1000, "physics.energy", "books of energy of laws and engines"),
     "hard": Campaign(60, "hard.physics", "hard physics with known answers"),
     "wear": Campaign(200, "hard.wear", "worn volumes"),

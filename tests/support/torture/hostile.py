@@ -61,7 +61,7 @@ def read_by(trial: Trial, name: str) -> list:
         return [trial.draw("check", "run"), "rig.toml"]
     if ending in (".uff", ".csv") and trial.chance(0.5):
         return ["import", name, "-o", "out.csv"]
-    if ending in (".msh", ".vtu", ".inp", ".unv"):
+    if ending in (".msh", ".vtu", ".inp", ".med"):
         Path("mesh.toml").write_text(text_of({"contact": {
             "length": "2 mm", "width": "2 mm", "height": "1 mm", "load": "5 N", "substrate": "steel", "mesh": name}}))
         return [trial.draw("check", "run"), "mesh.toml"]
@@ -116,7 +116,7 @@ def waits(trial: Trial) -> list:
 
 def endless(trial: Trial) -> list:
     """Files with one line, one number or one name of megabytes, and files with holes of gigabytes."""
-    name = "x" + trial.draw(".toml", ".csv", ".inp", ".unv", ".msh", ".uff", ".csv", ".npy", ".mat", ".sdf")
+    name = "x" + trial.draw(".toml", ".csv", ".inp", ".med", ".msh", ".uff", ".csv", ".npy", ".mat", ".sdf")
     how = trial.draw("line", "number", "quote", "hole", "commas", "lines")
     if how == "hole":
         with open(name, "wb") as file:

@@ -43,11 +43,6 @@ def inp(trial: Trial) -> None:
     written(trial, "m.inp", _inp)
 
 
-def unv(trial: Trial) -> None:
-    """Universal files."""
-    written(trial, "m.unv", _unv)
-
-
 def written(trial: Trial, name: str, form) -> None:
     """A mesh with a wound of its meaning, or of its bytes."""
     mesh = pair_mesh(GRID)
@@ -131,21 +126,3 @@ def _inp(mesh: dict) -> str:
     for name, members in sets.items():
         lines += [f"*ELSET, ELSET={name}", *(", ".join(map(str, members[k:k + 8])) for k in range(0, len(members), 8))]
     return "\n".join([*lines, ""])
-
-
-def _unv(mesh: dict) -> str:
-    lines, sets = ["    -1", "  2411"], {}
-    for k, (x, y) in enumerate(mesh["points"].tolist(), 1):
-        lines += [f"{k:10d}{1:10d}{1:10d}{11:10d}", f"  {x:.16E}  {y:.16E}  0.0".replace("E", "D")]
-    lines += ["    -1", "    -1", "  2412"]
-    for number, tag, cell in _cells(mesh):
-        lines.append(f"{number:10d}{44 if len(cell) == 4 else 11:10d}{1:10d}{1:10d}{7:10d}{len(cell):10d}")
-        lines += ["         0         0         0"] if len(cell) == 2 else []
-        lines.append("".join(f"{node:10d}" for node in cell))
-        sets.setdefault(NAMES.get(tag, "other"), []).append(number)
-    lines += ["    -1", "    -1", "  2467"]
-    for k, (name, members) in enumerate(sets.items(), 1):
-        lines += [f"{k:10d}" + f"{0:10d}" * 6 + f"{len(members):10d}", name]
-        pairs = [f"{8:10d}{one:10d}{0:10d}{0:10d}" for one in members]
-        lines += ["".join(pairs[k:k + 2]) for k in range(0, len(pairs), 2)]
-    return "\n".join([*lines, "    -1", ""])
