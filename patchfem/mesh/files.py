@@ -94,7 +94,10 @@ def read_pieces(path: Path) -> PairMesh:
 
 
 def _tagged(path: Path, mesh) -> Tagged:
-    """Triangles, quads and edge nodes of a meshio mesh by tag: physical names in .msh, groups in .med, the array `tag` in .vtu."""
+    """Read triangles, quads and edge nodes of a meshio mesh by tag.
+
+    Tags are physical names in .msh, groups in .med, the array `tag` in .vtu.
+    """
     if path.suffix == ".msh":
         names = {(int(v[1]), int(v[0])): name for name, v in mesh.field_data.items() if len(v) == 2}
         codes, how = mesh.cell_data.get("gmsh:physical"), "names of physical groups"

@@ -25,10 +25,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
+from rubbing import periodic_amplitude, rub
 from synthetic import report_area
 
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
-from patchfem.wear.asperities import periodic_amplitude, rub
 
 HERE = Path(__file__).parent
 STEP, POINTS, UM = 3.2e-6, 320, 1e-6

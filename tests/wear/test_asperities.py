@@ -6,10 +6,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from rubbing import anisotropy, overlap_of, periodic_amplitude, rub
 from synthetic import SIGMA, report_area
 
 from patchfem.core import PatchfemError
-from patchfem.wear.asperities import anisotropy, overlap_of, periodic_amplitude, rub
 
 STEP = 3.2e-6
 UM = 1e-6

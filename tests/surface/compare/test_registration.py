@@ -6,6 +6,7 @@ The recipe was tuned on seeds 0 to 150; the seeds here are others.
 import numpy as np
 import pytest
 from pairs import UM, pair, surface
+from rubbing import rub
 from synthetic import report_area
 
 from patchfem.core import PatchfemError, frozen_array
@@ -14,7 +15,6 @@ from patchfem.surface.compare.compare import compared
 from patchfem.surface.compare.place import matched
 from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile, level
-from patchfem.wear.asperities import rub
 
 HELD_OUT = 80000
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..core import PatchfemError, frozen_array, say
+from patchfem.core import PatchfemError, frozen_array, say
 
 BITE = 1e-3  # default mean depth taken in one place of one pass, as a share of the combined root mean square height
 CLOSE = 1e-9  # by which the mean overlap may miss its target before it is scaled to it
