@@ -20,7 +20,7 @@ Read the package in this order. A module imports its own entry of the list and t
 16. `friction`    laws of friction and the sum over bonds along the path
 17. `slip`        partial slip of the pieces: elements, shear modes, their tangent
 18. `structure`   the modes of the rig and what drives it
-19. `dynamics`    the engines: exact events, march in time, harmonic balance, comparison methods
+19. `dynamics`    the engines: exact events, march in time, harmonic balance
 20. `model`       what a scene means: pieces, gap, law, slide, modes, drive, numerics
 21. `response`    measures of a run: outcome, events, levels and ringing
 22. `wear`        worn depth over many cycles

@@ -7,7 +7,7 @@ of a study (`runs.many.lumped.lanes`).
 
 A law is carried by the bench, by a rig of one interface under a constant load (it can run there), and by what its
 record names: "shear" of pieces that give way, "joints" (several interfaces, springs that bend, strips that yaw),
-"varying-load" in a rig, "harmonic" balance, "two-directions" of a bench, "comparison" methods, "exact" events,
+"varying-load" in a rig, "harmonic" balance, "two-directions" of a bench, "exact" events,
 "pieces" of it (elements that stick or slip, exact from yield to yield), "grooves" whose flanks the load
 climbs, a "plane" in which an interface of a rig slides. Traits: "set-valued" (it holds without a stretch), "bonds" (the
 sum 2.17 with its readings and orders), "averaged" (over the pressure behind a point), "timeless" (no rate of the slide
@@ -157,13 +157,13 @@ EFFECTS = {
     "normal": Effect("", "sigma_n A = N at one point", (), ("pressure",)),
     "normal.grooves": Effect("patchfem.friction.grooves", CLIMB, ("pressure",), ("traction",)),
     "friction.law=coulomb": _law("laws.coulomb", "|F| <= mu_s N stuck, F = mu_k N sgn(v) sliding (2.1)",
-                                 ("", "kinetic"), "shear joints varying-load comparison exact pieces grooves",
+                                 ("", "kinetic"), "shear joints varying-load exact pieces grooves",
                                  "set-valued timeless memoryless"),
     "friction.law=tanh": _law("laws.tanh", "F = mu N tanh(v/v_0) (2.4)", ("reference_speed", ""),
-                              "joints varying-load harmonic comparison grooves", "memoryless creeps"),
+                              "joints varying-load harmonic grooves", "memoryless creeps"),
     "friction.law=elastic-plastic": _law("laws.elastic_plastic", "F' = k v, |F| <= mu N (3.12, corrected for "
                                          "reversals), k = stiffness or mu N/bond_length", ("bond_length|stiffness", ""),
-                                         "shear joints varying-load harmonic comparison pieces grooves plane",
+                                         "shear joints varying-load harmonic pieces grooves plane",
                                          "timeless"),
     "friction.law=nonlocal": _law("bonds.quadrature", "tau = -mu_s int phi(R/eps) sigma_n u/|u| dL1/eps_0 (2.17)",
                                   ("bond_length", "kinetic reading order rest_growth slip_growth rest_speed "
@@ -228,13 +228,6 @@ EFFECTS = {
     "accuracy.method=march": Effect("patchfem.dynamics.march.loop_kernels",
                                     "exact propagator of the modes; the force is averaged over the path of each step "
                                     "and found by Newton's method"),
-    "accuracy.method=duhamel": Effect("patchfem.dynamics.comparison.duhamel",
-                                      "Duhamel's integral with forces that are linear within a step, fixed-point "
-                                      "iteration (3.10)"),
-    "accuracy.method=newmark": Effect("patchfem.dynamics.comparison.newmark",
-                                      "Newmark's average acceleration; below a given sliding speed the interface "
-                                      "sticks"),
-    "accuracy.method=euler": Effect("patchfem.dynamics.comparison.euler", "explicit Euler"),
     "accuracy.method=harmonic": Effect("patchfem.dynamics.harmonic.harmonic",
                                        "x = Re sum X_k exp(i k w t); with law `coulomb`: the "
                                        "exact motion from event to event, found so that it repeats after one period"),

@@ -73,12 +73,10 @@ def test_exact_a_rubbing_point_needs_no_other_rig():
     """One mode, one sine, one point: no masses, files, springs, heave, other drives, other engines."""
     modules = run_of(POINT + COULOMB + STRUCTURE)
     absent(modules, "structure.matrices", "structure.masses", "structure.arrays", "structure.universal",
-           "structure.bonded", "structure.identify", "structure.drives", "dynamics.comparison.duhamel",
-           "dynamics.comparison.newmark",
-           "dynamics.comparison.euler", "dynamics.comparison.comparison", "dynamics.harmonic.harmonic",
+           "structure.bonded", "structure.identify", "structure.drives", "dynamics.harmonic.harmonic",
            "dynamics.events.stick_steady",
            "dynamics.harmonic.continuation", "dynamics.propagator", "dynamics.march.joints",
-           "dynamics.march.varying_load", "runs.rig.comparison",
+           "dynamics.march.varying_load",
            "runs.rig.steady", "dynamics.harmonic.balance", "contact.contact_sets", "inputs.signals")
     assert "pyuff" not in modules
 
@@ -87,13 +85,12 @@ def test_exact_a_rubbing_point_needs_no_other_rig():
 @pytest.mark.parametrize("lines, module", [
     ('[structure.stiffening]\ncubic = "1e12 N/m^3"\n', "dynamics.march.joints"),
     ('[structure.bonded]\nstiffness = "1e6 N/m"\n', "structure.bonded"),
-    ('[accuracy]\nmethod = "newmark"\nstick_speed = "10 um/s"\n', "dynamics.comparison.newmark"),
     ('[accuracy]\nmethod = "harmonic"\n', "dynamics.events.stick_steady"),
-], ids=["stiffening", "bonded", "newmark", "harmonic"])
+], ids=["stiffening", "bonded", "harmonic"])
 def test_exact_a_rig_brings_what_it_names(lines, module):
     modules = run_of(POINT + COULOMB + STRUCTURE + lines)
     assert f"patchfem.{module}" in modules
-    others = {"dynamics.march.joints", "structure.bonded", "dynamics.comparison.newmark",
+    others = {"dynamics.march.joints", "structure.bonded",
               "dynamics.events.stick_steady"} - {module}
     assert not {f"patchfem.{name}" for name in others} & modules
 

@@ -55,9 +55,6 @@ SOURCES = (
         "cameron1989", "Cameron, T. M. and Griffin, J. H.", "An alternating frequency/time domain method for "
         "calculating the steady-state response of nonlinear dynamic systems", APPLIED, "56:149--154", 1989,
         "10.1115/1.3176036")),
-    (("accuracy.method=newmark",), _article(
-        "newmark1959", "Newmark, N. M.", "A method of computation for structural dynamics",
-        "Journal of the Engineering Mechanics Division", "85(3):67--94", 1959)),
     (("wear",), _article(
         "archard1953", "Archard, J. F.", "Contact and rubbing of flat surfaces", "Journal of Applied Physics",
         "24:981--988", 1953, "10.1063/1.1721448")),

@@ -20,10 +20,9 @@ and the entries before it:
 15. `lanes`             many cases of one mode under a sine side by side; answers of `events` and `smooth` to its bars
 16. `march`           any law in time, under the path-mean forces of each step
 17. `smooth`          smooth laws by a method of high order from reversal to reversal
-18. `comparison`      the report's own methods: Duhamel, Newmark, Euler
-19. `harmonic`        steady motions by harmonic balance, branches and stability
-20. `limit_cycles` motions that a negative damping keeps up beside friction
-21. `grooves`         a load that climbs the flanks of matched grooves
+18. `harmonic`        steady motions by harmonic balance, branches and stability
+19. `limit_cycles` motions that a negative damping keeps up beside friction
+20. `grooves`         a load that climbs the flanks of matched grooves
 
 The friction force of a patch over a step comes from `contacts/`, called by the loop of `march/`: for rigid pieces
 `element_kernels.solve` (one point stands for all in the law, `friction.laws.stretch_kernels.mean`), for elastic ones

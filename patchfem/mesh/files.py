@@ -6,7 +6,6 @@ upper_far, lower_far. The lower piece lies at y <= 0, the upper one at y >= 0, a
 
 import re
 from contextlib import redirect_stderr, redirect_stdout
-from importlib.util import find_spec
 from io import StringIO
 from pathlib import Path
 
@@ -140,8 +139,6 @@ def _load(path: Path):
 
     if path.suffix == ".msh":
         _plausible(path)
-    if path.suffix == ".med" and find_spec("h5py") is None:
-        raise PatchfemError(f"{path}: .med files need h5py; install it by: pip install 'patchfem[med]'")
     try:
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
             return meshio.read(path)

@@ -25,7 +25,6 @@ CYCLE, CYCLE_BY = 85.0, {"smooth": 140.0, "march": 50.0}
 # per number of a turn kept from before the last cycles, four turns a cycle as long as they are fewer than all that are
 # kept; of 1e5 to 1e6 cycles, 0.8 to 1.5 of what they took
 TURN, TURN_BY, TURNS = 6.0, {"smooth": 16.0, "march": 18.0}, 4.0
-GRID = 24.0  # per number of a step of the comparison methods, which keep all of them
 SLIDE = 250.0  # per sample of a bench
 ROW = 400.0  # per row of a recorded drive
 MAPPED, CODE = 60e6, 150e6  # of address space beside what is used: packages, and the compiler's library
@@ -51,7 +50,7 @@ LINEAR = EngineCode(58e6, 0.0)  # nothing of it is compiled
 FOLLOWED = EngineCode(58e6, 0.15, 2.0)  # a slide, or a method of few kernels
 SMOOTH, PIECES, BALANCE = EngineCode(74e6, 0.15, 9.0), EngineCode(82e6, 0.15, 12.0), EngineCode(1e8, 0.3, 3.0)
 CODES = {"static": NONE, "bench, closed form": NONE, "bench, law step by step": NONE, "bench, two directions": NONE,
-         **dict.fromkeys(("bench, parallel elements", "bench, recursion", "duhamel", "newmark", "euler"), FOLLOWED),
+         **dict.fromkeys(("bench, parallel elements", "bench, recursion"), FOLLOWED),
          "smooth": SMOOTH, "exact": PIECES, "piecewise": PIECES, "harmonic": BALANCE}
 
 
@@ -158,9 +157,7 @@ def _of_rig(model: Model, engine: str, steps: int, numerics) -> list:
     rig, n = model.rig, len(model.rig.frequencies)
     width = 2.0 * n + 12 + 6 * len(rig.interfaces)
     parts = [Need(FULL * n**2, f"{n} modes", "structure")]
-    if engines.ENGINES[engine].keeps:
-        parts.append(Need(GRID * width * steps / 1.75, f"{steps} steps, all of them kept", "drive.cycles"))
-    elif engines.ENGINES[engine].steady:
+    if engines.ENGINES[engine].steady:
         if model.accuracy.harmonics:
             size = 2.0 * model.accuracy.harmonics * max(1, len(rig.interfaces))
             parts.append(Need(WAVE * size**2, f"{model.accuracy.harmonics} harmonics", "accuracy.harmonics"))

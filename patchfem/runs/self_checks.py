@@ -212,8 +212,7 @@ class Evidence:
         ):
             return None
         engine = engines.ENGINES.get(self.result.extra.get("engine"))
-        is_comparison = engine is None or engine.closes == np.inf
-        if is_comparison or rig.strips_slide_apart or not modes.slide.any():
+        if engine is None or rig.strips_slide_apart or not modes.slide.any():
             return None
         if self.result.outcome in (Outcome.EXCEEDS_TRAVEL, Outcome.GROWS, Outcome.NOT_CONVERGED):
             return None

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from ..faults import PatchfemError
 from . import meant
-from .keys import quantities
+from .keys import quantities, removed
 from .keys.contact import Material
 from .keys.tables import Tables
 from .keys.types import Table, choices, keys, kind_of, model_of, parts
@@ -340,6 +340,9 @@ def _nested(draft: Draft, model: type[Table], name: str, inner: type[Table], val
 
 
 def _unknown(draft: Draft, model: type[Table], raw: dict[str, Any], key: str, path: str) -> None:
+    if path in removed.KEYS:
+        draft.say(path, removed.KEYS[path])
+        return
     value = raw[key]
     tables = [name for name, at in keys(model).items() if model_of(model, at) and not is_value(model, at)]
     is_table = isinstance(value, dict) or (isinstance(value, list) and value and isinstance(value[0], dict))

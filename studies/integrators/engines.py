@@ -11,11 +11,12 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from engine_problems import ALL, KIND, POINT, POINTS, Problem, exact, march
+from report_methods import duhamel, euler, newmark
+from report_methods.point_laws import Coulomb, Smooth
 from switched import PROBLEMS, follow
 
-from patchfem.dynamics.comparison import duhamel, euler, newmark
-from patchfem.dynamics.comparison.point_laws import Coulomb, Smooth
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.friction.laws.tanh import Rate
 

@@ -7,11 +7,12 @@ from pathlib import Path
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from problems import SDOF, SDOF_DRIVE, SDOF_LIMIT, TWO, TWO_LIMIT, exact
+from report_methods import duhamel, newmark
+from report_methods.point_laws import Coulomb, Smooth
 
 from patchfem.core import Segment
-from patchfem.dynamics.comparison import duhamel, newmark
-from patchfem.dynamics.comparison.point_laws import Coulomb, Smooth
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.structure.drives import Piecewise
 

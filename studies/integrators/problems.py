@@ -2,12 +2,9 @@
 
 import numpy as np
 
-from patchfem.compiled import load
 from patchfem.core import BaseSine, ModalBasis, frozen_array
 from patchfem.dynamics.events.elements import coulomb
 from patchfem.dynamics.events.histories import at_times
-
-load("dynamics.comparison.comparison_kernels")  # compiled loops come from the hashed cache
 
 
 def basis(omega, zeta, slide, base) -> ModalBasis:

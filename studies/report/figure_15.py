@@ -26,13 +26,13 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "integrators"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
 from problems import PLAIN
+from report_methods import duhamel
+from report_methods.point_laws import Coulomb
 from told import told
 
 import patchfem as pf
 from patchfem.closed_forms.dynamics import decay
 from patchfem.core import Segment, Start
-from patchfem.dynamics.comparison import duhamel
-from patchfem.dynamics.comparison.point_laws import Coulomb
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.structure.drives import Piecewise
 

@@ -29,11 +29,11 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "integrators"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
 from problems import SDOF, SDOF_DRIVE, sampled
+from report_methods import newmark
+from report_methods.point_laws import Coulomb
 from told import told
 
 import patchfem as pf
-from patchfem.dynamics.comparison import newmark
-from patchfem.dynamics.comparison.point_laws import Coulomb
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent

@@ -155,7 +155,7 @@ EXAMPLES = {
                                    '"500 Hz"\nduration = "4 s"\n'),
     "structure.stiffening": (SOFT, '[structure.stiffening]\ncubic = "1e15 N/m^3"\n'),
     "accuracy.method=exact": method("exact", RIG),
-    **{f"accuracy.method={name}": method(name) for name in ("march", "duhamel", "newmark", "euler", "harmonic")},
+    **{f"accuracy.method={name}": method(name) for name in ("march", "harmonic")},
     "wear": (PATCH + '[contact.tilt]\nangle = "0.05 mrad"\n' + LAW + SLIDE.replace("2 um", "15 um"),
              '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 100000\n'),
     "wear.friction": (PATCH + LAW + SLIDE.replace("2 um", "15 um") + '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = '

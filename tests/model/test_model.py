@@ -35,7 +35,7 @@ KINDS = {"a patch": (PATCH, "patch"), "a small patch": (SMALL_PATCH, "patch"), "
 FEW = ["drive.cycles=6", "accuracy.steps_per_cycle=100", "contact.element_size=0.5 mm"]
 RUNS = {"patch": (SMALL_PATCH, []), "bench": (BENCH, ["accuracy.steps_per_cycle=100"]), "march": (RIG, FEW),
         "exact": (POINT + COULOMB + SHORT, []), "harmonic": (POINT + COULOMB + SHORT, ["accuracy.method=harmonic"]),
-        "comparison": (POINT + COULOMB + SHORT, ["accuracy.method=newmark"]), "linear": (LINEAR, ["drive.cycles=6"])}
+        "linear": (LINEAR, ["drive.cycles=6"])}
 
 
 def seen(result) -> tuple:
@@ -155,7 +155,7 @@ def test_exact_an_exchanged_part_is_the_scene_with_that_set(text, sets, change):
     assert seen(ours) == seen(want) != seen(run(before))
 
 
-@pytest.mark.parametrize("method", ["exact", "march", "harmonic", "duhamel", "newmark", "euler"])
+@pytest.mark.parametrize("method", ["exact", "march", "harmonic"])
 def test_exact_another_load_of_a_point_is_the_scene_with_that_set(method):
     sets = [f"accuracy.method={method}", *(["accuracy.steps_per_cycle=100"] if method != "exact" else [])]
     text = POINT + COULOMB + SHORT

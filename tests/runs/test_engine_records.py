@@ -15,7 +15,7 @@ from patchfem.scene.rules.methods import BESIDE, TAKES, Motion, lacking
 HOOKS = ("solve", "cost", "chosen", "refuse", "words", "notes")
 PACKAGE = Path(patchfem.__file__).parent
 LEVELS = WAVEFORMS["levels"]
-OWN = ("runs/rig/comparison.py", "runs/bench", "friction/bonds", "scene")  # own methods, sums, tables
+OWN = ("runs/bench", "friction/bonds", "scene")  # own methods, sums, tables
 
 
 def asks_by_name(tree) -> list:
@@ -71,7 +71,7 @@ def test_exact_the_march_takes_all_that_others_lack():
     for m in motions():
         assert lacking("march", m) == ""
         if m.varies or m.spring:
-            assert all([*reasons(m), lacking("smooth", m), lacking("duhamel", m)])
+            assert all([*reasons(m), lacking("smooth", m)])
 
 
 def test_exact_what_has_no_solution_between_events_is_named():

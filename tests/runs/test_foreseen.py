@@ -34,7 +34,6 @@ def planned(text, *sets):
     (PATCH, ["contact.element_size=0.5 um"], "make contact.element_size larger"),
     (RIG, [MARCH, "accuracy.steps_per_cycle=10000000"], "lower accuracy.steps_per_cycle"),
     (RIG, ["accuracy.method=harmonic", "accuracy.harmonics=10000"], "lower accuracy.harmonics"),
-    (RIG, ["accuracy.method=newmark", "drive.cycles=1e5"], "lower drive.cycles"),
     (RIG, [MARCH, "drive.cycles=3e7"], "lower drive.cycles"),
     (POINT + COULOMB + STRUCTURE, ["drive.cycles=2e7"], "lower drive.cycles"),
     (BENCH, ["slide.cycles=15000", "slide.kind=sine", "slide.frequency=1 Hz", "accuracy.steps_per_cycle=1000"],

@@ -293,7 +293,6 @@ def test_exact_the_plan_prints_stiffness_and_capacity():
     (BENCH, ["friction.static=2"], "normal.grooves.amplitude", "on which the pieces lock with static = 2"),
     (BENCH, ["friction.static=2"], "normal.grooves.amplitude", "= 6.3662e-06 m is needed"),
     (RIG, ["accuracy.method=exact"], "accuracy.method", "no exact solution exists with [normal.grooves]"),
-    (RIG, ["accuracy.method=newmark"], "accuracy.method", "with [normal.grooves]"),
     (RIG, ["friction.law=convolution", "friction.bond_length=1 um"], "friction.law",
      "with [normal.grooves] is not supported yet; use law 'coulomb'"),
     (RIG, ["friction.law=nonlocal", "friction.bond_length=1 um", "friction.order=2"], "friction.order",

@@ -315,7 +315,6 @@ def test_a_mesh_of_few_elements_leaves_the_errors_of_the_motion_open():
      "[structure.interface.contact.shear] is not supported yet; leave out the key kinetic"),
     (LAW, LAW.replace("0.3", "0.0"), "leave out [structure.interface.contact.shear]"),
     ("[drive]", '[wear]\ncoefficient = "1e-14 m^2/N"\ncycles = 1000\n[drive]', "wear: not supported yet"),
-    ("cycles = 40\n", 'cycles = 40\n[accuracy]\nmethod = "newmark"\n', "use 'march'"),
     ("[drive]", '[structure.interface.contact.profile]\nfile = "none.csv"\n[drive]',
      "structure.interface[2].contact.profile.file: there is no file"),
 ])

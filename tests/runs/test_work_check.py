@@ -40,7 +40,7 @@ def test_order_of_the_work_check_of_a_march_is_two(law):
     assert fine < 1e-3 and np.log(coarse / fine) / np.log(steps[1] / steps[0]) > 1.7
 
 
-@pytest.mark.parametrize("method, within", [("exact", 1e-12), ("march", 3e-4), ("newmark", 2e-3), ("harmonic", 1e-12)])
+@pytest.mark.parametrize("method, within", [("exact", 1e-12), ("march", 3e-4), ("harmonic", 1e-12)])
 def test_exact_coulomb_closes_both_books_in_every_engine(method, within):
     """The samples of events hold both sides of a jump, and between them the force of a slip is constant."""
     value, found = checked(POINT + 'law = "coulomb"\n' + RIG, f"accuracy.method={method}")

@@ -34,7 +34,6 @@ SCENES = {
     "bonded bench": FLAT + "[contact.shear]\n" + NONLOCAL + BRIEF,
     "exact rig": POINT + COULOMB + SHAKEN,
     "shared rig": FLAT + "[contact.shear]\n" + PLASTIC + SHAKEN,
-    "compared rig": POINT + COULOMB + SHAKEN + '[accuracy]\nmethod = "newmark"\n',
     "masses": PAIR + FORCED.replace("cycles = 25", "cycles = 5"),
     "linear": MODE + DRIVE.replace("cycles = 30", "cycles = 6"),
 }

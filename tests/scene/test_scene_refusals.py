@@ -345,8 +345,6 @@ UNBUILT = [
            "friction.reference_speed=1 mm/s"], "friction.law"),
     (RIG, ["structure.mode.second.normal=0.1", "friction.order=0"], "friction.order"),
     (RIG, ["structure.mode.second.pitch=2 rad/m", "accuracy.method=harmonic"], "accuracy.method"),
-    (RIG, ["structure.mode.second.normal=0.1", "accuracy.method=newmark", "friction.law=elastic-plastic"],
-     "accuracy.method"),
     (RIG, ["structure.mode.axial.pitch=1 rad/m", "contact.tilt.on=lower"], "contact.tilt.on"),
     (STRUCTURE + BENCH.split("[slide]")[0], ["normal.amplitude=1 N", "normal.frequency=5 Hz",
                                              "friction.law=convolution", "friction.bond_length=1 um"], "friction.law"),

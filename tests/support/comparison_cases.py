@@ -1,11 +1,11 @@
 """Structures and plain twins for the tests of the comparison methods."""
 
 import numpy as np
+from report_methods.point_laws import Coulomb, Smooth
 from scipy.linalg import expm
 from scipy.optimize import root
 
 from patchfem.core import BaseSine, ModalBasis, Segment
-from patchfem.dynamics.comparison.point_laws import Coulomb, Smooth
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.friction.laws.tanh import Rate
 from patchfem.structure.drives import Piecewise

@@ -21,9 +21,11 @@ from ...model.rig import BEYOND
 from ...model.source import placed
 from ...runs.patch import result as patch_result
 from ...runs.rig import engines, numerics, pieces
+from ...scene.rules import methods
 
 ENDINGS = (".mat", ".npz")
 DEPEND = 1e-6  # singular value of the slides over the largest, below which they depend on one another
+OF_SPEED = methods.Takes("", "no-law faces levels")  # what matrices with friction of the speed alone describe
 NLVIB = {"elements": "elasticDryFriction", "tanh": "tanhDryFriction"}
 
 
@@ -110,7 +112,8 @@ def _speeds(rig) -> bool:
 def _refuse(model: Model) -> None:
     """PatchfemError for what neither matrices nor friction elements have."""
     rig = model.rig
-    why = (engines.ENGINES["newmark"] if _speeds(rig) else engines.PIECES).lacks(model, steady=True)
+    motion = engines.motion_of(model, steady=True)
+    why = methods.first_lacking(OF_SPEED, motion) if _speeds(rig) else engines.PIECES.lacks(model, steady=True)
     if why.startswith("for law"):
         raise PatchfemError(f"{why.removeprefix('for ')} cannot be written as friction elements that stretch and slip; "
                             "use law 'elastic-plastic', 'iwan' or 'tanh', or law 'coulomb' with [contact.shear]",

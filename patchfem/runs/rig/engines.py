@@ -9,7 +9,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache, partial
 from importlib import import_module
-from math import inf
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -60,7 +59,7 @@ class Engine(NamedTuple):
     numerics, patch) and in_space(model, numerics, patch, coarse, solution) -> list of `Coarser`; least: relative error
     that stays; closes: gap of the energy balance beyond which a run has not converged, None where the engine's own
     error of the balance says it, infinite of methods that are shown with what they lose. tells: numbers of a run that
-    its summary has; resumes: it keeps its state on the way; keeps: every step of it is kept; steady: it finds
+    its summary has; resumes: it keeps its state on the way; steady: it finds
     motions that repeat.
     """
 
@@ -79,7 +78,6 @@ class Engine(NamedTuple):
     closes: float | None = CLOSED
     tells: tuple = ()
     resumes: bool = False
-    keeps: bool = False
     steady: bool = False
 
     def in_modes(self, model: Model, numerics, patch) -> list:
@@ -100,7 +98,7 @@ class Engine(NamedTuple):
     def lacks(self, model: Model, steady: bool = False) -> str:
         """The first thing in a model that the engine does not take, as words behind it; "" where it takes all. steady:
         under the sine of a curve, not the drive's own waveform."""
-        return methods.lacking(self.name, _met(model, steady))
+        return methods.lacking(self.name, motion_of(model, steady))
 
     def call(self, hook: str, *given) -> Any:
         """What the function of one of its fields gives, None where it has none."""
@@ -114,7 +112,7 @@ def inexact(model: Model, steady: bool = False) -> str:
     return reasons[-1] if all(reasons) else ""
 
 
-def _met(model: Model, steady: bool = False) -> methods.Motion:
+def motion_of(model: Model, steady: bool = False) -> methods.Motion:
     """What a model confronts an engine with."""
     rig = model.rig
     spring = "[structure.stiffening]" if rig.cubic is not None else \
@@ -299,10 +297,7 @@ MARCH = Engine("march", "march", "march run_march", _march_in_time, _march_in_sp
                notes="remarks marched_elements", tells=("steps_per_cycle", "iterations"), resumes=True)
 HARMONIC = Engine("harmonic", "harmonic", "steady.steady run_steady", _none, _steady_in_space, "plan steady_cost",
                   words="plan steady_words", notes="remarks unmoved_elements", closes=None, steady=True)
-ENGINES = {one.name: one for one in (EXACT, PIECES, SMOOTH, MARCH, HARMONIC, *(
-    Engine(name, name, "comparison run_comparison", _march_in_time, _march_in_space, "plan march_cost",
-           chosen="numerics by_named_steps", closes=inf, tells=("steps_per_cycle", "iterations"), keeps=True)
-    for name in ("duhamel", "newmark", "euler")))}
+ENGINES = {engine.name: engine for engine in (EXACT, PIECES, SMOOTH, MARCH, HARMONIC)}
 AUTOMATIC = (EXACT, PIECES, SMOOTH, MARCH)  # in the order in which they are tried
 
 

@@ -11,7 +11,6 @@ from ...structure.drive_sizes import repeat_cycles, sinusoidal, slowest
 from .costs import pairs_of, steps_per_cycle
 from .engines import engine_of
 
-COMPARED_STEPS = 400  # per cycle of a comparison method where the scene does not say
 WHOLE = 1e-6  # of a cycle by which a run may miss a whole number of them: a record of 30 periods has 30
 SETTLED = 3.0  # decay times after which a start has e^-6 of its mean square left
 LEAST_KEPT = 100  # samples of a run that has no cycles
@@ -79,12 +78,6 @@ def by_steps(model: Model, found: Numerics) -> Numerics:
     if "steps_per_cycle" in found.pinned:
         return found
     return replace(found, steps=ending(max(found.steps, unique_steps(model)), model.rig.cycles))
-
-
-def by_named_steps(model: Model, found: Numerics) -> Numerics:
-    """The choices of a comparison method, whose steps no error chooses."""
-    return replace(found, steps=model.accuracy.steps_per_cycle or COMPARED_STEPS,
-                   pinned=found.pinned | {"steps_per_cycle"})
 
 
 def by_error(model: Model, found: Numerics) -> Numerics:

@@ -4,7 +4,8 @@ from typing import Annotated, Literal
 
 from pydantic import BeforeValidator
 
-from .types import Positive, Share, Speed, Table, key, number, whole
+from . import removed
+from .types import Share, Table, key, number, whole
 
 
 def _still_summed(value: object) -> object:
@@ -18,14 +19,24 @@ def _still_summed(value: object) -> object:
 Summing = Annotated[Literal["auto", "direct", "truncated", "merged", "recursion"], BeforeValidator(_still_summed)]
 
 
+def _still_a_method(value: object) -> object:
+    """Return a method; ValueError for one that was removed."""
+    if isinstance(value, str) and value in removed.METHODS:
+        raise ValueError(removed.METHODS[value])
+    return value
+
+
+Method = Annotated[Literal["auto", "exact", "march", "harmonic"], BeforeValidator(_still_a_method)]
+
+
 class Accuracy(Table):
     """The tolerance determines the numerical settings; a key that is given fixes its own setting in place of the
     tolerance."""
 
     tolerance: key(number(gt=0, lt=1), "largest relative error that is allowed in any measure; the numerical settings "
                    "follow from this tolerance") = 1e-3
-    method: key(Literal["auto", "exact", "march", "duhamel", "newmark", "euler", "harmonic"], "method that computes "
-                "the motion; default: the program chooses a method for the scene") = "auto"
+    method: key(Method, "method that computes the motion; default: the program chooses a method for the "
+                        "scene") = "auto"
     steps_per_cycle: key(whole(4, 10_000_000) | None, "time steps per cycle; default: set by the tolerance") = None
     quadrature: key(Summing, "method that computes the sum over bonds; default: the fastest method that meets the "
                     "tolerance") = "auto"
@@ -37,8 +48,3 @@ class Accuracy(Table):
                                             "tolerance") = None
     shear_modes: key(whole(1, 10_000) | None, "number of shear modes of the pieces; default: set by the "
                                               "tolerance") = None
-    convergence: key(Literal["force", "velocity", "displacement"] | None, "method 'duhamel' stops iterating when the "
-                     "relative change of this quantity in one iteration is below `convergence_tolerance`") = None
-    convergence_tolerance: key(Positive | None, "method 'duhamel' stops iterating when the relative change of the "
-                               "quantity named in `convergence` is below this value") = None
-    stick_speed: key(Speed | None, "sliding speed below which method 'newmark' treats the interface as stuck") = None

@@ -42,14 +42,11 @@ class Acts(NamedTuple):
 
 
 KNOBS: dict[str, Acts] = {
-    "steps_per_cycle": Acts("bench rig linear", "auto bench march smooth duhamel newmark euler harmonic"),
+    "steps_per_cycle": Acts("bench rig linear", "auto bench march smooth harmonic"),
     "tail": Acts("bench rig", "auto bench march", "bonds"),
     "merge": Acts("bench rig", "auto bench march", "bonds"),
     "harmonics": Acts("rig", "harmonic"),
     "shear_modes": Acts("bench rig", "auto bench march"),
-    "convergence": Acts("rig", "duhamel"),
-    "convergence_tolerance": Acts("rig", "duhamel"),
-    "stick_speed": Acts("rig", "duhamel newmark euler", "set-valued"),
 }
 
 

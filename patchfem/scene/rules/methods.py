@@ -57,14 +57,17 @@ TAKES = {  # engine -> what it takes; the records of `runs.rig.engines` refer to
     "piecewise": Takes("pieces", "parts faces levels"),
     "smooth": Takes("", ""),
     "march": Takes("", " ".join(BESIDE)),
-    "harmonic": Takes("", "no-law parts grooves spring faces levels"),
-    **dict.fromkeys(("duhamel", "newmark", "euler"), Takes("comparison", "no-law faces levels"))}
+    "harmonic": Takes("", "no-law parts grooves spring faces levels")}
 METHODS = {"exact": ("exact", "piecewise")}  # accuracy.method -> engines of that name, where they are several
 
 
 def lacking(engine: str, m: Motion) -> str:
     """The first thing in a Motion that an engine of TAKES does not take, as words behind it; "" where it takes all."""
-    takes = TAKES[engine]
+    return first_lacking(TAKES[engine], m)
+
+
+def first_lacking(takes: Takes, m: Motion) -> str:
+    """Return the first thing in a Motion that is not taken, as words behind an engine; "" where all is taken."""
     odd = _odd(takes.law, m)
     if odd is not None:
         soft = next(give for one, give in zip(m.laws, m.give) if one is odd)
@@ -95,7 +98,7 @@ def check_method(draft: Draft, kind: str) -> None:
     if kind not in ("rig", "linear") or method in (None, "auto", "march"):
         return
     found = motion(draft.tables, kind)
-    if reason := {"exact": _exact, "harmonic": _harmonic}.get(method, _compared)(found, method):
+    if reason := {"exact": _exact, "harmonic": _harmonic}[method](found, method):
         draft.say(KEY, reason)
 
 
@@ -206,12 +209,3 @@ def _harmonic(m: Motion, method: str) -> str:
     beside = f"friction.{beside}" if beside else m.soft or m.lower
     return unbuilt(f"'harmonic' with law '{law.law}' and {beside}", "march") if has(law.law, "bonds") and beside \
         else ""
-
-
-def _compared(m: Motion, method: str) -> str:
-    """The comparison methods take one force per interface and linear modes."""
-    odd = _odd("comparison", m)
-    if odd is not None:
-        return unbuilt(f"'{method}' with {named(odd)}", f"use 'march', or {refusal('comparison', odd=odd)}")
-    why = lacking(method, m)
-    return unbuilt(f"'{method}' {why}", "march") if why else ""

@@ -120,7 +120,7 @@ def _beside(draft: Draft, tables, kind: str):
         yield "drive.kind = 'free'" if drive.kind == "free" else f"drive.waveform = '{drive.waveform}'", \
             "wear is computed from the last cycle of a steady motion: use " + \
             ("kind 'base' or 'force'" if drive.kind == "free" else "waveform 'sine'")
-    if kind == "rig" and method in ("duhamel", "newmark", "euler", "harmonic"):
+    if kind == "rig" and method == "harmonic":
         yield f"accuracy.method '{method}'", "use 'auto', 'exact' or 'march'"
     if tables.friction is not None and has(tables.friction.law, "averaged"):
         yield f"law '{tables.friction.law}'", LATER.format("use law 'coulomb'")

@@ -37,7 +37,6 @@ SIZES = {  # constant -> what it bounds and how it is written
     "dynamics.march.capacity.MOST_STRIPS": "number of entries in a list of bonds",
     "friction.bonds.parameters.LONGEST": "estimated computing time of a run with a list of bonds [s]",
     "runs.rig.costs.LONGEST": "estimated time to compute a whole motion by the event-to-event method [s]",
-    "dynamics.comparison.comparison.MOST_NUMBERS": "number of values that method duhamel, newmark or euler stores",
     "structure.drive_sizes.MOST_EVEN": "number of samples at equal spacing that are stored of a whole release, at "
                                        "least 20 per cycle; of a longer release turning points and the last cycles",
     "dynamics.resume.MOST_KEPT": "number of samples stored before the last cycles; longer records are thinned out"}
@@ -99,9 +98,7 @@ along x only; a note gives the motion of the ends of the patch across x.
 about 19 of 20 scenes. Stated errors do not include what the model neglects. A step in the gap makes the pressure peak
 infinite; any computed value of this peak would depend on the mesh.
 
-**Harmonic balance, Duhamel, Newmark, Euler.** Harmonic balance finds only periodic motions. Methods `duhamel`,
-`newmark` and `euler` serve for comparison with the report. These three methods support only linear modes and one
-friction force per interface.
+**Harmonic balance.** Harmonic balance finds only periodic motions.
 """
 
 

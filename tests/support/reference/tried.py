@@ -55,7 +55,7 @@ VALUES = {"reference_speed": '"1 mm/s"', "stiffness": '"1e7 N/m"', "chi": "-0.5"
           "stribeck_speed": '"1 mm/s"', "bond_length": '"1 um"'}
 FORMS = {"nonlocal": {"nonlocal": "", "nonlocal, order 2": "order = 2\n",
                       "nonlocal, reading 'report'": 'reading = "report"\n', "nonlocal, breakaway": "breakaway = 0.2\n"}}
-METHODS = ("auto", "exact", "march", "harmonic", "duhamel", "newmark", "euler")
+METHODS = ("auto", "exact", "march", "harmonic")
 
 
 class Beside(NamedTuple):

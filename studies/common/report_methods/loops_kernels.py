@@ -8,10 +8,10 @@ fill from their first entries on under the drive (k,) [m s-2]. The text runs wit
 
 import numpy as np
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import LEAN
-from ...friction.laws import tanh_kernels as law
-from ..modal_kernels import narrowed
+from patchfem.compiled.inner import njit
+from patchfem.dynamics.modal_kernels import narrowed
+from patchfem.friction.flags_kernels import LEAN
+from patchfem.friction.laws import tanh_kernels as law
 
 COULOMB, HEAD = 0, 4  # first number of a row of set-valued friction; numbers of a row before those of its law
 

@@ -1,13 +1,14 @@
 """Friction laws of one interface for the comparison methods: each depends on that interface alone."""
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
-from ... import compiled
-from ...core import ModalBasis, PatchfemError
-from ...friction.protocol import Element
-from ..contacts.dispatch import COULOMB, law_of, number_of
+from patchfem import compiled
+from patchfem.core import ModalBasis, PatchfemError
+from patchfem.dynamics.contacts.dispatch import COULOMB, law_of, number_of
+from patchfem.friction.protocol import Element
 
 HEAD = 4  # numbers of a row before those of its law
 SMOOTH = tuple(f"friction.laws.{law}_kernels" for law in ("elastic_plastic", "tanh"))  # what has a force at the end
@@ -101,8 +102,11 @@ def rows(laws, interfaces: int, stick_speed: float | None = None) -> np.ndarray:
 
 
 def loops():
-    """The compiled loops of the comparison methods, one instance of `comparison_kernels` for all their laws."""
-    return compiled.instance("dynamics.comparison.comparison_kernels", {"law": law_of(SMOOTH, ("at_end",))})
+    """Return the compiled loops of the methods, for all their laws, from the folder of compiled code."""
+    law = law_of(SMOOTH, ("at_end",))
+    text = Path(__file__).with_name("loops_kernels.py").read_text("utf-8")
+    text = text.replace("from patchfem.friction.laws import tanh_kernels as law", f"import {law.__name__} as law")
+    return compiled.written(f"report_methods_{compiled.digest(text)}", text, parts=[law])
 
 
 def added_static(modes: ModalBasis, face, stick_speed: float, h: float) -> float:

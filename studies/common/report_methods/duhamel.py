@@ -8,9 +8,10 @@ to 6 m d/(relax h^2), one of the speed by 2 m d/(relax h): the first two say lit
 import numpy as np
 from scipy.linalg import expm
 
-from ...core import ModalBasis, PatchfemError, Start
-from .comparison import Comparison, Grid, finish, grid
+from patchfem.core import ModalBasis, PatchfemError, Start
+
 from .point_laws import elastic_rates, sticking_warnings
+from .steps import Comparison, Grid, finish, grid
 
 CRITERIA = ("displacement", "velocity", "force")
 ADMITTED = 1e-2  # share of the friction limit that a step may leave open before a run says so

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 from comparison_cases import FREE_FREE, PLAIN, SDOF, UNIT, basis, elastic_plastic, sine, tanh
+from report_methods import duhamel, euler, newmark
+from report_methods.point_laws import Coulomb
 
 from patchfem.core import Segment, Start
-from patchfem.dynamics.comparison import duhamel, euler, newmark
-from patchfem.dynamics.comparison.point_laws import Coulomb
 from patchfem.structure.drives import Piecewise, release
 
 STICK_SLIP = 0.28704671337871602595  # exact peak, D = .8, 2 xi = .006

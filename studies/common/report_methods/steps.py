@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from ...core import ModalBasis, PatchfemError, Response, Start
-from ..integrated import accelerations
+from patchfem.core import ModalBasis, PatchfemError, Response, Start
+from patchfem.dynamics.integrated import accelerations
+
 from .point_laws import loops, rows
 
 MOST_NUMBERS = 2e8  # kept by a run: 1.6 GB

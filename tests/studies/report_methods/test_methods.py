@@ -24,11 +24,12 @@ from comparison_cases import (
 from hypothesis import given
 from hypothesis import strategies as st
 from numba import typeof
+from report_methods import duhamel, euler, newmark
+from report_methods import steps as step_grid
+from report_methods.point_laws import Coulomb, added_static, loops, rows
+from report_methods.steps import first_forces
 
 from patchfem.core import BaseSine, PatchfemError, Start, frozen_array
-from patchfem.dynamics.comparison import comparison, duhamel, euler, newmark
-from patchfem.dynamics.comparison.comparison import first_forces
-from patchfem.dynamics.comparison.point_laws import Coulomb, added_static, loops, rows
 from patchfem.structure.drives import Recorded, release
 
 DRIVE = BaseSine(1.3, 0.9)
@@ -258,7 +259,7 @@ def test_exact_one_compiled_loop_serves_read_only_arrays_and_any_order_in_memory
                 return getattr(loops(), name)(*given)
             return called
 
-    monkeypatch.setattr(comparison, "loops", Loops)
+    monkeypatch.setattr(step_grid, "loops", Loops)
     damping, faces, ends = np.array([[0.2, 0.1], [0.1, 0.3]]), np.array([[1.0, 0.5], [0.3, -0.8]]), []
     for form in (frozen_array, np.array, np.asfortranarray):
         modes = replace(basis([1.0, 2.5], [0.02, 0.05], faces, [1.0, 0.4]), damping=form(damping), faces=form(faces))

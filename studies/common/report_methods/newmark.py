@@ -9,9 +9,10 @@ friction is that of the speed at the start of the step, so a reversal without st
 
 import numpy as np
 
-from ...core import ModalBasis, PatchfemError, Start
-from .comparison import Comparison, Grid, finish, grid
+from patchfem.core import ModalBasis, PatchfemError, Start
+
 from .point_laws import Coulomb, added_static, low_speed, sticking_warnings
+from .steps import Comparison, Grid, finish, grid
 
 
 def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 400, stick_speed: float | None = None,

@@ -6,9 +6,10 @@ and friction limit tanh(v/v_0) shakes at rest for h > 2 v_0 m/limit.
 
 import numpy as np
 
-from ...core import ModalBasis, Start
-from .comparison import Comparison, finish, grid
+from patchfem.core import ModalBasis, Start
+
 from .point_laws import elastic_rates, sticking_warnings
+from .steps import Comparison, finish, grid
 
 
 def run(modes: ModalBasis, drive, laws, duration: float, steps_per_cycle: int = 400,
