@@ -39,6 +39,7 @@ def cases(law: str, count: int, seed: int = 1) -> run.Cases:
         numbers = np.array({"tanh": [slip, 1 / speed], "stretch": [spring, length],
                             "bouc_wen": [slip, length, r.choice([1, 2, 1.5], count), r.uniform(0.5, 1, count)],
                             }[law.split(".")[2].removesuffix("_kernels")]).T
+        r.uniform(size=(3, count))  # the bounds of the tests were measured for the damping that is drawn behind these
     return run.Cases(2 * np.sqrt(square) * 10 ** r.uniform(-1 if law in FLOWS else -3, -0.5, count), square, one, slip,
                      slip * (r.choice([1, 1.3], count) if law == "rigid" else 1), spring,
                      length, -one, one, 0 * one, 0.1 * r.choice([0, 1], count), numbers)
