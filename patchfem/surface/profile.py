@@ -1,7 +1,6 @@
 """One measured or made trace of heights, and the levelling and cleaning that every trace goes through first."""
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,28 +13,13 @@ _BLOCK = 1 << 17  # windows sorted at a time
 _MOST = 1 << 21  # samples of an evened trace
 
 
-@dataclass(frozen=True, slots=True)
-class Printed:
-    """A result that the instrument itself printed into the file of a trace.
-
-    value in SI, unit: "m", or "1" for a plain number; reference, measure: (place, width) [m] of the two cursors that
-    the instrument evaluated between, None where the file does not tell them.
-    """
-
-    value: float
-    unit: str
-    reference: tuple | None = None
-    measure: tuple | None = None
-
-
 @dataclass(frozen=True, eq=False, slots=True)
 class Profile:
     """A trace of heights z (n,) [m], NaN where none was measured, at increasing x (n,) [m]; straight lines between
     them.
 
     source: a name of the trace for messages; notes: what was done to it on the way, one sentence each, for the
-    warnings; tip_radius: of the stylus [m], None where the file does not tell it; printed: name -> `Printed`, what the
-    instrument itself computed.
+    warnings; tip_radius: of the stylus [m], None where the file does not tell it.
     """
 
     x: np.ndarray
@@ -43,7 +27,6 @@ class Profile:
     source: str
     notes: tuple = ()
     tip_radius: float | None = None
-    printed: Mapping = field(default_factory=dict)
 
     @property
     def missing(self) -> np.ndarray:

@@ -149,7 +149,7 @@ def test_exact_the_pages_are_the_same_bytes(tmp_path):
 
 @pytest.mark.skipif("PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans")
 def test_exact_the_dektak_file_as_it_is():
-    """The file as the instrument exports it: its own results between its own cursors, and the same by --window."""
+    """The file as the instrument exports it: the results that it printed between its cursors, by --window."""
     path = Path(os.environ["PATCHFEM_DATA"]) / "dektak-1.csv"
     answer = json.loads(cli("profile", path, "--window", "468 um,733 um", "--json").out)["profiles"][0]
     assert answer["step"] == pytest.approx(0.15625e-6, rel=1e-12)
@@ -157,8 +157,7 @@ def test_exact_the_dektak_file_as_it_is():
              "RzDin": ("RzDin", 49.17e-9, 5e-12), "WMaxDev": ("MaxDev", 128.61e-9, 5e-12),
              "ASH": ("ASH", 2.89171e-6, 1.5e-11)}
     for name, (ours, printed, near) in known.items():
-        assert answer["printed"][name]["printed"] == pytest.approx(printed, rel=1e-9)
-        assert answer["printed"][name]["value"] == answer["measures"][ours]["value"] == pytest.approx(printed, abs=near)
+        assert answer["measures"][ours]["value"] == pytest.approx(printed, abs=near), name
 
 
 @pytest.mark.skipif("PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans")

@@ -99,8 +99,6 @@ def lines_of(report: RoughnessReport, verbose: bool = False) -> list:
             out.append(f"  {'':<20}   {one.text}")
     out += [f"  no interval of {', '.join(names)}: {reason}" for reason, names in _untold(report).items()]
     out += asperities.lines_of(_told(report), report.cutoff) if report.kind == "profile" else []
-    for one in report.printed:
-        out.append(f"  the instrument printed {_pair(one)}")
     if report.tip is not None:
         out.append(f"  {report.tip.sentence}")
     return out
@@ -188,13 +186,6 @@ def _untold(report: RoughnessReport) -> dict:
     return out
 
 
-def _pair(one) -> str:
-    unit, scale = ("", 1.0) if one.unit == "1" else step_of(LADDERS[one.unit], one.printed)
-    unit = unit and f" {unit}"
-    return (f"{one.name} {one.printed * scale:.6g}{unit}; its heights give {one.here * scale:.6g}{unit} between its "
-            f"cursors, x = {say(one.window[0])} to {say(one.window[1])}")
-
-
 def data_of(report: RoughnessReport) -> dict:
     """The report as plain data in SI."""
     measures = {}
@@ -213,9 +204,6 @@ def data_of(report: RoughnessReport) -> dict:
     if report.tip is not None:
         out["tip"] = {"radius": report.tip.radius, "valley_radius": report.tip.valleys,
                       "narrow_share": report.tip.share, "text": report.tip.sentence}
-    if report.printed:
-        out["printed"] = {one.name: {"printed": one.printed, "value": one.here, "unit": one.unit}
-                          for one in report.printed}
     return out
 
 
@@ -245,7 +233,7 @@ def _section(number: int, report: RoughnessReport) -> Section:
     if report.tip is not None and report.tip.reaches:
         parts.append(f"<p class=soft>Stylus: {prose(report.tip.sentence)}.</p>")
     parts += [figure(f"{number}{place}", *one) for place, one in enumerate(figures(report))]
-    parts += [_table(report), _printed(report), _definitions(report)]
+    parts += [_table(report), _definitions(report)]
     if report.kind == "profile":
         parts.append(f"<pre>{escape(chr(10).join(asperities.lines_of(_told(report), report.cutoff)))}</pre>")
     return Section(f"surface{number}", report.source, "\n".join(parts))
@@ -308,17 +296,6 @@ def _table(report: RoughnessReport) -> str:
                if any(one.low is not None for one in report.values) else "")
             + "".join(f"<p class=soft>No interval of {escape(', '.join(names))}: {prose(reason)}.</p>"
                       for reason, names in _untold(report).items()))
-
-
-def _printed(report: RoughnessReport) -> str:
-    if not report.printed:
-        return ""
-    rows = []
-    for one in report.printed:
-        unit, scale = ("", 1.0) if one.unit == "1" else step_of(LADDERS[one.unit], one.printed)
-        rows.append([escape(one.name), f"{one.printed * scale:.6g}", f"{one.here * scale:.6g}", escape(unit)])
-    return ("<h3>What the instrument printed</h3>" + table(("result", ">printed", ">from its heights", "unit"), rows)
-            + "<p class=soft>Between the cursors of the file, about the least-squares line, without a filter.</p>")
 
 
 def _definitions(report: RoughnessReport) -> str:

@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...core import PatchfemError, say
-from ..profile import Printed, Profile
+from ..profile import Profile
 from ..samples import checked
 from .raw import Raw, shown
 from .text import text_of, values
@@ -21,12 +21,10 @@ _LENGTHS = {"m": 1.0, "mm": 1e-3, "millimeter": 1e-3, "um": 1e-6, "micrometer": 
             "nanometer": 1e-9, "a": 1e-10, "å": 1e-10, "angstrom": 1e-10, "mil": 25.4e-6}
 _QUANTITY = re.compile(r"\s*([+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?)\s*([^\W\d_]*)\s*")
 _HEADER = re.compile(r"^\s*Lateral\s+(\w+)\s*,\s*Raw\s+(\w+)[^\n]*$", re.MULTILINE | re.IGNORECASE)
-_LEFT = ("R.Cur Pos", "R.Cur Width", "M.Cur Pos", "M.Cur Width")
 
 
 def dektak(raw: Raw) -> Profile:
-    """The trace of a Dektak export, with the tip's radius and the instrument's own results; PatchfemError names the
-    line."""
+    """The trace of a Dektak export, with the tip's radius; PatchfemError names the line."""
     path, text = raw.path, text_of(raw)
     header = _HEADER.search(text)
     if header is None:
@@ -38,37 +36,23 @@ def dektak(raw: Raw) -> Profile:
     if body.count(",,\n") == body.count("\n"):
         body = body.replace(",,\n", "\n")  # empty columns behind
     found, at = values(path, body, number, {"x": 0, "z": 1}, ",", 2)
-    settings, results = _rows(text[:header.start()])
+    settings = _settings(text[:header.start()])
     x, notes = _stepped(path, found["x"], _length(settings.get("Length", "")), factors[0])
     found = checked(path, x, found["z"], at, tuple(factors))
     tip = re.search(r"Radius:\s*(.*)", settings.get("Stylus", ""))
-    return replace(found, notes=notes + found.notes, tip_radius=_length(tip[1]) if tip else None,
-                   printed={name: one for name, one in map(_printed, results) if one is not None})
+    return replace(found, notes=notes + found.notes, tip_radius=_length(tip[1]) if tip else None)
 
 
-def _rows(head: str) -> tuple:
-    """Settings as name -> text, results as one dict for each row of their table."""
-    settings, results, names = {}, [], None
+def _settings(head: str) -> dict:
+    """Return the settings above the results of the instrument as name -> text."""
+    settings = {}
     for line in head.split("\n"):
         cells = [cell.strip() for cell in line.split(",")]
-        if cells[0] == "Function":
-            names = cells
-        elif names is None and len(cells) > 1:
+        if cells[0] == "Function":  # the results of the instrument follow
+            break
+        if len(cells) > 1:
             settings.setdefault(cells[0], ",".join(cells[1:]))
-        elif names is not None and len(cells) >= len(names):
-            results.append(dict(zip(names, cells)))
-    return settings, results
-
-
-def _printed(row: dict) -> tuple:
-    """(name, `Printed`) of one row of the instrument's results; None where its result is no number."""
-    found = _QUANTITY.fullmatch(row.get("Result", ""))
-    if found is None or not np.isfinite(float(found[1])) or (found[2] and found[2].lower() not in _LENGTHS):
-        return row["Function"], None
-    factor = _LENGTHS[found[2].lower()] if found[2] else 1.0
-    place = [_length(row.get(name, "")) for name in _LEFT]
-    cursors = [None if None in pair else pair for pair in (tuple(place[:2]), tuple(place[2:]))]
-    return row["Function"], Printed(float(found[1]) * factor, "m" if found[2] else "1", *cursors)
+    return settings
 
 
 def _length(text: str) -> float | None:

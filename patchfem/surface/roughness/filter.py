@@ -13,16 +13,15 @@ REACH = 1.25  # cut-offs to either side; beyond them lies 1.5e-10 of the weight
 FEWEST = 4  # steps of a cut-off
 
 
-def filtered(profile: Profile, cutoff: float, ends: str = "trimmed", stages: int = 1) -> tuple:
+def filtered(profile: Profile, cutoff: float, ends: str = "trimmed") -> tuple:
     """Waviness and roughness of a trace at a cut-off [m], both of them a Profile.
 
     The trace is put on an even step (`even`), its least-squares line is subtracted, and the weighting function of
     ISO 16610-21, exp(-pi (x / (alpha cutoff))^2) / (alpha cutoff) with alpha = sqrt(ln 2 / pi), takes the mean line.
     ends: "trimmed": half a cut-off is left off at each end, and where the weighting function still reaches beyond the
     trace, the part within is scaled to a sum of one; "whole": nothing is left off, and the mean line at the ends is
-    that of the weighted least-squares line (ISO 16610-28, first moment). stages: 2 for the filter of ISO 13565-1, whose
-    mean line is that of the trace with its valleys below the first mean line cut off. PatchfemError for a cut-off of
-    fewer than four steps or, trimmed, as long as the trace.
+    that of the weighted least-squares line (ISO 16610-28, first moment). PatchfemError for a cut-off of fewer
+    than four steps or, trimmed, as long as the trace.
     """
     if ends not in ("trimmed", "whole"):
         raise PatchfemError(f"a filtered trace has no treatment of its ends called '{ends}'; use trimmed or whole")
@@ -34,8 +33,6 @@ def filtered(profile: Profile, cutoff: float, ends: str = "trimmed", stages: int
         raise PatchfemError(f"{profile.source}: the trace is {say(flat.length)} long; half a cut-off of {say(cutoff)} "
                             "is trimmed at each end, so the cut-off must be shorter than the trace")
     line = mean_line(flat.z, cutoff / step, ends == "whole")
-    if stages == 2:
-        line = mean_line(np.maximum(flat.z, line), cutoff / step, ends == "whole")
     keep = slice(edge, flat.x.size - edge)
     x = frozen_array(flat.x[keep])
     return (replace(flat, x=x, z=frozen_array(line[keep])), replace(flat, x=x, z=frozen_array((flat.z - line)[keep])))

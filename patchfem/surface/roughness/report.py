@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array, say
 from ..areal import Areal
-from ..profile import Profile, even, level, spikes
+from ..profile import Profile, even, spikes
 from ..quantity import Quantity, refused
 from ..spikes import spikes_of
 from . import rows
@@ -30,21 +30,6 @@ SECTIONS = 6  # cut-offs in a trace: five that count and one that the filter tak
 ROUND = 1e-14  # of the largest height: what levelling leaves of a straight line
 LONG = ("the trace is shorter than four wavelengths of its strongest wave, so a longer trace would give a different "
         "value")
-PRINTED = {"Ra": "Pa", "Rq": "Pq", "Skew": "Psk", "RzDin": "RzDin", "MaxDev": "MaxDev", "ASH": "ASH",
-           "Wa": "Pa", "Wq": "Pq", "WMaxDev": "MaxDev"}  # names of a Dektak, which filters nothing unless asked
-
-
-class Reread(NamedTuple):
-    """A result that the instrument printed into the file, and the same one read off its heights [SI] between its
-    cursors, the window [m]."""
-
-    name: str
-    printed: float
-    here: float
-    unit: str
-    window: tuple
-
-
 class Settings(NamedTuple):
     """What is taken off a surface before its parameters are read, and where two of them are read.
 
@@ -67,8 +52,8 @@ class RoughnessReport:
 
     values: tuple of Quantity, each with its name; length [m]; shape: samples, along y first; step [m] between samples;
     form: the name of what was subtracted first; cutoff, window [m] or None; band: wavelengths [m] of band_amplitude;
-    notes: sentences about the file and what was done to it; tip: the stylus against the valleys, or None; printed:
-    tuple of Reread; abbott: (ratio, height) of the roughness, of the primary without one, of the scan, and its core. Of
+    notes: sentences about the file and what was done to it; tip: the stylus against the valleys, or None;
+    abbott: (ratio, height) of the roughness, of the primary without one, of the scan, and its core. Of
     traces only: primary, the trace without form; waviness, roughness, None without a cut-off; spectrum of the primary.
     scan: the areal scan that the parameters are read from. measured: heights of a trace before it was resampled.
     """
@@ -86,7 +71,6 @@ class RoughnessReport:
     window: tuple | None = None
     band: tuple = BAND
     tip: Tip | None = None
-    printed: tuple = ()
     primary: Profile | None = None
     waviness: Profile | None = None
     roughness: Profile | None = None
@@ -125,8 +109,6 @@ def report_of(surface: Profile | Areal, cutoff: float | None = None, window: tup
         rough = replace(heights, z=roughness.z, section=cutoff)
         inner = Intervals(rough, None)
         values += [_value(row, row.of(rough), inner) for row in rows.ROUGH]
-        staged = replace(heights, z=filtered(primary, cutoff, stages=2)[1].z, section=cutoff)
-        values += [_value(row, row.of(staged), inner) for row in rows.TWO_STAGE]
     if window is not None:
         values += [_value(row, _ends(trace) if row.of is None else row.of(heights), found) for row in rows.WINDOW]
     shown, radius = rough or heights, surface.tip_radius if tip is None else tip
@@ -135,7 +117,7 @@ def report_of(surface: Profile | Areal, cutoff: float | None = None, window: tup
     notes += () if roughness is None else _short(roughness, cutoff)
     return RoughnessReport(
         trace.source, "profile", trace.length, (trace.x.size,), heights.step, tuple(values), notes, form, settings,
-        cutoff, window, band, stylus, reread(surface), primary, waviness, roughness, abbott(shown), shown.core,
+        cutoff, window, band, stylus, primary, waviness, roughness, abbott(shown), shown.core,
         spectrum, measured=cut.x.size)
 
 
@@ -174,7 +156,7 @@ def _between(source: str, axis, first: float, last: float, name: str) -> slice:
 def interval_of(name: str, profile: Profile, cutoff: float | None = None, band: tuple = BAND) -> Quantity:
     """One parameter of a trace with its interval; names as in `rows`, those of the roughness need a cut-off [m]."""
     row = rows.TABLE.get(name)
-    if row is None or row in rows.AREAL or row in rows.WINDOW or row in rows.TWO_STAGE:
+    if row is None or row in rows.AREAL or row in rows.WINDOW:
         known = ", ".join(each.name for each in (*rows.PRIMARY, *rows.WAVES, *rows.ROUGH))
         raise PatchfemError(f"'{name}' is not a parameter of a trace; use one of {known}")
     trace = _enough(even(_enough(profile)))
@@ -185,29 +167,6 @@ def interval_of(name: str, profile: Profile, cutoff: float | None = None, band: 
         raise PatchfemError(f"{profile.source}: {name} belongs to the roughness profile and needs a cut-off")
     heights = Heights(filtered(_primary(trace, band)[0], cutoff)[1].z, trace.length / (trace.x.size - 1), cutoff)
     return _value(row, row.of(heights), Intervals(heights, None))
-
-
-def reread(profile: Profile) -> tuple:
-    """What the instrument printed into the file, each beside the same result read off its heights; () without any.
-
-    The instrument levels the part between its cursors by least squares and filters nothing.
-    """
-    table = {row.name: row for row in (*rows.PRIMARY, *rows.WINDOW)}
-    out, parts = [], {}
-    for name, one in profile.printed.items():
-        row = table.get(PRINTED.get(name, ""))
-        if row is None or one.reference is None or one.measure is None or one.reference[1] or one.measure[1]:
-            continue
-        cursors = one.reference[0], one.measure[0]
-        if cursors not in parts:
-            try:
-                part = even(_enough(windowed(profile, *cursors)))
-            except PatchfemError:
-                continue
-            parts[cursors] = part, Heights(level(part).z, part.length / (part.x.size - 1))
-        part, heights = parts[cursors]
-        out.append(Reread(name, one.value, _ends(part) if row.of is None else row.of(heights), one.unit, cursors))
-    return tuple(out)
 
 
 def _enough(trace: Profile) -> Profile:

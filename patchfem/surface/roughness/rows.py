@@ -103,14 +103,6 @@ _MEAN = {"p", "v", "z"}
 ROUGH = tuple(Parameter(name if name.startswith("Mr") else "R" + name, unit,
                         text + (", mean over the sections of one cut-off" if name in _MEAN else "")
                         + ", of the roughness profile", of, kind) for name, unit, text, of, kind in _BASE)
-TWO_STAGE = tuple(Parameter(f"{row.name}_13565", row.unit, row.text.replace("roughness profile", "profile of the "
-                                                                                                 "two-stage filter of "
-                                                                                                 "ISO 13565-1, which "
-                                                                                                 "cuts the valleys off "
-                                                                                                 "before the second "
-                                                                                                 "mean line is "
-                                                                                                 "computed"),
-                            row.of, "") for row in ROUGH if row.name in ("Rk", "Rpk", "Rvk", "Mr1", "Mr2"))
 WAVES = (
     Parameter("dominant_wavelength", "m", "wavelength of the octave with the largest mean square height, of the "
               "levelled trace", lambda heights: spectrum_of(heights.z, heights.step).dominant, "wave"),
@@ -185,4 +177,4 @@ AREAL = (
     Parameter("Sdc", "m", "height difference between the levels with material ratios {second} and {first}",
               _all(ratio_heights), ""),
 )
-TABLE = {row.name: row for row in (*PRIMARY, *ROUGH, *TWO_STAGE, *WAVES, *WINDOW, *AREAL)}
+TABLE = {row.name: row for row in (*PRIMARY, *ROUGH, *WAVES, *WINDOW, *AREAL)}

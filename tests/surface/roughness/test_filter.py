@@ -62,7 +62,6 @@ def test_exact_half_a_cutoff_is_trimmed_at_each_end():
 def test_exact_waviness_and_roughness_add_up_to_the_levelled_trace():
     x = np.arange(3000) * UM
     z = np.random.default_rng(0).normal(0, UM, 3000) + 0.01 * x
-    from patchfem.surface.profile import level
 
     waviness, rough = filtered(Profile(x, z, "t"), 250 * UM)
     assert waviness.z + rough.z == pytest.approx(level(Profile(x, z, "t")).z[125:-125], abs=1e-18)
@@ -114,22 +113,3 @@ def test_refuses_a_cutoff_that_does_not_fit(cutoff, says):
 def test_refuses_ends_that_are_not_known():
     with pytest.raises(PatchfemError, match="no treatment of its ends called 'padded'; use trimmed or whole"):
         filtered(sine(np.arange(1000) * UM, UM, 80 * UM), 80 * UM, "padded")
-
-
-def test_exact_the_two_stage_filter_by_its_definition():
-    """Valleys below the first mean line are cut off before the second (ISO 13565-1): by sums over the weights."""
-    rng = np.random.default_rng(8)
-    x = np.arange(900) * 1e-6
-    z = rng.normal(size=x.size) * 1e-7 - 3e-6 * (np.abs((x * 1e6) % 120 - 60) < 5)
-    trace = level(Profile(x, z, "trace"))
-
-    def mean(values, at, cutoff=100.0):
-        weight = np.exp(-np.pi * ((np.arange(values.size) - at) / (ALPHA * cutoff)) ** 2)
-        return (weight * values).sum() / weight.sum()
-
-    first = np.array([mean(trace.z, at) for at in range(x.size)])
-    rough = filtered(trace, 100e-6, stages=2)[1]
-    for at in (50, 400, 849):
-        assert rough.z[at - 50] == pytest.approx(trace.z[at] - mean(np.maximum(trace.z, first), at), abs=1e-14)
-    plain = filtered(trace, 100e-6)[1]
-    assert rough.z.min() < plain.z.min()  # the mean line stays on the plateaus

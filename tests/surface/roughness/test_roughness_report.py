@@ -12,7 +12,7 @@ from synthetic import sine
 from patchfem.core import PatchfemError
 from patchfem.export.surfaces.roughness import heading
 from patchfem.surface.areal import Areal
-from patchfem.surface.profile import Printed, Profile
+from patchfem.surface.profile import Profile
 from patchfem.surface.roughness.report import NOTHING, fitting_cutoff, interval_of, report_of, windowed
 
 UM = 1e-6
@@ -115,19 +115,6 @@ def test_exact_a_trace_as_long_as_its_waves_has_no_interval_of_heights():
     report = report_of(Profile(np.arange(2000) * UM, z / z.std() * UM, "fractal.csv"))
     assert report["Pq"].low is None and report["Pq"].reason.startswith("the trace is shorter than four wavelengths")
     assert report["Pdq"].low is not None and report["Psk"].low is not None
-
-
-def test_exact_what_the_instrument_printed_is_read_again():
-    """A window of the file's cursors, levelled; results of other names or with wide cursors are left alone."""
-    cursors = {"reference": (100 * UM, 0.0), "measure": (900 * UM, 0.0)}
-    printed = {"Ra": Printed(1.2 * UM, "m", **cursors), "ASH": Printed(0.0, "m", **cursors),
-               "Slope": Printed(1.0, "1", **cursors), "Rq": Printed(1.0, "m", (100 * UM, 5 * UM), (900 * UM, 0.0))}
-    trace = made(printed=printed)
-    found = {one.name: one for one in report_of(trace).printed}
-    inside = report_of(trace, window=(100 * UM, 900 * UM))
-    assert set(found) == {"Ra", "ASH"}
-    assert found["Ra"].here == inside["Pa"].value and found["Ra"].printed == 1.2 * UM
-    assert found["ASH"].here == trace.z[900] - trace.z[100] == inside["ASH"].value
 
 
 def test_exact_the_tip_of_the_file_or_of_the_call():

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from scipy.stats import norm
 
 from patchfem.surface.roughness.parameters import Heights, abbott, core, crossings, mean_element, mean_spacing
-from patchfem.surface.roughness.rows import AREAL, PRIMARY, ROUGH, TABLE, TWO_STAGE, WAVES, WINDOW
+from patchfem.surface.roughness.rows import AREAL, PRIMARY, ROUGH, TABLE, WAVES, WINDOW
 
 UM = 1e-6
 
@@ -116,7 +116,7 @@ def test_exact_a_flat_trace_has_no_shape():
 
 def test_exact_every_row_has_a_name_of_its_own_and_a_definition():
     rows = [*PRIMARY, *ROUGH]
-    assert len(rows) + len(TWO_STAGE) + len(AREAL) + len(WAVES) + len(WINDOW) == len(TABLE)
+    assert len(rows) + len(AREAL) + len(WAVES) + len(WINDOW) == len(TABLE)
     assert all(len(row.text.split()) > 4 and row.unit in ("m", "1", "rad") for row in TABLE.values())
 
 
