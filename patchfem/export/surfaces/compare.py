@@ -21,7 +21,7 @@ from ...surface.roughness.spectrum import BAND
 from ...surface.scans.change import Change, hidden
 from ..pages.document import Section, document, figure, prose, table, warned
 from ..pages.words import pair
-from . import line, pictures
+from . import pictures
 from .areal import write_columns, write_x3p
 
 WORDS = {"shift": "shift", "tilt": "tilt", "scale": "scale of x", "worn_depth_max": "worn depth, largest",
@@ -246,11 +246,13 @@ def page(parts: list, found: tuple, directions: list = (), pressing: Pressed | N
                                 "\n".join(body)))
     if pressing is not None:
         sections.append(Section("pressed", f"{pressing.title}, pressed with each surface", _pressing(pressing)))
-    found = parts[0].change
-    if found is None or found.found is None:
-        return document(title, lead, sections)
-    sections.insert(1 + bool(directions), line.section(found))
-    return document(title, lead, sections, {"charts": [], "scans": line.film(found)}, line.SCRIPTS)
+    return document(title, lead, sections)
+
+
+def _laid(one: Change) -> tuple:
+    """Return heights before about their plane, heights after aligned with them, and depth (m, n) [m] of two scans."""
+    first = level_plane(one.before).z
+    return first, first - one.volumes.filled, one.volumes.filled
 
 
 def figures(one: Comparison) -> list:
@@ -292,7 +294,7 @@ def figures(one: Comparison) -> list:
 
 def _maps(one: Change) -> list:
     """Pictures of two scans that lie on each other."""
-    x, y, (first, second, depth) = one.before.x, one.before.y, line.laid(one)
+    x, y, (first, second, depth) = one.before.x, one.before.y, _laid(one)
     worn = one.volumes.values["worn_volume"]
     out = [(pictures.maps(x, y, (first, second, depth)),
             "Left and middle: the first scan (before wear) and the second scan (after wear), aligned with the first; "

@@ -59,7 +59,7 @@ def test_exact_a_sine_with_a_little_noise():
     assert report["band_amplitude"].value == pytest.approx(2 * UM, rel=0.01)
     assert report["dominant_wavelength"].value == pytest.approx(80 * UM, rel=0.01)
     assert [one.low <= one.value <= one.high for one in report.values if one.low is not None].count(False) == 0
-    assert len({one.name for one in report.values}) == len(report.values) == 42
+    assert len({one.name for one in report.values}) == len(report.values) == 37
 
 
 def test_exact_a_flat_trace_says_so():

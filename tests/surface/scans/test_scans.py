@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from command_line import cli
 from known_scans import make
-from page_data import data_of
 
 from patchfem.__main__ import main
 from patchfem.export.results import FILES
@@ -270,8 +269,6 @@ def test_always_the_verb_tells_volumes_and_draws_maps(grooved, worn, tmp_path, c
     assert data["verdict"].startswith("worn") and data["worn_volume"]["unit"] == "m3"
     assert {"shift_x", "shift_y", "rotation", "mirrored", "turned"} <= set(data["registration"])
     assert data["removed"] == {"before": 0, "after": 0} and data["hidden_wear"]["reason"].startswith("unworn parts")
-    page = (tmp_path / "out" / "report.html").read_text()
-    assert "with which the second scan" in page and 'id="line"' in page and "scans" in data_of(page)
     found = worn
     files = [read_surface(tmp_path / "out" / f"difference.{end}") for end in ("x3p", "csv")]
     for one in files:
