@@ -2,7 +2,7 @@
 
     python tests/support/scans_score.py --seeds 1000-1059 [--points 1000x1000] [--table FILE.json]
 
-Every pair is written as two SDF files and compared by the command line in this process. A verdict is "right"; "missed"
+Every pair is written as two X3P files and compared by the command line in this process. A verdict is "right"; "missed"
 where a true change is not shown, two scans of one place are called not comparable, or a fault of the files is not
 named; "false" where something is said that is not so; "refused" where the command ends with an error. An interval holds
 the truth of a volume also where every point counts as a whole pixel. Seeds below 1000 serve to build the method. With
@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 from known_scans import make
-from surfaces import sdf_binary
+from surfaces import x3p_of
 
 from patchfem.__main__ import main
 
@@ -29,9 +29,9 @@ ORDER = ("wrong order", "exchanged")
 
 
 def written(path: Path, scan: tuple) -> Path:
-    """A scan (x, y, z) as a binary SDF file."""
+    """A scan (x, y, z) as an X3P file."""
     x, y, z = scan
-    path.write_bytes(sdf_binary(z, steps=(x[1], y[1])))
+    path.write_bytes(x3p_of(z, steps=(x[1], y[1])))
     return path
 
 
@@ -50,7 +50,7 @@ def answered(before: tuple, after: tuple) -> dict:
     """What compare says as JSON of two scans, or its `error`; with seconds `cpu` and `clock`, and `memory` [MB]."""
     out, err, code = io.StringIO(), io.StringIO(), 0
     with tempfile.TemporaryDirectory() as folder:
-        files = [written(Path(folder) / name, scan) for name, scan in (("before.sdf", before), ("after.sdf", after))]
+        files = [written(Path(folder) / name, scan) for name, scan in (("before.x3p", before), ("after.x3p", after))]
         start, clock, least = time.process_time(), time.perf_counter(), peak(reset=True)
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             try:

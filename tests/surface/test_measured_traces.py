@@ -104,13 +104,6 @@ def test_exact_the_measured_interface_of_a_bolted_beam(data, truth):
     assert np.array_equal(scan.z[row, column], points[:, 2], equal_nan=True)
 
 
-def test_exact_an_ascii_surface_data_file(data):
-    scan = read_surface(data / "sdf-1.sdf")
-    lines = (data / "sdf-1.sdf").read_text().split("*")[1].split()
-    assert scan.z.shape == (4, 7) and scan.z.ravel() == pytest.approx(np.array(lines, float) * 1e-6, rel=1e-15)
-    assert scan.x == pytest.approx(np.arange(7) * 1e-6) and scan.y == pytest.approx(np.arange(4) * 1e-6)
-
-
 def test_exact_measured_traces_hold_few_spikes(data):
     assert not spikes(mitutoyo(data)).any() and not spikes(dektak(data)).any()
     for name in ("nanovea-test1.txt.gz", "nanovea-test2.txt.gz"):

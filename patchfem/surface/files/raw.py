@@ -19,8 +19,8 @@ DIRECTORY = 2**20  # bytes of the list of members of a zip file
 HEAD = 4096  # bytes that tell the format
 PIECE = 2**16  # bytes that are counted at a time: larger ones are mapped anew each time
 MARKS = (("gzip", b"\x1f\x8b"), ("zip", b"PK\x03\x04"), ("zip", b"PK\x05\x06"), ("npy", b"\x93NUMPY"),
-         ("mat", b"MATLAB 5.0 MAT-file"), ("mat", b"MATLAB 7.3 MAT-file"), ("sdf", b"aISO-1.0"), ("sdf", b"bISO-1.0"),
-         ("sdf", b"aBCR-1.0"), ("sdf", b"bBCR-1.0"))  # fmt: skip
+         ("mat", b"MATLAB 5.0 MAT-file"), ("mat", b"MATLAB 7.3 MAT-file"), ("binary", b"aISO-1.0"),
+         ("binary", b"bISO-1.0"), ("binary", b"aBCR-1.0"), ("binary", b"bBCR-1.0"))  # fmt: skip
 PLAIN = (".txt", ".csv", ".tsv", ".dat", ".prn", ".asc", ".xyz", ".prf", "")  # suffixes of what may be plain text
 BROKEN = (zipfile.BadZipFile, zipfile.LargeZipFile, zlib.error, struct.error, OSError, EOFError, ValueError,
           RuntimeError, NotImplementedError, OverflowError, KeyError, IndexError)  # of zipfile over a damaged file

@@ -10,13 +10,12 @@ from .arrays import mat, npy
 from .dektak import MARK, dektak
 from .instruments import instrument
 from .raw import PLAIN, Raw, fetch
-from .sdf import sdf
 from .text import columns
 from .units import ASIDE
 from .x3p import x3p
 
 KINDS = {"npy": npy, "mat": mat, "binary": instrument}
-TOLD = {"sdf": sdf, "x3p": x3p, "dektak": dektak}  # formats that tell their units
+TOLD = {"x3p": x3p, "dektak": dektak}  # formats that tell their units
 WYKO = b"Wyko ASCII"  # first words of heights in wavelengths, which SurfaceTopography reads
 
 

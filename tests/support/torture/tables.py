@@ -125,7 +125,7 @@ def answered(trial: Trial, bad: bool, *words) -> None:
 
 def instruments(trial: Trial) -> None:
     """Traces and scans as instruments and programs write them, with wounded bytes."""
-    kind = trial.draw("npy", "mat", "sdf", "x3p", "dektak", "npz", "matrix")
+    kind = trial.draw("npy", "mat", "x3p", "dektak", "npz", "matrix")
     x, z = np.arange(40.0), trial.r.normal(size=40)
     file = io.BytesIO()
     if kind == "npy":
@@ -138,13 +138,6 @@ def instruments(trial: Trial) -> None:
         np.savez(file, x=x, z=z)
     elif kind == "x3p":
         _x3p(file, z)
-    elif kind == "sdf":
-        head = {"ManufacID": "x", "NumPoints": 20, "NumProfiles": trial.draw(1, 2), "Xscale": 1e-6, "Yscale": 1e-6,
-                "Zscale": 1e-9, "Zresolution": -1, "Compression": 0, "DataType": 7, "CheckType": 0}
-        if trial.chance(0.5):
-            head[trial.draw(*head)] = trial.draw(0, -1, 10**9, 10**30, "nan", 1e308, 1e-320, "x", 2.5)
-        file.write(("aISO-1.0\n" + "".join(f"{k} = {v}\n" for k, v in head.items()) + "*\n"
-                    + " ".join(f"{int(1e4 * one)}" for one in z) + "\n*\n").encode())
     elif kind == "matrix":
         head = trial.draw("# Width: 8 um\n# Height: 5 um\n# Value units: um\n", "h = 5, w = 8\npixel size = 1 um\n",
                           "# Breite: 8,0 µm\n# Höhe: 5,0 µm\n# Einheiten: um\n", "")

@@ -167,10 +167,6 @@ def test_exact_units_that_are_given_overrule_the_header_and_it_is_told(tmp_path)
                           f"{path}: the header gives the heights in V, but um is used, as given by --units")
     named = read(tmp_path, f"Kanal A\tKanal B\n{PAIRS}", ("mm", "um"))
     assert named.notes == (f"{path}:1: columns 'Kanal A', 'Kanal B' are taken as x, z in this order",)
-    sdf = read(tmp_path, "aISO-1.0\nNumPoints = 3\nNumProfiles = 1\nXscale = 1e-6\nYscale = 1e-6\nZscale = 1e-9\n*\n"
-               "1 2 4\n*\n", ("mm", "um"))
-    assert sdf.notes == (f"{path}: the file states its own units; the units that you gave are ignored",)
-    assert sdf.x == pytest.approx(np.arange(3) * 1e-6)
 
 
 def test_exact_a_matrix_of_which_only_the_pixel_is_known(tmp_path):
