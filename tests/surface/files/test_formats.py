@@ -265,8 +265,8 @@ def test_exact_one_trace_of_any_format_and_no_scan(tmp_path):
     (tmp_path / "a.x3p").write_bytes(write.x3p_of(Z))
     with pytest.raises(PatchfemError, match="scan of 4 x 6 heights, but a single trace is needed; write one row of"):
         read_profile(tmp_path / "a.x3p")
-    (tmp_path / "a.zip").write_bytes(write.zipped({"one/a.csv": b"x [um],z [um]\n0,1\n1,2\n2,4\n"}))
-    assert read_profile(tmp_path / "a.zip").z == pytest.approx([1e-6, 2e-6, 4e-6], rel=1e-15)
+    (tmp_path / "a.zip").write_bytes(write.zipped({"one/a.csv": b"x [um],z [nm]\n0,1\n1,2\n2,4\n"}))
+    assert read_profile(tmp_path / "a.zip").z == pytest.approx([1e-9, 2e-9, 4e-9], rel=1e-15)
 
 
 @pytest.mark.skipif("PATCHFEM_TOPOGRAPHY_PYTHON" not in os.environ,
