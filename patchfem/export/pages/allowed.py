@@ -21,7 +21,7 @@ import numpy as np
 from ...scales import LADDERS, plain, step_of
 from ..written import NUMBER, bare, label
 from . import document
-from .changes import lines_of, shown_of
+from .key_lines import lines_of, shown_of
 from .words import linked, short, zero_below
 
 WITHIN = 0.05  # of its value in the first case, in which a measure is said to stay
@@ -292,25 +292,6 @@ def sentence(limits: Limits) -> str:
         parts.append(f"the stiffness of the patch changes by {100 * WITHIN:g} % {' and '.join(stiff)}")
     where = "" if moving or not parts else f"As {limits.key['name']} grows, "
     return f"{where}{'; '.join(parts)}." if parts else ""
-
-
-def passed(limits: Limits) -> str:
-    """Which of the largest pressure and the stiffness are beyond their limit in the second case already, so that the
-    cases do not show how far the key may go, as one sentence; "" where none is."""
-    if limits.key is None:
-        return ""
-    found = [one for one in limits.found if one.beyond is not None and not one.resolved()]
-    found = sorted((one for one in found if one.name in ("pressure_peak", *STIFF)),
-                   key=lambda one: (one.beyond, one.name in STIFF))
-    size, said = np.asarray(limits.key["values"], float), {}
-    for one in found:
-        by = "more than doubled" if one.change >= 1 else \
-            f"{'risen' if one.change > 0 else 'fallen'} by more than {100 * WITHIN:g} %"
-        said.setdefault(_at(limits, one, float(size[one.beyond])), {}).setdefault(by, []).append(label(one.name))
-    places = [f"at {place} " + " and ".join(f"the {' and the '.join(names)} ha{'s' if len(names) == 1 else 've'} {by}"
-                                            for by, names in told.items()) for place, told in said.items()]
-    return f"As {limits.key['name']} grows, already {'; '.join(places)}; smaller values would show these limits." \
-        if places else ""
 
 
 def _moving(limits: Limits) -> str:

@@ -1,15 +1,14 @@
 """Where a swept frequency has its peak: its place, height and half-power width for each value of the other keys."""
 
-from collections.abc import Callable
 from html import escape
 from typing import NamedTuple
 
 import numpy as np
 
-from ...scales import plain, short, told
+from ...scales import plain, told
 from ..written import label
 from . import document
-from .changes import lines_of, shown_of, varies
+from .key_lines import lines_of, shown_of, varies
 from .words import linked, zero_below
 
 KEYS = ("drive.frequency",)
@@ -17,7 +16,6 @@ HEIGHTS = ("relative_displacement_amplitude", "absolute_acceleration_peak")
 LEAST = 5  # frequencies that show a peak
 SURE = 3.0  # times what polynomials differ by
 NEWTON = 30  # steps from a vertex, or a straight line's crossing
-NAMED = 4  # values of another key in the sentence
 OPEN = "not resolved by these cases"
 KNOWN = 0.01  # of a steady estimate, up to which it tells the height of a peak
 
@@ -140,55 +138,6 @@ def sentence(peaks: list) -> str:
     return "; ".join(said for said in (_known(known).rstrip("." if lost else ""), _lost(lost, bool(known))) if said)
 
 
-def edge(keys: list, measures: dict, trusted: dict, grid: bool) -> str:
-    """That the largest value of all cases, or of those with some values of the other keys, stands at an end of the
-    swept frequencies, so that it may be larger beyond; "" where none does. Arguments as of `allowed.allowed`."""
-    key = next((one for one in keys if one["name"] in KEYS and not one["words"]), None)
-    name = next((one for one in HEIGHTS if one in measures), None)
-    if key is None or name is None or (len(keys) > 1 and not grid):
-        return ""
-    height, others = _heights(name, measures, trusted)[0], [one for one in keys if one is not key and varies(one)]
-    tops = [top for line in lines_of(key, others)
-            if (top := _end(line, height, np.asarray(key["values"], float), zero_below(name))) is not None]
-    if not tops:
-        return ""
-    best = max(tops, key=lambda top: height[top])
-    if height[best] < np.nanmax(height):
-        return (f"With {_levels(others, tops)} the largest {label(name)} lies at the edge of the swept frequencies; it "
-                "may be larger outside this range.")
-    place, rest = ", ".join(f"{one['name']} {_level(one)(best)}" for one in keys if varies(one)), \
-        [top for top in tops if top != best]
-    more = f"; with {_levels(others, rest)} the largest value lies at the edge too" if rest else ""
-    return (f"The largest {label(name)}, {short(height[best], measures[name][2], 4)}, lies at {place}, at the edge of "
-            f"the swept frequencies; it may be larger outside this range{more}.")
-
-
-def _end(line: np.ndarray, height: np.ndarray, frequency: np.ndarray, zero: float) -> int | None:
-    """The case of a line that has its largest value where that is at an end of its frequencies, else None."""
-    line = line[np.isfinite(height[line])]
-    if line.size < LEAST or not height[line].max() > zero:
-        return None
-    top = int(line[np.argmax(height[line])])
-    flat = height[line].min() > (1 - KNOWN) * height[top]
-    return None if flat or frequency[top] not in (frequency.min(), frequency.max()) else top
-
-
-def _level(key: dict) -> Callable:
-    """A function from a case to the value of a key in it, as people read it."""
-    return key["texts"].__getitem__ if key["words"] else shown_of(key)
-
-
-def _levels(others: list, cases: list) -> str:
-    """What the other keys are in some cases: of one key its values, of more keys the first combination."""
-    if len(others) == 1:
-        shown = [_level(others[0])(case) for case in cases]
-        told = shown if len(shown) <= NAMED else [*shown[:NAMED - 1], f"{len(shown) - NAMED + 1} other values"]
-        *first, last = told
-        return f"{others[0]['name']} {', '.join(first)}{' and ' * bool(first)}{last}"
-    more = f" and {len(cases) - 1} other combination{'s' * (len(cases) > 2)}" if len(cases) > 1 else ""
-    return ", ".join(f"{one['name']} {_level(one)(cases[0])}" for one in others) + more
-
-
 def _lost(peaks: list, others: bool) -> str:
     """For which lines the peak is not known; others: whether it is for some."""
     if not peaks:
@@ -207,25 +156,8 @@ def _known(peaks: list) -> str:
     head = f"{label(first.name).capitalize()} peaks at {_at(first)}"
     if len(peaks) == 1:
         return f"{head}, {_high(first)}{_width(first)}."
-    trend = _trend(len(peaks), np.array([one.frequency for one in peaks]), np.array([one.height for one in peaks]))
     return (f"{head} with {first.held} ({_high(first)}{_width(first)}) and at {_at(last)} with {last.held} "
-            f"({_high(last)}{_width(last)}){trend}.")
-
-
-def _trend(count: int, frequency: np.ndarray, height: np.ndarray) -> str:
-    """How frequency and height, each (count, 2) with errors, go from peak to peak, as words behind those of the first
-    and the last; "" where they turn or move by less than their errors, and of fewer than three peaks."""
-    ways = [f"{name} {way}" for name, of in (("the peak frequency", frequency), ("the height", height))
-            if (way := _way(*of.T))]
-    return f"; over these {count} values {' and '.join(ways)} from each value to the next" * (count > 2 and bool(ways))
-
-
-def _way(value: np.ndarray, error: np.ndarray) -> str:
-    """Whether a sequence "grows" or "falls" throughout, by more than its errors in all; "" where it turns."""
-    step = np.diff(value)
-    if abs(value[-1] - value[0]) <= error[0] + error[-1]:
-        return ""
-    return "grows" if (step > 0).all() else "falls" if (step < 0).all() else ""
+            f"({_high(last)}{_width(last)}).")
 
 
 def _at(one: Peak) -> str:
@@ -240,30 +172,6 @@ def _width(one: Peak) -> str:
     if np.isfinite(one.width[0]):
         return f", half-power width {told(*one.width, unit='Hz')}"
     return f", half-power width {OPEN}" if one.open else ""
-
-
-def over(keys: list, measures: dict, trusted: dict, shown: dict) -> str:
-    """The peak frequency of curves of steady motions at both ends of the one key of numbers that is swept, and from
-    where to where a curve has no peak because nothing moves; "" without such curves.
-
-    keys, measures, trusted: as of `allowed.allowed`; shown: {name: `shown_of` the key}.
-    """
-    swept, name = [one for one in keys if varies(one)], "peak_frequency"
-    if len(swept) != 1 or swept[0]["name"] not in shown or name not in measures:
-        return ""
-    order = np.argsort(np.asarray(swept[0]["values"], float), kind="stable")
-    (value, error, unit), height = measures[name], measures[HEIGHTS[0]]
-    known = [int(case) for case in order if np.isfinite(value[case]) and trusted[name][case]]
-    if len(known) < 2:
-        return ""
-    key, at = swept[0]["name"], shown[swept[0]["name"]]
-    first, last = (f"{told(value[case], error[case], unit=unit)} with {key} {at(case)} "
-                   f"({short(height[0][case], height[2], 4)})" for case in (known[0], known[-1]))
-    still = [int(case) for case in order if height[0][case] == 0 and not np.isfinite(value[case])]
-    ends = [at(case) for case in (still[:1] + still[-1:] if len(still) > 1 else still)]
-    lost = f"; with {key} {' to '.join(ends)} the output does not move, so there is no peak" if still else ""
-    trend = _trend(len(known), *(np.transpose([of[0], np.nan_to_num(of[1])])[known] for of in ((value, error), height)))
-    return f"{label(HEIGHTS[0]).capitalize()} peaks at {first} and at {last}{trend}{lost}."
 
 
 def table(peaks: list) -> str:

@@ -9,7 +9,7 @@ from ...core import Outcome
 from ...scales import fitting, plain
 from ..written import NUMBER, label
 from . import document
-from .changes import shown_of, varies
+from .key_lines import shown_of, varies
 from .words import both, is_share, joined, linked, short
 
 RANKED = ("relative_displacement_amplitude", "loop_area", "equivalent_damping", "absolute_acceleration_peak",

@@ -60,12 +60,11 @@ def columns_of(cases: Cases) -> list:
 
 
 def _shared(held: dict, columns: list) -> dict:
-    """The tolerance of the cases, the size of their patch, the ends [Hz] of their curves over frequency and the level
-    [m s-2] above which they run away, from what all have in common and what is swept."""
+    """The tolerance of the cases, the size of their patch and the ends [Hz] of their curves over frequency, from what
+    all have in common and what is swept."""
     swept = {one["name"]: one["values"] for one in columns}
     return {"tolerance": held.get("tolerance", swept.get("accuracy.tolerance", np.nan)),
             "ends": tuple(held.get(f"drive_{end}", swept.get(f"drive.{end}", np.nan)) for end in ("from", "to")),
-            "knee": held.get("knee", np.nan),
             "patch": {name: float(held[f"patch_{name}"]) for name in ("length", "width") if f"patch_{name}" in held}}
 
 
@@ -169,7 +168,7 @@ def _table(folder: Path, rows: list, keys: list, file) -> dict:
     words = json.loads(str(file.attrs.get("words", "[]"))) or AGAIN
     overs = words if "case" in file.dimensions else [
         word for one in columns for word in ("--over", f"{one['name']}={','.join(dict.fromkeys(one['texts']))}")]
-    held = {name: float(file.attrs[name]) for name in (*FACTS, "knee") if name in file.attrs}
+    held = {name: float(file.attrs[name]) for name in FACTS if name in file.attrs}
     title = tomllib.loads(text).get("title") or folder.resolve().name
     wanted(isinstance(title, str) and all(isinstance(one, list | tuple) for one in (sets, words)),
            "sweep.nc: the scene, the --set or the cases stored in this file cannot be read")

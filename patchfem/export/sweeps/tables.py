@@ -20,7 +20,6 @@ from ...response import rows
 from ...runs.many.answers import Answers
 from ...runs.results.patch_rows import TABLE as STATIC
 from ...runs.results.result import meaning
-from ...runs.rig.plan import run_away
 from ...scene.keys import types
 from ...scene.reader import owner_of
 from .. import netcdf
@@ -102,8 +101,10 @@ def contents(asked: Asked, cases: Cases, found: Answers, keys: Sequence[str] = (
 
 
 def facts(asked: Asked, cases: Cases) -> dict:
-    """`tolerance` of all cases, `patch_length`, `patch_width` [m], the ends `drive_from`, `drive_to` [Hz] of the swept
-    frequencies and `knee`, as far as they are known and not swept."""
+    """Collect the FACTS that all cases share and that are not swept.
+
+    These are the tolerance, the size of the patch [m] and the ends of the swept frequencies [Hz].
+    """
     for number in range(min(len(cases), TRIED)):
         try:
             tables = tomllib.loads(asked.scene(cases.sets(number)).resolved())
@@ -113,21 +114,8 @@ def facts(asked: Asked, cases: Cases) -> dict:
     else:
         return {}
     swept = {axis.key for axis in cases.axes}
-    held = {name: float(str(tables[table][key]).partition(" ")[0]) for name, (table, key) in FACTS.items()
+    return {name: float(str(tables[table][key]).partition(" ")[0]) for name, (table, key) in FACTS.items()
             if key in tables.get(table, {}) and f"{table}.{key}" not in swept}
-    return held | _knee(asked, cases, number)
-
-
-def _knee(asked: Asked, cases: Cases, number: int) -> dict:
-    """{`knee`: acceleration of the base [m s-2] above which friction alone does not limit the amplitude}, where it is
-    the one key that is swept; {} of other sweeps, and where this is not known of the case of a number."""
-    if [axis.key for axis in cases.axes] != ["drive.acceleration"]:
-        return {}
-    try:
-        found = run_away(asked.model(cases.sets(number)))
-    except PatchfemError:  # this case has no answer
-        return {}
-    return {"knee": found["knee"]} if found else {}
 
 
 def _numbers(values: Sequence) -> np.ndarray:

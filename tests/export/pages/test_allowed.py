@@ -6,14 +6,18 @@ from math import log
 import numpy as np
 import pytest
 from page_data import own_part
-from test_changes import TILT, key
 
-from patchfem.export.pages.allowed import _change, allowed, as_json, passed, sentence
+from patchfem.export.pages.allowed import _change, allowed, as_json, sentence
 from patchfem.export.pages.lead import lead_of
 from patchfem.export.pages.sweep import page
 from patchfem.export.sweeps.answer import answer_of
 
-TILT = np.array(TILT)
+TILT = np.array([0.05, 0.1, 0.2, 0.5, 1.0])
+
+
+def key(values=TILT, name="contact.tilt.angle", unit="mrad", words=False) -> dict:
+    return {"name": name, "values": np.array(values, float), "texts": [f"{one:g} {unit}" for one in values],
+            "words": words}
 
 
 def limits(measures: dict, errors=0.0, tilt=TILT, factors=False, trusted=None, **more):
@@ -77,19 +81,6 @@ def test_always_a_limit_of_a_curve_that_flattens_is_on_the_safe_side(tilt):
     found = limits({"loop_area": 1 - 0.06 * (1 - np.exp(-np.array(tilt) / 0.1))}, tilt=np.array(tilt))
     assert as_json(found)[0]["low"] < 0.1792e-3 < as_json(found)[0]["high"]
     assert 0.14 < float(sentence(found).split()[3]) < 0.1792 and 0.14e-3 < found.found[0].value < 0.1792e-3
-
-
-def test_exact_what_has_passed_its_limit_in_the_second_case_is_named():
-    """The peak of the tilted pieces grew 15.6 times and the stiffness fell by 81 %, and neither was told."""
-    lines = {"pressure_peak": [1, 5.5, 9, 15.6], "normal_stiffness": [1, 0.43, 0.29, 0.19],
-             "tangential_stiffness": [1, 0.98, 0.9, 0.8]}
-    found = limits(lines, tilt=np.array([0, 0.05, 0.1, 0.2]))
-    assert passed(found) == ("As contact.tilt.angle grows, already at 0.05 mrad the pressure peak has more than "
-                             "doubled and the normal stiffness has fallen by more than 5 %; smaller values would show "
-                             "these limits.")
-    told = {one["measure"]: (one["low"], one["value"], one["high"]) for one in as_json(found)}
-    assert told["pressure_peak"] == pytest.approx((0, 0, 5e-5)) and told["normal_stiffness"] == told["pressure_peak"]
-    assert passed(limits({"pressure_peak": [1, 1.1, 1.2, 1.3, 5]})) == passed(allowed([], {}, {})) == ""
 
 
 def test_exact_the_gap_is_that_of_the_angle_as_it_is_written():

@@ -11,7 +11,7 @@ from page_data import data_of, own_part, unheard
 from patchfem.export.pages import drawn, library
 from patchfem.export.pages.document import DIGITS, Section, document, encoded, figure
 from patchfem.export.pages.document import table as sheet
-from patchfem.export.pages.lead import lead_of, span
+from patchfem.export.pages.lead import span
 from patchfem.export.pages.sweep import brief, page
 from patchfem.export.sweeps.page import joined, wide
 
@@ -325,55 +325,6 @@ def test_exact_round_off_is_zero_in_the_span_and_known_absolutely():
     loop = np.array([4.2e-21, -1.4e-19, 3.7e-2]), np.array([1e-11, 1e-11, 7.4e-5]), "J"
     text = span({"loop_area": loop}, {"loop_area": np.ones(3, bool)}, np.ones(3, bool))
     assert text == "Loop area ranges from 0 to 37 mJ, with errors of at most 0.2 %."
-
-
-def swept(heights, known=1e-9, beside=()) -> str:
-    """What is told of the least amplitude over a load of 1 N to 1 kN, and a width [mm] that changes beside it."""
-    load = np.geomspace(1, 1000, len(heights))
-    keys = [{"name": "normal.load", "unit": "N", "values": load, "log": True,
-             "texts": [f"{one:.0f} N" for one in load]}]
-    keys += [{"name": "normal.width", "unit": "m", "values": np.array(beside) / 1e3, "log": False,
-              "texts": [f"{one} mm" for one in beside]}] if len(beside) else []
-    columns = {"relative_displacement_amplitude": ("m", heights),
-               "peak_frequency": ("Hz", np.linspace(300, 400, load.size))}
-    measures = {name: {"unit": unit, "means": "", "values": np.asarray(values), "floors": np.zeros(load.size),
-                       "errors": known * np.ones(load.size) * values} for name, (unit, values) in columns.items()}
-    return lead_of({"keys": keys, "measures": measures, "outcome": ["steady"] * load.size, "tolerance": 1e-2,
-                    "grid": not len(beside)}).least
-
-
-def test_exact_two_columns_that_change_together_have_a_least_and_others_have_none():
-    heights = np.array([9, 5, 1, 2, 3, 4, 4]) * 1e-6
-    assert swept(heights, beside=[1, 2, 3, 4, 5, 6, 7]) == \
-        "Relative displacement amplitude is least at normal.load 10 N, normal.width 3 mm: 1 um, at its peak " \
-        "frequency of 333.3 Hz (neighbouring cases: 3 N with 2 mm and 32 N with 4 mm)."
-    assert "normal.width 5 mm: 1 um" in swept(heights, beside=[7, 6, 5, 4, 3, 2, 1])
-    assert swept(heights, beside=[1, 2, 3, 3, 5, 6, 7]) == swept(heights, beside=[1, 9, 3, 4, 5, 6, 7]) == ""
-
-
-def test_exact_a_case_that_is_not_known_may_stand_beside_the_least_where_it_cannot_lie_below():
-    heights = np.array([9, 5, 1, 2, 3, 4, 4]) * 1e-6
-    wide = np.full(7, 1e-9)
-    wide[4] = 0.5
-    assert "is least at normal.load 10 N" in swept(heights, wide)
-    wide[4] = 0.7
-    assert swept(heights, wide) == ""
-
-
-def test_exact_the_load_that_lets_a_blade_move_least():
-    assert swept(np.array([9, 5, 1, 2, 3, 4, 4]) * 1e-6) == \
-        "Relative displacement amplitude is least at normal.load 10 N: 1 um, at its peak frequency of 333.3 Hz " \
-        "(neighbouring cases: 3 N and 32 N)."
-    for ends in ([1, 2, 3, 4, 5, 6, 7], [7, 6, 5, 4, 3, 2, 1], [1.04, 1, 2, 3, 4, 5, 6], [2, 1, 2, 2]):
-        assert swept(np.array(ends) * 1e-6) == ""
-    assert swept(np.array([9, 5, 1, 2, 3, 4, 4]) * 1e-6, known=0.1) == ""
-
-
-def test_exact_a_motion_that_is_0_from_a_case_on_says_from_where():
-    """"is least at friction.static 0.3051: 0" stood there, though all later cases had 0 too."""
-    assert swept(np.array([9, 5, 1, 0, 0, 0, 0]) * 1e-6) == \
-        "Relative displacement amplitude is 0 from normal.load 32 N on (not yet at 10 N)."
-    assert swept(np.array([9, 5, 0, 0, 1, 2, 3]) * 1e-6) == swept(np.zeros(7)) == swept(np.eye(7)[6]) == ""
 
 
 def test_always_a_browser_that_cannot_unpack_says_so(chromium, table):
