@@ -69,6 +69,7 @@ from . import __version__
 from .commands import compare, lab, look, profile, run, scene, start, study, sweep
 from .commands.shared import Ended, Refused, say
 from .commands.streams import plain, ready
+from .scales import tidied
 
 # group -> verb -> (the module of its function, loaded where the verb is asked for; what it does; words of an example)
 SCREEN = {
@@ -94,6 +95,10 @@ SCREEN = {
               "cite": (start, "BibTeX of a scene's sources", "joint.toml")}}
 VERBS = {verb: row[0] for verbs in SCREEN.values() for verb, row in verbs.items()}
 
+REMOVED_OPTIONS = {  # (verb, option): what to do in its place
+    ("report", "--measured"): "convert the file with `patchfem import FILE -o table.csv` and plot table.csv together "
+                              "with result.nc of the run in a plotting program"}
+
 OUT_OF_MEMORY = ("out of memory; if a key of the scene sets the size of the largest part of the "
                  "memory, `patchfem plan` names this part and the key")
 
@@ -118,6 +123,15 @@ def _unexpected(verb: str, left: list) -> str:
         return f"unexpected '{' '.join(left)}'; see `patchfem {verb} --help`"
     near, what = get_close_matches(verb, VERBS, 1), "option" if verb.startswith("-") else "verb"
     return f"unknown {what} '{verb}'; {f'did you mean `{near[0]}`? ' if near else ''}see `patchfem --help`"
+
+
+def _removed_option(words: list) -> str:
+    """State what replaces the first option among the words that was removed; "" without such an option."""
+    for word in words[1:]:
+        option = word.partition("=")[0]
+        if (words[0], option) in REMOVED_OPTIONS:
+            return f"{words[0]} {option} was removed in version 1.0; {REMOVED_OPTIONS[words[0], option]}"
+    return ""
 
 
 def known(words: list) -> None:
@@ -189,6 +203,8 @@ def _guarded(words: list, before=lambda: None) -> int:
         if words in ([], ["--help"], ["-h"]):
             print(first_screen(), flush=True)
             return 0
+        if removed := _removed_option(words):
+            raise Refused(removed)
         known(words)
         try:
             app(words, exit_on_error=False, print_error=False)
@@ -229,11 +245,11 @@ def _guarded(words: list, before=lambda: None) -> int:
             return 4
         if hasattr(error, "mistakes"):  # SceneError, which is not named: words are read 20 ms faster before pydantic is
             for line in error.mistakes:
-                say(plain(line))
+                say(plain(tidied(line)))
             return 2
         code = getattr(error, "code", None)
         if isinstance(code, int) and type(error).__module__.startswith("patchfem"):
-            say(plain(str(error)))
+            say(plain(tidied(str(error))))
             return code
         said = " ".join(f"{type(error).__name__}: {error}".split())
         say(plain(f"patchfem: internal fault{_place_of_fault(error)}: {said}"))

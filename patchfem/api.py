@@ -371,16 +371,14 @@ def profile(*files: str | Path, cutoff: float | str | None = None, window: Itera
     return {"profiles": [roughness.data_of(one) for one in reports], "means": roughness.means_data(reports)}
 
 
-def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None = None, *,
-           measured: str | Path | None = None) -> Path:
+def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None = None) -> Path:
     """Put the results folders of a list side by side on one page and return the path of the page. For a single sweep,
     rebuild the page of the sweep.
 
-    out: the page, default report.html. measured: laboratory file to draw over the pictures. Raises PatchfemError for an
-    empty list and for folders that cannot be compared.
+    out: the page, default report.html. Raises PatchfemError for an empty list and for folders that cannot be compared.
     """
-    return Path(page_of_several.report_of(_paths(folders, "report"), None if out is None else _path(
-        out, "report: out"), None if measured is None else _path(measured, "report: measured")))
+    target = None if out is None else _path(out, "report: out")
+    return Path(page_of_several.report_of(_paths(folders, "report"), target))
 
 
 def export(folder: str | Path, out: str | Path, /, *, frame: int | None = None, histories: bool = False,

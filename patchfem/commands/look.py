@@ -51,13 +51,10 @@ def view(folder: Path, /, *, out: out_in("file to write instead of opening a win
         print(told)
 
 
-def report(*folders: Path, out: out_in("page to write; default: report.html in the current folder") = None,
-           measured: Annotated[Path | None, Parameter(help="measured data to plot in the same charts as the runs: a "
-                                                           "laboratory file, or "
-                                                           "a table written by `import`")] = None):
+def report(*folders: Path, out: out_in("page to write; default: report.html in the current folder") = None):
     """Show the results folders of several runs, or of several sweeps over the same keys, side by side on one page. For
     a single sweep, rebuild its page.
 
-    Example: patchfem report out/rig out/six --measured loop.csv -o both.html
+    Example: patchfem report out/rig out/six -o both.html
     """
-    print(reports.report_of(list(folders), out, measured))
+    print(reports.report_of(list(folders), out))

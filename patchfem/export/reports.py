@@ -4,20 +4,18 @@ from pathlib import Path
 
 from ..core import PatchfemError
 from ..disk.whole import fault, write_text
-from ..inputs import laboratory, records
 from .pages import beside, sweep
 from .sweeps import page as sweeps
 
 PAGE = "report.html"
 
 
-def report_of(folders: list, out: Path | None = None, measured: Path | None = None) -> Path:
+def report_of(folders: list, out: Path | None = None) -> Path:
     """Write the page of these results folders and return its path.
 
     Several runs, or several sweeps over the same keys, are laid side by side; for a single sweep, its page is rebuilt.
     out: the page; unless given, report.html in the folder of one sweep, else in this folder. PatchfemError for a folder
     that is neither a run nor a sweep, and for runs beside sweeps; Missing where the page cannot be written.
-    measured: a file of a laboratory, whose histories and loops are laid over those of the runs.
     """
     if not folders:
         raise PatchfemError("report: give at least one results folder")
@@ -27,21 +25,10 @@ def report_of(folders: list, out: Path | None = None, measured: Path | None = No
                             f"{folders[many.index(False)]} is not")
     out = out if out is not None else (folders[0] / PAGE if many[0] and len(folders) == 1 else Path(PAGE))
     if not many[0]:
-        runs = [beside.read(folder) for folder in folders]
-        return _written(beside.page(runs, None if measured is None else _read(measured, runs)), out)
-    if measured is not None:
-        raise PatchfemError(f"--measured {measured}: can be plotted only over runs, not over sweeps")
+        return _written(beside.page([beside.read(folder) for folder in folders]), out)
     tables = [sweeps.seen_from(sweeps.read_table(folder), folder, out) for folder in folders]
     names = beside.distinct([folder.resolve().name for folder in folders])
     return _written(sweep.page(tables[0] if len(tables) == 1 else sweeps.joined(tables, names)), out)
-
-
-def _read(path: Path, runs: list) -> beside.FinishedRun:
-    found = laboratory.read_records(path, records.wanted(())).values
-    if not found.keys() & beside.KNOWN.keys() - {"time"}:
-        raise PatchfemError(f"--measured {path}: the file contains none of {', '.join(beside.KNOWN)}, only "
-                            f"{', '.join(found)}")
-    return beside.measured(path.name, found, runs[0])
 
 
 def _written(text: str, out: Path) -> Path:

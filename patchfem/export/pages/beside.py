@@ -20,11 +20,6 @@ from .words import linked, meaning, pair
 
 TALL = 410  # pixels of a picture
 POINTS = 4000  # of one line in a picture
-KNOWN = {"time": "time", "displacement": "relative_displacement", "acceleration": "absolute_acceleration",
-         "force": "friction_force"}  # columns of a measurement that are shown
-UNITS = {"time": "s", "displacement": "m", "acceleration": "m s-2", "force": "N"}
-IN_PHASE = ("relative_displacement", "absolute_acceleration")
-MEASURED = "measured"
 MANY = 10.0  # times the first value, from which a change is told as a factor
 CYCLES = 2.0  # of the last motion that are shown: result.nc keeps so many whole
 CHARTS = (  # title, x: (variable, label), y: (variable, label); only the last cycles of what stands on time
@@ -78,48 +73,10 @@ def _arrays(path: Path) -> dict:
     return out
 
 
-def measured(name: str, values: dict, like: FinishedRun) -> FinishedRun:
-    """A measurement as a FinishedRun without measures, shown beside runs like `like`.
-
-    values: name -> (k,) in SI as `inputs.laboratory` reads them: time, displacement, acceleration, force. Where both
-    move under a sine its time is shifted until the first harmonics of both displacements, or accelerations, agree in
-    phase.
-    """
-    arrays = {KNOWN[key]: (np.asarray(rows, float), UNITS[key]) for key, rows in values.items() if key in KNOWN}
-    one = FinishedRun(name, {"kind": like.summary["kind"], "measures": {}, "outcome": MEASURED}, like.resolved, arrays)
-    if "time" in arrays:
-        end = like.arrays["time"][0][-1] if "time" in like.arrays else arrays["time"][0][-1]
-        one.arrays["time"] = (arrays["time"][0] + _lag(one, like) - end, "s")  # 0 is the end of the run
-    return one
-
-
-def _lag(one: FinishedRun, like: FinishedRun) -> float:
-    """Time [s] that a measurement is shifted by: its end to that of the run, then on to the same phase."""
-    shift = like.arrays["time"][0][-1] - one.arrays["time"][0][-1] if "time" in like.arrays else 0.0
-    period = period_of(like)
-    both = next((key for key in IN_PHASE if key in one.arrays and key in like.arrays), None)
-    if period is None or both is None or like.summary["kind"] == "bench":
-        return shift
-    turns = []
-    for run, more in ((one, shift), (like, 0.0)):
-        late = _late(run)
-        angle = 2 * np.pi * (run.arrays["time"][0][late] + more) / period
-        parts = np.linalg.lstsq(np.stack([np.cos(angle), np.sin(angle), np.ones(angle.size)], axis=1),
-                                run.arrays[both][0][late], rcond=None)[0]
-        turns.append(math.atan2(parts[0], parts[1]) / (2 * np.pi))
-    return shift + ((turns[0] - turns[1] + 0.5) % 1.0 - 0.5) * period
-
-
-def page(runs: list, read: FinishedRun | None = None) -> str:
-    """The whole HTML page of several `FinishedRun`s, in their order; differences are from the first.
-
-    read: a measurement, of `measured`, laid over their pictures.
-    """
+def page(runs: list) -> str:
+    """Make the whole HTML page of several `FinishedRun`s, in their order; differences are from the first."""
     names = distinct([run.name for run in runs])
-    told, shown = (names, runs) if read is None else ([f"measured: {read.name}", *names], [read, *runs])
-    charts = [one for one in (_chart(number, *chart, shown, told) for number, chart in enumerate(CHARTS)) if one]
-    if read is not None:
-        charts = [_over(one) for one in charts if any(mark["name"] in names for mark in one["marks"])]
+    charts = [one for one in (_chart(number, *chart, runs, names) for number, chart in enumerate(CHARTS)) if one]
     outcomes = "; ".join(f"{escape(name)}: {escape(run.summary['outcome'])}" for name, run in zip(names, runs))
     sections = [Section("scenes", "What differs in the scenes", _differences(runs, names)),
                 Section("measures", "Measures side by side", _measures(runs, names))]
@@ -132,15 +89,6 @@ def page(runs: list, read: FinishedRun | None = None) -> str:
     title = " and ".join(names) if len(names) < 4 else f"{len(names)} runs side by side"
     return document(title, f"<p class=verdict>{outcomes}.</p>", sections, {"charts": charts} if charts else None,
                     ("figures.js", "curves.js") if charts else ())
-
-
-def _over(chart: dict) -> dict:
-    """A chart whose first line, where it is the measured one, lies broad and grey under the others."""
-    first, *rest = chart["marks"]
-    if not first["name"].startswith("measured: "):
-        return chart
-    marks = [mark | {"colour": colour} for mark, colour in zip(rest, COLOURS * len(rest))]
-    return chart | {"marks": [first | {"colour": "soft", "width": 3, "alpha": 0.55}, *marks]}
 
 
 def distinct(names: list) -> list:
@@ -160,7 +108,7 @@ def _chart(number: int, title: str, x: tuple, y: tuple, runs: list, names: list)
         if "time" in run.arrays and run.arrays["time"][0].shape == a.shape:
             late = _late(run)
             a, b = a[late], b[late]
-            a = a - a[-1] if x[0] == "time" and run.summary["outcome"] != MEASURED else a
+            a = a - a[-1] if x[0] == "time" else a
         step = -(-a.size // POINTS)
         lines.append((name, a[::step], b[::step]))
     if not lines:

@@ -5,12 +5,11 @@ import re
 import numpy as np
 import pytest
 from command_line import cli
-from page_data import charts_of, own_part
+from page_data import charts_of
 
 from patchfem.core import Measure, PatchfemError
 from patchfem.export.netcdf import of_run, write
-from patchfem.export.pages.beside import measured, page, read
-from patchfem.export.reports import report_of
+from patchfem.export.pages.beside import page, read
 from patchfem.export.summary import summary, write_json
 
 SCENE = """[normal]
@@ -105,46 +104,13 @@ def test_refuses_a_summary_of_another_shape(tmp_path, text, why):
         read(tmp_path)
 
 
-def test_exact_a_measurement_lies_over_the_runs_in_phase(tmp_path):
-    """The same motion, begun at another time with another clock: its line is that of the run."""
-    run = read(made(tmp_path / "a", 10.0, 2e-6, 0.0))
-    clock = np.linspace(0.0, 0.0731, 2001) + 5.0
-    motion = 3e-6 * np.sin(2 * np.pi * 100 * clock + 1.1)
-    seen = measured("<i>lab.csv", {"time": clock, "displacement": motion, "force": -9.0 * np.sign(motion)}, run)
-    text = page([run], seen)
-    assert "<i>lab" not in own_part(text) and "measured: &lt;i&gt;lab.csv" in text
-    found = charts_of(text)
-    over, own = found["Displacement", "displacement"]["marks"]
-    assert over["name"] == "measured: <i>lab.csv" and over["colour"] == "soft" and own["name"] == "a"
-    np.testing.assert_allclose(over["y"], 3 * np.sin(2 * np.pi * 0.1 * np.array(over["x"])), atol=1e-6)
-    assert -5.0 <= over["x"][-1] <= 5.0  # within half a cycle of the run's end
-    loop, _ = found["Friction loop", "friction force"]["marks"]
-    assert max(loop["y"]) == pytest.approx(9.0) and max(loop["x"]) == pytest.approx(3.0, rel=1e-4)
-    assert "<td>measured" not in text  # it has no measures and is no column
-
-
-def test_refuses_a_measurement_beside_sweeps_or_without_a_channel(tmp_path):
+def test_exact_the_removed_option_measured_says_what_to_use(tmp_path):
     folder = made(tmp_path / "a", 10.0, 2e-6, 0.0)
-    (tmp_path / "table.csv").write_text("time [s],velocity [m/s]\n0,1\n1,2\n")
-    with pytest.raises(PatchfemError, match="contains none of time, displacement, acceleration, force, only"):
-        report_of([folder], tmp_path / "x.html", tmp_path / "table.csv")
-    (tmp_path / "sweep.csv").write_text("")
-    with pytest.raises(PatchfemError, match="plotted only over runs, not over sweeps"):
-        report_of([tmp_path], tmp_path / "x.html", tmp_path / "table.csv")
-
-
-def test_exact_an_imported_table_lies_over_the_runs(tmp_path):
-    """As the command line does it: a laboratory's table becomes one that `report` takes."""
-    folder = made(tmp_path / "a", 10.0, 2e-6, 0.0)
-    (tmp_path / "lab.csv").write_text("time [ms],displacement [um],force [lbf]\n" + "\n".join(
-        f"{k},{np.sin(k):.6f},{np.cos(k):.6f}" for k in range(40)))
-    answer = cli("import", tmp_path / "lab.csv", "-o", tmp_path / "table.csv")
-    assert answer.code == 0, answer.err
-    answer = cli("report", folder, "--measured", tmp_path / "table.csv", "-o", tmp_path / "p.html")
-    assert answer.code == 0, answer.err
-    loop = charts_of((tmp_path / "p.html").read_text("utf-8"))["Friction loop", "friction force"]["marks"][0]
-    assert loop["name"] == "measured: table.csv"
-    np.testing.assert_allclose(np.hypot(np.array(loop["y"]) / 4.4482216, loop["x"]), 1.0, atol=1e-5)
+    for words in (("--measured", "table.csv"), ("--measured=table.csv",)):
+        answer = cli("report", folder, *words, "-o", tmp_path / "p.html")
+        assert answer.code == 2 and not (tmp_path / "p.html").exists()
+        assert "report --measured was removed in version 1.0" in answer.err
+        assert "patchfem import" in answer.err
 
 
 def test_always_a_browser_draws_it(tmp_path, browser):
