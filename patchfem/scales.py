@@ -32,7 +32,7 @@ LADDERS = {  # from the smallest unit up: (name, what one SI unit is in it)
 }
 SPOKEN = {unit: unit for unit in LADDERS if "-" not in unit} | {"N/m": "N m-1"}  # units as sentences write them
 _UNITS = "|".join(sorted(SPOKEN, key=len, reverse=True))
-_POWER = re.compile(rf"(?<![\w.\"'-])(\d+\.?\d*e[-+]?\d+)(?![\w.])(?: ({_UNITS})(?![\w/^]))?")
+_POWER = re.compile(rf"(?<![\w./\"'-])(\d+\.?\d*e[-+]?\d+)(?![\w.])(?: ({_UNITS})(?![\w/^]))?")
 
 
 def step_of(ladder: tuple, size: float) -> tuple:

@@ -72,7 +72,7 @@ def test_exact_a_number_as_a_person_writes_it(value, error, least, unit, text):
     ("carries 1.1e+02 % of it", "carries 110 % of it"), ("created 3.02e-07 J per cycle", "created 302 nJ per cycle"),
     ("accuracy.tolerance = 1e-05 refines it", "accuracy.tolerance = 1e-5 refines it"), ("at 5e-06 m/s", "at 5e-6 m/s"),
     ("K of 4.25e+06 N/m, 2e-05 N m", "K of 4.25 N/um, 20 uN m"), ("run_1e-05.csv: 3e5", "run_1e-05.csv: 300000"),
-    ('set it to "1e-05 m"', 'set it to "1e-05 m"')])
+    ('set it to "1e-05 m"', 'set it to "1e-05 m"'), ("out/1e-05 and .1e-05", "out/1e-05 and .1e-05")])
 def test_exact_a_sentence_has_no_powers_of_ten_that_a_unit_saves(text, tidy):
     assert tidied(text) == tidy
 

@@ -115,7 +115,7 @@ def _print_plan(answer: dict, probe: bool, verbose: bool) -> None:
     for effect in answer["effects"]:
         print(f"  runs   {effect['effect']:<28} {effect['equations']}")
     for sentence in answer["verdict"]:
-        print(f"says     {sentence}")
+        print(f"says     {tidied(sentence)}")
     bonded = any(has(one["effect"].partition("law=")[2], "bonds") for one in answer["effects"])
     links = [f"{_link(name, bonded)} {link if isinstance(link, str) else short(link, 'N m-1', 4)}"
              for name, link in answer["stiffness_chain"].items()]

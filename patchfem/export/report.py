@@ -148,9 +148,10 @@ def _wear(data: dict) -> Picture | None:
     mean = depth.mean(axis=1) if depth.ndim == 3 else depth
     profiles = (states["time"] / data["wear"]["period"], states["normal_stress"], mean)
     return Picture(charts.wear, (data["x"], *profiles, history),
-                   f"Wear of the patch over {history['cycle'][-1]:.6g} cycles: pressure and worn depth of both "
-                   f"pieces together{', means over the width' if depth.ndim == 3 else ''}, and measures of patch and "
-                   "motion divided by their values on the unworn patch. All other pictures show the worn patch."
+                   f"Wear of the patch over {scales.plain(history['cycle'][-1], 4)} cycles: pressure and worn depth "
+                   f"of both pieces together{', means over the width' if depth.ndim == 3 else ''}, and measures of "
+                   "patch and motion divided by their values on the unworn patch. All other pictures show the worn "
+                   "patch."
                    f"{_edge_peaks(history)}")
 
 
@@ -159,7 +160,7 @@ def _edge_peaks(history: dict) -> str:
     above = np.asarray(history.get("pressure_peak_at_edge", ()))
     if not (above > 0).any():
         return ""
-    cycles = ", ".join(f"{one:.6g}" for one in np.asarray(history["cycle"])[above > 0])
+    cycles = ", ".join(scales.plain(one, 4) for one in np.asarray(history["cycle"])[above > 0])
     most = scales.short(float(above.max()), "Pa", 2)
     return (f" After {cycles} cycles the peak pressure is that of a node at the edge of the contact; it stands up to "
             f"{most} above all pressures farther inside and has an error of this size.")
@@ -169,7 +170,7 @@ def _worn_map(data: dict) -> Picture | None:
     if "wear" not in data or (depth := data["wear"]["states"]["worn_depth"][-1]).ndim < 2 or not depth.any():
         return None
     return Picture(charts.worn_map, (data["x"], data["width"], depth), "Worn depth of both pieces together after "
-                   f"{data['wear']['history']['cycle'][-1]:.6g} cycles, in every strip over the width.")
+                   f"{scales.plain(data['wear']['history']['cycle'][-1], 4)} cycles, in every strip over the width.")
 
 
 def _interface(data: dict) -> Picture | None:

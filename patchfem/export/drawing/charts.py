@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...core import G_N
-from ...scales import axis_unit, wide_scale
+from ...scales import axis_unit, plain, wide_scale
 
 LINE, FRAMES = 6000, 24  # points of a line, frames of the shear stress behind the largest one
 FAINT, FEWEST = 400, 200  # points of such a frame, and those that every line keeps
@@ -446,7 +446,7 @@ def wear(x, cycles, pressure, depth, history: dict) -> list:
     pick = np.unique(np.linspace(0, len(cycles) - 1, PROFILES).round().astype(int))
     for values, unit, title in ((pressure, "Pa", "Pressure"), (depth, "m", "Worn depth")):
         name, scale = axis_unit(values, unit)
-        lines = [line(x * size, values[k] * scale, colour, "new" if cycles[k] == 0 else f"{cycles[k]:.6g} cycles")
+        lines = [line(x * size, values[k] * scale, colour, "new" if cycles[k] == 0 else f"{plain(cycles[k], 4)} cycles")
                  for k, colour in zip(pick, ("soft", *COLOURS))]
         out.append(chart(title, axis("x", along), axis(title.lower(), name), lines))
     out[0]["y"]["range"] = [0.0, 1.05 * float(np.max(pressure)) * axis_unit(pressure, "Pa")[1]]

@@ -7,6 +7,7 @@ import numpy as np
 
 from ...core import Measure, Outcome, frozen_array, say
 from ...response.errors import convergence_errors, error_of_change
+from ...scales import plain
 from ..patch.measures import other_strips
 from ..patch.press import areas, pressed
 from ..patch.values import values
@@ -72,8 +73,8 @@ def _ended(model, found, gone: dict) -> list:
     if model.patch.strips is not None:
         place += f" of the strip at y = {say(float(found.patch.strips.offsets[strip]), 3)}"
     return [f"the coating of the {name} piece, {say(thickness)}, is worn through at {place} after "
-            f"{found.state.cycle:.6g} of {model.wear.cycles:.6g} cycles; the measures are those of the patch at that "
-            "cycle"]
+            f"{plain(found.state.cycle, 4)} of {plain(model.wear.cycles, 7)} cycles; the measures are those of the "
+            "patch at that cycle"]
 
 
 def jumped(model, found, measures: dict) -> dict:
