@@ -5,19 +5,26 @@ slide of the upper piece as a whole is taken out before the rest is magnified, a
 factor that shows a bent pad would throw the block aside by half its length.
 """
 
-from collections.abc import Iterator
+import logging
+import shutil
+import subprocess
 from dataclasses import dataclass, replace
+from importlib.util import find_spec
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 
-from ...core import PatchfemError
+from ...core import Missing, PatchfemError
 from ..fields.series import Frame, Series, moving
-from .flat import Picture
+from .flat import LOOK, Picture
 from .panels import near, panels, rounded, slide_of
-from .reels import write
 
-SIZE = (12.0, 6.8)  # inches; an even number of pixels, as video wants
+ENDINGS = (".gif", ".mp4")
+DPI = 100  # with SIZE an even number of pixels, as video wants
+BIT_RATE = 4000  # kbit/s
+
+SIZE = (12.0, 6.8)  # inches
 SLIDE = 0.03  # share of the length of the pieces that the largest slide takes
 LASTS = 2.4  # s that a cycle takes, as far as LEAST and MOST let it
 LEAST, MOST = 0.04, 0.3  # s that a frame takes
@@ -90,24 +97,86 @@ def _hull(windows: list) -> tuple:
     return (float(low[0]), float(high[1]), float(low[2]), float(high[3]))
 
 
-def images(series: Series, film: Film, head: str) -> Iterator:
-    """The picture (height, width, 3) uint8 of every frame of a film."""
-    picture = None
-    for number in film.numbers:
-        frame = series.frame(number)
-        text = f"{head}, {frame.time:.6g} s"
-        shown = film.panels(frame)
-        if picture is None:
-            picture = Picture(frame, text, shown, SIZE, film.reach)
-        else:
-            picture.show(frame, text, shown)
-        yield picture.pixels()
-
-
 def shoot(series: Series, head: str, magnify: float | None, out: Path) -> str:
-    """Write the film of a series as the ending of `out` says; one line on it. Missing without what writes it."""
-    film = film_of(series, magnify)
-    write(out, images(series, film, head), film.seconds)
+    """Write the film of a series in the format that the suffix of `out` names.
+
+    Parameters
+    ----------
+    series : Series
+    head : str
+        First line of the title of each frame.
+    magnify : float or None
+        Magnification of the motion; None for the largest that suits every frame.
+    out : Path
+        File with a suffix of `ENDINGS`.
+
+    Returns
+    -------
+    str
+        Number of frames and their times.
+
+    Raises
+    ------
+    PatchfemError
+        The series has a single frame.
+    Missing
+        ffmpeg is not installed or cannot write the file.
+    """
+    film, picture = film_of(series, magnify), None
+    writer = _writer_of(out, film.seconds)
+    with matplotlib.rc_context(LOOK | {"savefig.bbox": None, "savefig.dpi": "figure"}):
+        for number in film.numbers:
+            frame = series.frame(number)
+            text, shown = f"{head}, {frame.time:.6g} s", film.panels(frame)
+            if picture is None:
+                picture = Picture(frame, text, shown, SIZE, film.reach)
+                picture.freeze_layout(DPI)
+                writer.setup(picture.figure, str(out), dpi=DPI)
+            else:
+                picture.show(frame, text, shown)
+            try:
+                writer.grab_frame()
+            except BrokenPipeError:  # ffmpeg has ended early; `finish` states the reason
+                break
+        _finish(writer, out)
     first, last = series.times[list(film.numbers)][[0, -1]]
     return f"{len(film.numbers)} frames, {first:.6g} s to {last:.6g} s"
 
+
+def check_ffmpeg(out: Path) -> None:
+    """Raise Missing if `out` is an .mp4 file and no ffmpeg is installed."""
+    if out.suffix == ".mp4":
+        _ffmpeg(out)
+
+
+def _ffmpeg(out: Path) -> str:
+    """Return the path of the program ffmpeg, that of imageio-ffmpeg where there is no other."""
+    program = shutil.which("ffmpeg")
+    if program is None and find_spec("imageio_ffmpeg"):
+        from imageio_ffmpeg import get_ffmpeg_exe
+
+        program = get_ffmpeg_exe()
+    if program is None:
+        raise Missing(f"{out}: writing .mp4 needs ffmpeg, which is not installed; run pip install imageio-ffmpeg, or "
+                      "write .gif or .html")
+    return program
+
+
+def _writer_of(out: Path, seconds: float):
+    """Make the writer of matplotlib for a .gif or .mp4 file whose frames last so many seconds."""
+    from matplotlib import animation
+
+    if out.suffix == ".gif":
+        return animation.PillowWriter(fps=1 / seconds)
+    logging.getLogger(animation.__name__).setLevel(logging.ERROR)  # `_finish` states what ffmpeg prints
+    matplotlib.rcParams["animation.ffmpeg_path"] = _ffmpeg(out)
+    return animation.FFMpegWriter(fps=1 / seconds, codec="h264", bitrate=BIT_RATE)
+
+
+def _finish(writer, out: Path) -> None:
+    """Close the file; raise Missing with the last line of ffmpeg where it fails."""
+    try:
+        writer.finish()
+    except subprocess.CalledProcessError as error:
+        lines = (error.stderr or error.output or "").strip().splitlines() or [f"code {error.returncode}"]
+        raise Missing(f"{out}: ffmpeg could not write this file ({lines[-1]}); use .gif or .html") from None

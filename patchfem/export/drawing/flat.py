@@ -59,16 +59,11 @@ class Picture:
             line.set_ydata(values)
         self._head(head, shown)
 
-    def pixels(self) -> np.ndarray:
-        """The picture (height, width, 3) uint8 at 100 dots per inch; what the first one measures out stays so."""
-        from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-        with matplotlib.rc_context(LOOK):
-            canvas = FigureCanvasAgg(self.figure)
-            self.figure.set_dpi(100)
-            canvas.draw()
-            self.figure.set_layout_engine("none")
-            return np.array(canvas.buffer_rgba())[..., :3]
+    def freeze_layout(self, dpi: float) -> None:
+        """Lay the axes out at this resolution and keep them there in all later frames."""
+        self.figure.set_dpi(dpi)
+        self.figure.draw_without_rendering()
+        self.figure.set_layout_engine("none")
 
     def _head(self, head: str, shown: tuple) -> None:
         whole, close = self.bodies

@@ -15,7 +15,7 @@ from ...core import Missing, PatchfemError
 from ...disk.whole import whole
 from ...scales import axis_unit
 from ..fields.series import Frame, Series
-from . import film, flat, reels
+from . import film, flat
 from .panels import Panel, borders, curves, panels
 
 ENDINGS = (".png", ".svg", ".pdf")
@@ -41,11 +41,11 @@ def view(folder: Path, out: Path | None, frame: int | None = None, magnify: floa
     """
     if magnify is not None and not (np.isfinite(magnify) and magnify >= 0):
         raise PatchfemError(f"--magnify: {magnify} must be 0 or more")
-    if out is not None and Path(out).suffix in reels.ENDINGS:
+    if out is not None and Path(out).suffix in film.ENDINGS:
         _film(folder, Path(out), frame, magnify)
         return
     if out is not None and Path(out).suffix not in ENDINGS:
-        raise PatchfemError(f"{out}: pictures are written as {', '.join(ENDINGS)}, films as {', '.join(reels.ENDINGS)}"
+        raise PatchfemError(f"{out}: pictures are written as {', '.join(ENDINGS)}, films as {', '.join(film.ENDINGS)}"
                             " or .html")
     with Series(folder) as series:
         one = series.frame(-1 if frame is None else frame)
@@ -64,7 +64,7 @@ def view(folder: Path, out: Path | None, frame: int | None = None, magnify: floa
 def _film(folder: Path, out: Path, frame: int | None, magnify: float | None) -> None:
     if frame is not None:
         raise PatchfemError(f"--frame: {out.suffix} shows the whole last cycle; use a .png for one frame")
-    reels.ready(out)
+    film.check_ffmpeg(out)
     with Series(folder) as series:
         with whole(out) as partial:
             said = film.shoot(series, series.path.parent.resolve().name, magnify, partial)
