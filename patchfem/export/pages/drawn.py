@@ -1,11 +1,10 @@
-"""Which cases of a sweep its page draws: all where there is room for them, else a part of a grid that is a grid again,
-or evenly spread ones, each time with those at which something is largest or smallest."""
+"""Which cases of a sweep its page draws: all where there is room for them, else evenly spread cases and those at which
+a measure or a key is largest or smallest."""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from ..written import label
 from .document import encoded
 
 ROOM = 1_200_000  # bytes of what is drawn; packed, with its library, a page stays below 1.5 MB
@@ -20,9 +19,16 @@ class Drawn(NamedTuple):
     said: str = ""
 
 
-def drawn(table: dict, first: str | None, data) -> Drawn:
-    """What of a sweep is drawn; table: as `sweep.page` takes it; first: the measure of interest; data(cases, whole):
-    what the scripts would draw of some cases, with all their digits or not."""
+def drawn(table: dict, data) -> Drawn:
+    """Choose the cases of a sweep that its page draws.
+
+    Parameters
+    ----------
+    table : dict
+        As `sweep.page` takes it.
+    data : callable
+        data(cases, whole) returns what the scripts would draw of some cases, with all digits or not.
+    """
     number = len(table["outcome"])
     some = _evenly(number, LOOKED)
     if number * len(encoded(data(some, True))) <= ROOM * some.size:
@@ -30,7 +36,7 @@ def drawn(table: dict, first: str | None, data) -> Drawn:
     most = max(FEWEST, int(ROOM * some.size / len(encoded(data(some, False)))))
     if most >= number:
         return Drawn(np.arange(number))
-    return _of_grid(table, first, most) if table["grid"] else _of_rows(table, most)
+    return _of_rows(table, most)
 
 
 def _of_rows(table: dict, most: int) -> Drawn:
@@ -42,27 +48,6 @@ def _of_rows(table: dict, most: int) -> Drawn:
     return Drawn(cases, f"{cases.size} of {number} cases are drawn: evenly spaced cases, and the cases with the "
                         "largest or "
                         "smallest value of a measure or a key.")
-
-
-def _of_grid(table: dict, first: str | None, most: int) -> Drawn:
-    """Some values of each key, the ends among them and those at which the measure of interest has its ends; of keys cut
-    to one value the one at which it is largest."""
-    number, ends = len(table["outcome"]), _ends(table["measures"][first]["values"]) if first else []
-    along = [np.unique(np.asarray(one["values"], float), return_inverse=True) for one in table["keys"]]
-    counts = [values.size for values, _ in along]
-    while True:
-        chosen = [np.union1d(_evenly(values.size, count), place[ends]) if count > 1 else place[ends[-1:] or [0]]
-                  for count, (values, place) in zip(counts, along)]
-        if np.prod([float(one.size) for one in chosen]) <= most or max(counts) == 1:
-            break
-        largest = int(np.argmax(counts))
-        counts[largest] = int(counts[largest] * 0.95)
-    there = np.all([np.isin(place, some) for some, (_, place) in zip(chosen, along)], axis=0)
-    of = ", ".join(f"{some.size} of {values.size} values of {one['name']}" for one, some, (values, _) in
-                   zip(table["keys"], chosen, along) if some.size < values.size)
-    told = "" if not ends else f"; the case with the largest {label(first)} is among them" if not there[ends[0]] else \
-        f"; the cases with the largest and the smallest {label(first)} are among them"
-    return Drawn(np.flatnonzero(there), f"{int(there.sum())} of {number} cases are drawn: {of}{told}.")
 
 
 def _evenly(number: int, most: int) -> np.ndarray:

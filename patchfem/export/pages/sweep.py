@@ -35,7 +35,7 @@ def page(table: dict, told: Lead | None = None) -> str:
     """
     first = next((name for name in ranked.asked_first(FIRST, table) if name in table["measures"]
                   and np.isfinite(table["measures"][name]["values"]).any()), None)
-    told, part = told or lead_of(table), drawn(table, first, lambda cases, whole: _data(table, first, cases, whole))
+    told, part = told or lead_of(table), drawn(table, lambda cases, whole: _data(table, first, cases, whole))
     data = _data(table, first, part.cases, not part.said)
     sections = [Section("answers", "Results", _explorer(part.said, table["folders"]) if data["measures"] else
                         "<p>No case has a value to draw.</p>"),
@@ -61,7 +61,8 @@ def _data(table: dict, first: str | None, cases: np.ndarray, whole: bool) -> dic
         one |= {"values": digits(one["values"], SHORT), "errors": digits(one["errors"], BAR)}
     links = table["folders"]
     return {"keys": keys, "measures": measures, "outcome": [str(table["outcome"][i]) for i in cases.tolist()],
-            "settled": SETTLED, "grid": bool(table["grid"]), "first": first, "along": _along(keys), "whole": whole,
+            "settled": SETTLED, "grid": bool(table["grid"] and whole), "first": first, "along": _along(keys),
+            "whole": whole,
             "links": None if links is None else [links[i] for i in cases.tolist()]}
 
 
