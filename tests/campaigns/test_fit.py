@@ -442,7 +442,7 @@ def test_refuses_a_broken_loop_by_line(asked, text, says, tmp_path):
 
 
 @pytest.mark.parametrize("table, says", [
-    ("time [s],displacement [m]\n0,1e-6\n0.1,2e-6\n", "slide.csv:2: displacement starts at 1e-06"),
+    ("time [s],displacement [m]\n0,1e-6\n0.1,2e-6\n", "slide.csv:2: displacement starts at 1e-6"),
     ("time [s],displacement [m],wobble [N]\n0,0,0\n0.1,2e-6,5\n", "slide.csv:1: a header like"),
 ])  # fmt: skip
 def test_refuses_a_faulty_slide_file_as_check_does(tmp_path, table, says):
