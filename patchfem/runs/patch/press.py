@@ -208,11 +208,6 @@ class PressedStrips:
         return how(self.asked, self.bare, self.gap + worn)[3].force
 
 
-def pressure_on(asked, pieces: Compliance, gap) -> Pressure:
-    """Pressure of bare pieces, of any cells, on the gap (m,) [m] under the load and the holder of a `PatchModel`."""
-    return _how(asked)(asked, pieces, gap)[1]
-
-
 def _how(asked, under=None):
     """Function (asked, pieces, gap) -> (Compliance with its skin, Pressure, skin, strips) that presses the pair; under:
     that of a load, None for `_under`."""

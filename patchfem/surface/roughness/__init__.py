@@ -1,4 +1,4 @@
-"""Roughness of a trace or of an areal scan: levelling, filter, parameters, spectrum, each with its interval.
+"""Roughness of a trace or of an areal scan: filter, parameters, spectrum, each with its interval.
 
 In: a `Profile` or an `Areal` [m]. Out: a `RoughnessReport`: the parameters of ISO 21920-2 (4287, 13565-2), of the
 primary profile without a cut-off and of the roughness profile with one, spectrum, Abbott curve, the stylus's reach.
