@@ -1,9 +1,9 @@
 """The grids of a patch: graded to where its own pressure ends, to its corners, its coating and the waves of its gap.
 
 The coarsest grid follows from the patch alone: its contact is searched on columns that are graded to what the search
-before found. A plan, which presses nothing, lays it out by the same rules for the contact of springs. Every next grid
-splits all cells in two, so the grids of a tighter tolerance are those of a wider one and more. How far the ladder is
-climbed a run decides in `ladder`, a plan expects in `expected_grids`. Read `base_grids` first, then `layout_of`.
+before found; a plan searches in the same way. Every next grid splits all cells in two, so the grids of a tighter
+tolerance are those of a wider one and more. How far the ladder is climbed a run decides in `ladder`, a plan expects in
+`expected_grids`. Read `base_grids` first, then `layout_of`.
 """
 
 from dataclasses import dataclass, replace
@@ -17,7 +17,6 @@ from ...elasticity.grid_fronts import predicted_bytes, predicted_seconds
 from ...mesh.grading import Layout, columns, rows
 from ...mesh.nested import coarser, finer, plan_of
 from ...mesh.tensor import TensorGrid
-from ...model.patch import bars
 from ...model.pieces import grid_of, outlined, rounded_edges
 from . import slip_zones
 from .condensed import Pair, condensed
@@ -43,8 +42,6 @@ SEARCHES = 8  # of the contact, each on columns graded to what the one before fo
 LEAST_LEVELS = 3  # nested meshes that show an order
 SPENT = {True: 3.0, False: 0.4}  # predicted seconds of the finest mesh: of a static patch, of one that moves
 OTHER = 4.0  # time of condensing a grid that is not a tensor grid over that of one that is
-# of the interface, by which a plan expects the contact; times that they are cut; of the slope at which a piece rests
-SPRINGS, SHORTENED, HALVINGS = 801, 3, 30
 ONE_MORE = 2e-3  # tolerance below which a contact that ends inside, or over a jump, is expected to take a level more
 
 
@@ -282,8 +279,8 @@ def expected_grids(asked, tolerance: float) -> Sizes:
     if asked.meshes is not None:
         ladder = [[body for body in level if body is not None] for level in asked.meshes.levels]
     elif asked.chosen:
-        seen = expected_contact(asked)
-        bodies, ends = grids_of(asked, layout_of(asked, [seen])), len(seen.places)
+        bodies = base_grids(asked)
+        ends = len(find_contact(asked).places)
         more = tolerance < ONE_MORE and bool(ends or asked.gap.jumps)
         ladder = [bodies]
         while len(ladder) < LEAST_LEVELS + more:
@@ -303,46 +300,9 @@ def expected_grids(asked, tolerance: float) -> Sizes:
                  asked.outlined or not plain, ends)
 
 
-def expected_contact(asked) -> ContactExtent:
-    """The contact of a `PatchModel` as springs beside each other have it, each as soft as a bar of the pieces.
-
-    A contact shorter than the pieces are high strains them about as deep as it is long, so that its springs are bars of
-    that height. A profile is left out. Columns are laid out by the logarithm of its lengths, for which that serves.
-    """
-    x = np.linspace(-asked.length / 2, asked.length / 2, SPRINGS)
-    gap = replace(asked.gap, profile=None).at(x)[0]
-    # the integral of the depth over x [m2] under the load, of bars as high as the pieces
-    depth = asked.nominal_load * asked.length * bars(asked, lambda m: (1 - m.poisson**2) / m.young)
-    height, share = (asked.lower.height + asked.upper.height) / 2, 1.0
-    free = asked.rotates and not asked.spring > 0 and asked.load
-    for _ in range(SHORTENED):
-        bears = _bearing(x, gap, depth * share, asked.moment / asked.load if free else None)
-        share = min(1.0, np.count_nonzero(bears) * (x[1] - x[0]) / height)
-    index, change = np.flatnonzero(bears), np.flatnonzero(bears[1:] != bears[:-1])
-    places = ((x[change] + x[change + 1]) / 2).tolist()
-    low, high = places[0] if index[0] else float(x[0]), places[-1] if index[-1] < x.size - 1 else float(x[-1])
-    return ContactExtent((low, high), tuple(places), tuple(float(x[at]) for at in (0, -1) if bears[at]), 0.0)
-
-
-def _bearing(x, gap, depth: float, arm: float | None) -> np.ndarray:
-    """Springs at x (k,) [m] under `gap` (k,) [m] that bear: of depths with this integral [m2] and, where the piece
-    turns, their middle at `arm` [m]."""
-    def closed(theta: float) -> np.ndarray:
-        rising = np.sort(gap + theta * x)
-        filled = np.arange(1, x.size + 1) * rising - np.cumsum(rising)  # below each of them, in springs
-        k = max(int(np.searchsorted(filled * (x[1] - x[0]), depth)), 1)
-        return (depth / (x[1] - x[0]) + rising[:k].sum()) / k - gap - theta * x
-
-    theta = 0.0
-    if arm is not None:
-        end = max(x[-1] - abs(arm), x[1] - x[0])  # from the load to the nearer end
-        high = 2 * (float(np.ptp(gap)) + depth / end) / end  # beyond it all that bear lie between the load and that end
-        low = -high
-        for _ in range(HALVINGS):
-            theta = (low + high) / 2
-            low, high = (theta, high) if np.maximum(closed(theta), 0.0) @ (x - arm) > 0 else (low, theta)
-    deep = closed(theta)
-    return (deep > 0) | (deep == deep.max())
+def find_contact(asked) -> ContactExtent:
+    """Return the contact of a `PatchModel` on its coarsest grids."""
+    return contact_extent(pressed(asked, condensed(asked, *base_grids(asked))))
 
 
 def _nodes(body) -> tuple:
