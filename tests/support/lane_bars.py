@@ -32,7 +32,8 @@ LAWS = {"coulomb": 'law = "coulomb"\nstatic = 0.3', "weakening": 'law = "coulomb
         "tanh": 'law = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"',
         "iwan": 'law = "iwan"\nstatic = 0.3\nstiffness = "1e6 N/m"\nchi = -0.5\nbeta = 0.5',
         "nonlocal": 'law = "nonlocal"\nstatic = 0.3\nbond_length = "10 um"',
-        "bouc-wen": 'law = "bouc-wen"\nstatic = 0.3\nstiffness = "1e6 N/m"'}
+        "bouc-wen": 'law = "bouc-wen"\nstatic = 0.3\nstiffness = "1e6 N/m"',
+        "lugre": 'law = "lugre"\nstatic = 0.3\nstiffness = "1e6 N/m"\nstribeck_speed = "1 mm/s"'}
 FLOORS = {name: row.floor for table in (STATIC, MOTION) for name, row in table.items()}
 WORST = 5  # misses of a law that are looked at
 
@@ -68,6 +69,12 @@ def of_law(law: str, r, load: float, speed: float) -> dict:
     if law == "bouc-wen":
         return {"friction.stiffness": 0.3 * load / length, "friction.exponent": float(r.choice([1, 1.5, 2, 4])),
                 "friction.shape": r.uniform(0.5, 1)}
+    if law == "lugre":
+        stribeck = speed * 10 ** r.uniform(-1.5, 0)
+        return {"friction.stiffness": 0.3 * load / length, "friction.stribeck_speed": stribeck,
+                "friction.kinetic": r.uniform(0.15, 0.3),
+                "friction.micro_damping": float(r.choice([0, 1])) * 0.1 * load / speed,
+                "friction.viscous": float(r.choice([0, 1])) * 0.02 * load / speed}
     return {}
 
 

@@ -144,14 +144,13 @@ def test_exact_columns_of_models_are_the_numbers_of_each(name):
         values = 10.0 ** r.uniform(-3, -0.4, (7, len(keys)))
         alike = asked.alike(keys, values, partial(written, keys, values), np.arange(7))
         single = list(alike)
-        smooth = name in ("tanh", "nonlocal", "bouc-wen")
-        of_lanes = () if name == "lugre" else (lanes._of_contact, lanes._rate, *([lanes.of_law] if smooth else []))
-        for row in (lanes._of_rig, *of_lanes):
+        smooth = name in ("tanh", "nonlocal", "bouc-wen", "lugre")
+        for row in (lanes._of_rig, lanes._of_contact, lanes._rate, *([lanes.of_law] if smooth else [])):
             np.testing.assert_array_equal(columns_of(alike, row), columns_of(single, row))
         for mine, theirs in zip(columns.sizes_of(alike), columns.sizes_of(single)):
             np.testing.assert_array_equal(mine, theirs)
-        few = columns_of(alike.some([4, 2]), lanes._of_rig)
-        np.testing.assert_array_equal(few, columns_of(single, lanes._of_rig)[:, [4, 2]])
+        few = columns_of(alike.some([4, 2]), lanes._of_contact)
+        np.testing.assert_array_equal(few, columns_of(single, lanes._of_contact)[:, [4, 2]])
 
 
 def test_exact_a_rule_sees_what_it_tells_apart():

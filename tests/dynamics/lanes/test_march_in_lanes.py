@@ -12,7 +12,7 @@ from patchfem.dynamics.lanes import names_kernels as at
 from patchfem.dynamics.lanes import reading, run
 from patchfem.friction.laws.iwan import largest
 
-FLOWS = tuple(f"friction.laws.{law}_kernels" for law in ("tanh", "stretch", "bouc_wen"))
+FLOWS = tuple(f"friction.laws.{law}_kernels" for law in ("tanh", "stretch", "bouc_wen", "lugre"))
 LAWS = "rigid", "yielding", "masing", "table", *FLOWS
 ALWAYS = 0, 1, 2, 3, 5  # each law is a loop to compile: one of those that flow
 
@@ -38,8 +38,9 @@ def cases(law: str, count: int, seed: int = 1) -> run.Cases:
         spring = np.divide(slip, length, out=0 * slip, where=length > 0)
         numbers = np.array({"tanh": [slip, 1 / speed], "stretch": [spring, length],
                             "bouc_wen": [slip, length, r.choice([1, 2, 1.5], count), r.uniform(0.5, 1, count)],
+                            "lugre": [spring, slip * r.uniform(0.6, 1, count), slip, speed,
+                                      *(r.uniform(0, 0.2, count) * slip / speed for _ in range(2))],
                             }[law.split(".")[2].removesuffix("_kernels")]).T
-        r.uniform(size=(3, count))  # the bounds of the tests were measured for the damping that is drawn behind these
     return run.Cases(2 * np.sqrt(square) * 10 ** r.uniform(-1 if law in FLOWS else -3, -0.5, count), square, one, slip,
                      slip * (r.choice([1, 1.3], count) if law == "rigid" else 1), spring,
                      length, -one, one, 0 * one, 0.1 * r.choice([0, 1], count), numbers)

@@ -185,11 +185,16 @@ def test_always_what_misses_its_tolerance_is_exact(monkeypatch):
     assert all(one["engine"] == "exact" for one in many.answers(cases).numerics.values())
 
 
-def test_exact_cases_of_lugre_run_by_themselves():
-    """Lanes of LuGre gave 0.6 cases a CPU second, no more than single runs."""
-    law = 'law = "lugre"\nstatic = 0.3\nstiffness = "1e6 N/m"\nstribeck_speed = "1 mm/s"'
-    cases = [build(load(SCENE.format(law=law)))] * lanes.LEAST
-    assert lanes.no_lanes(cases[0]) and not lanes.parts(cases)
+@pytest.mark.slow
+def test_always_a_peak_of_force_that_lasts_as_long_as_the_slide_turns_is_within_both_bars():
+    """LuGre near its break-away: by 128 steps a cycle, as by 64, the peak of the force was missed by 32 bars."""
+    cases = models("lugre", 32003, 106)
+    cases = [cases[105], *cases[:63]]
+    found, single = many.answers(cases), one_by_one.solve(cases[:1])
+    assert found.numerics[0]["engine"] == "lanes" and found.numerics[0]["steps_per_cycle"] >= 256
+    for name in ("friction_force_peak", "absolute_acceleration_peak"):
+        bars = found.errors[name][0] + single.errors[name][0]
+        assert abs(found.values[name][0] - single.values[name][0]) <= bars
 
 
 def test_exact_a_motion_that_marches_on_until_it_settles_is_that_of_ten_times_its_cycles(monkeypatch):
@@ -325,6 +330,6 @@ def test_exact_the_secant_of_a_slide_that_turns_beside_the_end_of_a_cycle_is_tha
 
 def test_always_cases_that_all_run_away_are_not_judged_by_a_loop():
     """Motions that grow have no friction loop; the damping ratio was held against it, and the whole batch was lost."""
-    cases, found = models("bouc-wen", 5, 3), Answers.blank(3)
+    cases, found = models("lugre", 5, 3), Answers.blank(3)
     found.measure("equivalent_damping", "1")
     assert "loop_area" not in found.values and not lanes.too_wide(cases, found).any()

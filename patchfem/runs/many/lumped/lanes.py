@@ -1,6 +1,6 @@
 """The batch of lanes: lumped cases of one law side by side, with bars from half the steps.
 
-Where the bars of a case of a law of a stretch (tanh, Bouc-Wen, bonds of a constant length) miss the tolerance,
+Where the bars of a case of a law of a stretch (tanh, Bouc-Wen, LuGre, bonds of a constant length) miss the tolerance,
 it marches by a quarter of the steps too, which shows how its errors fall. A case marches by twice the steps where its
 bars still miss it: what it said before tells the errors then. A case of Iwan or of the elastic-plastic law that has not
 settled marches on. What rings in a stick that lasts all the time is told in closed form behind one spring, else by a
@@ -46,11 +46,12 @@ TIGHTEST = 1e-4  # tolerance that lanes serve
 TOGETHER = 4096  # cases of one compiled call
 # law -> that of `dynamics.lanes`
 KINDS = {"coulomb": "rigid", "elastic-plastic": "yielding", "iwan": "masing", "tanh": "friction.laws.tanh_kernels",
-         "bouc-wen": "friction.laws.bouc_wen_kernels",
+         "bouc-wen": "friction.laws.bouc_wen_kernels", "lugre": "friction.laws.lugre_kernels",
          "nonlocal": "friction.laws.stretch_kernels"}
 MARCH_ON = "yielding", *march.MASING  # whose motions march on until they settle
 SMOOTH, CALM = (128, 256, 512, 1024, 2048), 0.5  # steps of a cycle under a law of a stretch, its rate in a step then
 LAYER = 0.5  # of the rate at which a speed settles in the layer of tanh, from which on bars ask for more steps
+PASSES = 0.75  # of the time in which a slide that turns passes the speed of Stribeck, over that of a rate
 RINGING = 512  # steps of a cycle under a law of a stretch from which a ring that is not found is none
 RATES = ((5.0, 96), (10.0, 192), (20.0, 384))  # fastest motion over the drive, and the steps of a cycle it asks for
 OF_TABLE = ((10.0, 96), (20.0, 192), (40.0, 384), (80.0, 768))  # the same behind sliders that are a patch
@@ -109,18 +110,23 @@ def _creates(model: Model):
     f = model.friction
     if has(f.law, "bonds"):
         return np.not_equal(f.breakaway or 0.0, 0.0) | np.not_equal(f.initial_bonds, 1.0)
+    if f.law == "lugre":  # the power of its damping is below zero from there on
+        return np.greater(f.micro_damping * model.rig.speed, 4 * of_law(model)[1])
     return np.less(f.shape, 0.5) if f.law == "bouc-wen" else False
 
 
 def of_law(model: Model) -> tuple:
     """Numbers of a law of a stretch, as its `flowing` takes them, and the length [m] over which it gives way, 0 for
     none."""
-    f, limit = model.friction, model.limits(model.point.load)[0]
+    f, load, limit = model.friction, model.point.load, model.limits(model.point.load)[0]
     if f.law == "tanh":
         return limit, 1 / f.reference_speed, 0.0
     if has(f.law, "bonds"):
         return limit / f.bond_length, f.bond_length, f.bond_length
-    return limit, limit / f.stiffness, f.exponent, f.shape, limit / f.stiffness
+    if f.law == "bouc-wen":
+        return limit, limit / f.stiffness, f.exponent, f.shape, limit / f.stiffness
+    kinetic = f.static if f.kinetic is None else f.kinetic
+    return f.stiffness, kinetic * load, limit, f.stribeck_speed, f.micro_damping, f.viscous, limit / f.stiffness
 
 
 def steps_of(models: Sequence[Model]) -> np.ndarray:
@@ -153,6 +159,9 @@ def _rate(model: Model) -> tuple:
     if model.friction.law == "tanh":
         rate = model.limits(model.point.load)[0] / model.friction.reference_speed * scale + damper
         rate = np.where(rate > CALM * SMOOTH[-1] / (2 * np.pi) * omega, np.inf, LAYER * rate)
+    if model.friction.law == "lugre":  # its peak of force lasts while the slide turns, as long as its speed is that low
+        turns = np.abs(modes.slide[0] * modes.base[0]) * largest(model.rig.drive)
+        rate = np.maximum(damper, PASSES * turns / model.friction.stribeck_speed)
     return np.where(_creates(model), np.inf, np.maximum(rate, np.sqrt(modes.omega[0]**2 + stiff)) / omega),
 
 
