@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from math import prod
 from pathlib import Path
@@ -147,6 +147,14 @@ class Answers:
     def has(self, name: str, case: int) -> bool:
         """Whether a case has a measure, with a value or with the reason why it has none."""
         return not np.isnan(self.values[name][case]) or case in self.reasons.get(name, ())
+
+
+def joined_answers(count: int, parts: Iterable[tuple[Sequence[int], Answers]]) -> Answers:
+    """Answers of `count` cases put together from parts, each with the places of its cases."""
+    out = Answers.blank(count)
+    for cases, part in parts:
+        out.place(cases, part)
+    return out
 
 
 def unread(model: Model) -> bool:
