@@ -21,10 +21,9 @@ from .flat import LOOK, Picture
 from .panels import near, panels, rounded, slide_of
 
 ENDINGS = (".gif", ".mp4")
-DPI = 100  # with SIZE an even number of pixels, as video wants
-BIT_RATE = 4000  # kbit/s
-
-SIZE = (12.0, 6.8)  # inches
+FRAME_SIZE = (12.0, 6.8)  # width and height of a frame [inch]
+DPI = 100  # pixels per inch; with FRAME_SIZE an even number of pixels, which video formats require
+BIT_RATE = 4000  # of a video [kbit/s]
 SLIDE = 0.03  # share of the length of the pieces that the largest slide takes
 LASTS = 2.4  # s that a cycle takes, as far as LEAST and MOST let it
 LEAST, MOST = 0.04, 0.3  # s that a frame takes
@@ -123,13 +122,13 @@ def shoot(series: Series, head: str, magnify: float | None, out: Path) -> str:
         ffmpeg is not installed or cannot write the file.
     """
     film, picture = film_of(series, magnify), None
-    writer = _writer_of(out, film.seconds)
     with matplotlib.rc_context(LOOK | {"savefig.bbox": None, "savefig.dpi": "figure"}):
+        writer = _writer_of(out, film.seconds)
         for number in film.numbers:
             frame = series.frame(number)
             text, shown = f"{head}, {frame.time:.6g} s", film.panels(frame)
             if picture is None:
-                picture = Picture(frame, text, shown, SIZE, film.reach)
+                picture = Picture(frame, text, shown, FRAME_SIZE, film.reach)
                 picture.freeze_layout(DPI)
                 writer.setup(picture.figure, str(out), dpi=DPI)
             else:
@@ -164,10 +163,12 @@ def _ffmpeg(out: Path) -> str:
 
 def _writer_of(out: Path, seconds: float):
     """Make the writer of matplotlib for a .gif or .mp4 file whose frames last so many seconds."""
+    if out.suffix == ".gif":
+        from .gif_writer import GifWriter
+
+        return GifWriter(fps=1 / seconds)
     from matplotlib import animation
 
-    if out.suffix == ".gif":
-        return animation.PillowWriter(fps=1 / seconds)
     logging.getLogger(animation.__name__).setLevel(logging.ERROR)  # `_finish` states what ffmpeg prints
     matplotlib.rcParams["animation.ffmpeg_path"] = _ffmpeg(out)
     return animation.FFMpegWriter(fps=1 / seconds, codec="h264", bitrate=BIT_RATE)

@@ -1,0 +1,52 @@
+"""A writer of matplotlib for .gif files in which a colour is the same in every frame."""
+
+from io import BytesIO
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.animation import AbstractMovieWriter
+from matplotlib.colors import to_rgb
+from PIL import Image
+
+from .pictures import BLUE, ORANGE
+
+N_SCALE = 184  # colours of the scale of stresses; with the greys and tints 256
+N_GREYS = 40  # greys from black to white, for the soft edges of text and lines
+N_TINTS = 16  # tints of each curve from white to its colour
+
+
+class GifWriter(AbstractMovieWriter):
+    """Write frames with one table of 256 colours.
+
+    `matplotlib.animation.PillowWriter` gives each frame 256 colours of its own, so that a stress has another
+    colour in the next frame.
+    """
+
+    def setup(self, fig, outfile, dpi=None):
+        """Begin the film of a figure."""
+        super().setup(fig, outfile, dpi=dpi)
+        self.frames = []
+        self.palette = Image.new("P", (1, 1))
+        self.palette.putpalette(_colours().tobytes())
+
+    def grab_frame(self, **savefig):
+        """Add the figure as it is now."""
+        buffer = BytesIO()
+        self.fig.savefig(buffer, **savefig, format="rgba", dpi=self.dpi)
+        image = Image.frombuffer("RGBA", self.frame_size, buffer.getbuffer(), "raw", "RGBA", 0, 1).convert("RGB")
+        self.frames.append(image.quantize(palette=self.palette, dither=Image.Dither.NONE))
+
+    def finish(self):
+        """Write the file."""
+        first, *others = self.frames
+        duration = round(1000 / self.fps)
+        first.save(self.outfile, save_all=True, append_images=others, duration=duration, loop=0, optimize=False)
+
+
+def _colours() -> np.ndarray:
+    """Return the colours (256, 3) uint8 of a film: the scale of stresses, greys, tints of both curves."""
+    scale = colormaps["viridis"](np.linspace(0, 1, N_SCALE))[:, :3]
+    greys = np.linspace(0, 1, N_GREYS)[:, None] * np.ones(3)
+    share = np.linspace(0, 1, N_TINTS)[:, None]
+    tints = [1 - share * (1 - np.array(to_rgb(colour))) for colour in (BLUE, ORANGE)]
+    return np.round(255 * np.concatenate([scale, greys, *tints])).astype(np.uint8)
