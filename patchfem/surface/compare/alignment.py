@@ -49,8 +49,9 @@ class Alignment:
         See `model.Parameter`; the slope is a height at the end of the trace.
     free : tuple
         Parameters that were fitted.
-    half : float
-        Half of the length [m] that slope and bend refer to.
+    half, middle : float
+        Half of the length [m] that slope and bend refer to, and the place [m] in the second trace where
+        they are zero.
     noise, least : float
         Standard deviation [m] of the unworn depths, and rounding.
     doubt : (k,) array
@@ -69,6 +70,7 @@ class Alignment:
     state: np.ndarray
     free: tuple
     half: float
+    middle: float
     noise: float
     least: float
     doubt: np.ndarray
@@ -94,11 +96,6 @@ class Alignment:
     def bend(self) -> float:
         """Sag [m] of the second datum over the common length that was taken out."""
         return float(self.state[Parameter.BEND]) * (np.ptp(self.x) / 2 / self.half) ** 2
-
-    @property
-    def middle(self) -> float:
-        """Middle [m] of the common part in the x of the second trace."""
-        return float(self.x[0] + self.x[-1]) / 2
 
     @cached_property
     def noise_at(self) -> np.ndarray:
@@ -243,6 +240,7 @@ def _record(model, state, free, scale: float, worn) -> Alignment:
         state=frozen_array(state),
         free=tuple(free),
         half=model.half,
+        middle=model.middle,
         noise=scale,
         least=model.least,
         doubt=frozen_array(doubt),

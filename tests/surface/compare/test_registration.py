@@ -12,6 +12,7 @@ from synthetic import report_area
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.surface.compare.alignment import align
 from patchfem.surface.compare.compare import compared
+from patchfem.surface.compare.model import Parameter
 from patchfem.surface.compare.place import matched
 from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile, level
@@ -58,7 +59,10 @@ def test_exact_without_noise(seed):
     worn = np.interp(found.x, p.after.x, p.worn)
     assert abs(found.shift - p.shift) < 5e-11
     assert abs(found.depth.mean() - worn.mean()) < 2e-11
-    assert found.slope == pytest.approx(p.slope, abs=3e-8)
+    error = found.error_of(Parameter.SLOPE) / found.half  # the interpolation between samples errs by 0.1 nm
+    assert abs(found.slope - p.slope) <= 2 * error < 1e-7
+    offset = found.state[Parameter.OFFSET] - found.slope * found.middle
+    assert offset == pytest.approx(p.offset, abs=1e-11)
 
 
 def test_exact_a_trace_on_itself_shows_no_change():

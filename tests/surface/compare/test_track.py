@@ -55,9 +55,10 @@ def test_exact_without_noise_the_depth_and_the_place():
     worn = compared(p.before, p.after, shift=p.shift).worn
     on = p.after.x[p.worn > 0]
     assert worn.largest.value == pytest.approx(p.worn.max(), abs=1e-4 * UM)
-    assert [one.value for one in worn.extent.after] == pytest.approx([on[0], on[-1]], abs=0.51 * UM)
-    moved = [on[0] - p.shift, on[-1] - p.shift]
-    assert [one.value for one in worn.extent.before] == pytest.approx(moved, abs=0.51 * UM)
+    ends = [on[0] - UM / 2, on[-1] + UM / 2]  # between the last unworn sample and the first worn one
+    assert [one.value for one in worn.extent.after] == pytest.approx(ends, abs=1e-12)
+    moved = [place - p.shift for place in ends]
+    assert [one.value for one in worn.extent.before] == pytest.approx(moved, abs=1e-3 * UM)
 
 
 @pytest.mark.parametrize("seed", [18, 37])
