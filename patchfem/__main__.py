@@ -96,6 +96,7 @@ SCREEN = {
 VERBS = {verb: row[0] for verbs in SCREEN.values() for verb, row in verbs.items()}
 
 REMOVED_OPTIONS = {  # (verb, option): what to do in its place
+    ("sweep", "--device"): "batches of cases run on the processor; share them by -j N or --executor dask",
     ("report", "--measured"): "convert the file with `patchfem import FILE -o table.csv` and plot table.csv together "
                               "with result.nc of the run in a plotting program"}
 
@@ -130,7 +131,7 @@ def _removed_option(words: list) -> str:
     for word in words[1:]:
         option = word.partition("=")[0]
         if (words[0], option) in REMOVED_OPTIONS:
-            return f"{words[0]} {option} was removed in version 1.0; {REMOVED_OPTIONS[words[0], option]}"
+            return f"{words[0]} {option} was removed in patchfem 1.0; {REMOVED_OPTIONS[words[0], option]}"
     return ""
 
 

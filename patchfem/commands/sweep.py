@@ -74,13 +74,6 @@ class By:
     shard: word("run only one part of the cases, such as 3/40 for the third of 40 parts; all parts write into the "
                 "same folder", "--shard") = ""
     collect: flag("run no case, only write the tables of a sweep whose cases are all done", "--collect") = False
-    device: Annotated[str | None, Parameter(name="--device", show=False, help=
-                                       "removed in patchfem 1.0; use --jobs, such as --jobs 2")] = None
-
-    def __post_init__(self):
-        if self.device is not None:
-            raise Refused("--device was removed in patchfem 1.0, because batches of cases run only on the processor; "
-                          "use -j N or --executor dask to share the cases among processes or machines")
 
     def part(self) -> tuple | None:
         """(i, n) of a shard, None without one."""

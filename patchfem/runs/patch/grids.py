@@ -280,7 +280,7 @@ def expected_grids(asked, tolerance: float) -> Sizes:
         ladder = [[body for body in level if body is not None] for level in asked.meshes.levels]
     elif asked.chosen:
         bodies = base_grids(asked)
-        ends = len(find_contact(asked).places)
+        ends = len(contact_on(asked, bodies).places)
         more = tolerance < ONE_MORE and bool(ends or asked.gap.jumps)
         ladder = [bodies]
         while len(ladder) < LEAST_LEVELS + more:
@@ -300,9 +300,9 @@ def expected_grids(asked, tolerance: float) -> Sizes:
                  asked.outlined or not plain, ends)
 
 
-def find_contact(asked) -> ContactExtent:
-    """Return the contact of a `PatchModel` on its coarsest grids."""
-    return contact_extent(pressed(asked, condensed(asked, *base_grids(asked))))
+def contact_on(asked, bodies: list) -> ContactExtent:
+    """Return the contact of a `PatchModel` whose pieces have the grids `bodies`, one where they are alike."""
+    return contact_extent(pressed(asked, condensed(asked, *bodies)))
 
 
 def _nodes(body) -> tuple:
