@@ -21,7 +21,7 @@ from ..model.model import Model, build
 from ..model.source import placed
 from ..runs.joint import held_patch
 from ..runs.patch import ladder
-from ..runs.patch.kept import elements, strip_elements
+from ..runs.patch.derived import elements, strip_elements
 from ..scene.scene import Scene
 
 DECADE, ROWS = 8, 12  # amplitudes a decade, and in all at least

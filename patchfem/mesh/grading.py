@@ -8,7 +8,7 @@ import numpy as np
 from ..core import frozen_array
 
 
-@dataclass(frozen=True, eq=False, slots=True)
+@dataclass(frozen=True, slots=True)
 class Layout:
     """Wanted cell lengths on the stretch from `start` to `stop` [m].
 

@@ -16,8 +16,8 @@ from ..structure import drive_sizes
 from . import memory
 from .bench import engine as of_bench
 from .patch import grids as patch_grids
-from .patch import kept
 from .patch import plan as patch_plan
+from .patch import store
 from .rig import engines
 from .rig import numerics as rig_numerics
 from .rig import plan as of_rig
@@ -133,8 +133,8 @@ def _planned(model: Model, per_point: bool) -> Plan:
     for number, one in enumerate(model.rig.interfaces if model.rig is not None else ()):
         if one.patch is not None:
             grids = patch_grids.expected_grids(one.patch, model.accuracy.tolerance)
-            alone = kept.by_content(one.patch) not in alike  # equal patches are pressed once
-            alike.add(kept.by_content(one.patch))
+            alone = store.content_key(one.patch) not in alike  # equal patches are pressed once
+            alike.add(store.content_key(one.patch))
             for name, size in patch_plan.sizes(grids).items():
                 unknowns[name] = unknowns.get(name, 0) + size * alone
             chain |= {rows.of_number(name, number): link for name, link in patch_plan.chain(one.patch).items()

@@ -10,13 +10,12 @@ import patchfem as pf
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.runs.many import one_by_one
 from patchfem.runs.many.meshes import meshed
-from patchfem.runs.patch import kept, ladder, press
-from patchfem.runs.patch.kept import by_content
+from patchfem.runs.patch import derived, press, store
+from patchfem.runs.patch.store import content_key
 from patchfem.runs.rig import interface
 
 DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 20\n'
 TEXT = COATED + '[contact.tilt]\nangle = "0.02 mrad"\n' + SHEAR + PLASTIC + MODE + DRIVE
-STORES = (ladder._kept, kept._measures, kept._band, kept.elements)
 
 
 def models(angles=(2e-5, 3e-4), levels=(3.0, 5.0, 8.0)) -> list:
@@ -24,22 +23,19 @@ def models(angles=(2e-5, 3e-4), levels=(3.0, 5.0, 8.0)) -> list:
                    for angle in angles for level in levels])
 
 
-def forget() -> None:
-    for store in STORES:
-        store.cache_clear()
-
-
 @pytest.fixture(autouse=True)
 def nothing_kept():
-    forget()
+    store.clear()
 
 
-def test_exact_runs_of_one_patch_are_those_that_share_nothing():
+def test_exact_runs_of_one_patch_are_those_that_share_nothing(monkeypatch):
+    made, jenkins_set = [], derived.jenkins_set
+    monkeypatch.setattr(derived, "jenkins_set", lambda *given: made.append(given) or jenkins_set(*given))
     cases = models()
     found = one_by_one.solve(cases)
-    assert ladder._kept.cache_info().hits == 4 and kept.elements.cache_info().misses == 4  # with those of the error
+    assert len(made) == 4  # of two patches, each with that of its error
     for case, model in enumerate(cases):
-        forget()
+        store.clear()
         alone = one_by_one.solve([model])
         assert alone.outcome[0] == found.outcome[case] and alone.notes.get(0) == found.notes.get(case)
         for name, values in alone.values.items():
@@ -66,17 +62,25 @@ def test_exact_a_patch_of_many_levels_is_pressed_once(monkeypatch):
     {"contact.holder.tangential_stiffness": 1e7}, {"contact.holder.rotational_stiffness": 1e3}])
 def test_always_other_patches_are_not_the_same(changed):
     first, second, third = (pf.build(TEXT, **more).patch for more in ({}, {"drive.acceleration": 1.0}, changed))
-    assert by_content(first) == by_content(second) and hash(by_content(first)) == hash(by_content(second))
-    assert by_content(first) != by_content(third)
+    assert content_key(first) == content_key(second) and hash(content_key(first)) == hash(content_key(second))
+    assert content_key(first) != content_key(third)
 
 
 def test_always_a_file_that_may_change_is_read_again(tmp_path):
     own = pf.build(TEXT)
-    assert not kept.shares(own.patch) and kept.shares(meshed([own, own])[0].patch)
+    assert not store.is_shared(own.patch) and store.is_shared(meshed([own, own])[0].patch)
     (tmp_path / "heights.csv").write_text("x [mm],z [um]\n" + "".join(f"{0.1 * k - 7},{k % 2}\n" for k in range(140)))
     (tmp_path / "a.toml").write_text(TEXT.replace(SHEAR, SHEAR + '[contact.profile]\nfile = "heights.csv"\n'))
     profiled = meshed([pf.build(tmp_path / "a.toml")] * 2)[0].patch
-    assert profiled.meshes is not None and not kept.shares(profiled)
+    assert profiled.meshes is not None and not store.is_shared(profiled)
+
+
+def test_exact_the_result_that_was_not_used_for_longest_is_made_again():
+    numbers = range(store.MAX_ENTRIES + 1)
+    for number in (*numbers[:-1], 0, numbers[-1]):
+        store.reuse((number,), lambda: "first")
+    kept = [store.reuse((number,), lambda: "again") for number in (0, numbers[-1], 2, 1)]
+    assert kept == ["first", "first", "first", "again"]
 
 
 def test_exact_marches_of_one_patch_share_its_shear_modes(monkeypatch):

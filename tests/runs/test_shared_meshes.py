@@ -11,7 +11,7 @@ from patchfem.core import PatchfemError
 from patchfem.mesh.grading import Layout
 from patchfem.model.model import build
 from patchfem.runs.many.meshes import meshed
-from patchfem.runs.patch import condensed, grids
+from patchfem.runs.patch import condensed, grids, store
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.measures import measures
 from patchfem.runs.patch.meshes import _merged
@@ -73,13 +73,14 @@ def test_exact_pieces_of_meshes_that_are_just_made_are_not_made_again(monkeypatc
 def test_exact_the_pieces_of_a_first_search_serve_all_patches_of_a_geometry(monkeypatch):
     """The coarsest grids that they lead to are those of a search of its own; a gap with waves has other columns."""
     low, high = (one.patch for one in family(1e-5, 1e-3))
-    search = grids.Search(low)
-    for one in (low, high):
-        assert [list(body.x) for body in grids.base_grids(one, search)] == [
-            list(body.x) for body in grids.base_grids(one)]
-    assert search.of(high) is search.pair
+    store.clear()
+    alone = grids.base_grids(high)
+    store.clear()
+    pair = grids.search_pair(low)
+    assert grids.search_pair(high) is pair
+    assert [list(body.x) for body in grids.base_grids(high)] == [list(body.x) for body in alone]
     monkeypatch.setattr(grids, "_longest", lambda _: 5e-5)
-    assert search.of(high) is None
+    assert grids.search_pair(high).grid.x.size > pair.grid.x.size
 
 
 def test_exact_a_merged_layout_keeps_the_bands_that_its_size_asks_for():

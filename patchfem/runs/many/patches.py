@@ -13,8 +13,8 @@ from ...core import Outcome, allowed
 from ...elasticity.lapack import one_thread
 from ...model.alike import Alike, some
 from ...model.model import Model
-from ..patch import kept, static
 from ..patch import result as of_patch
+from ..patch import static, store
 from ..patch.meshes import geometry_of
 from ..patch.strength import yielding_faces
 from ..remedies import Finding, beyond_tolerance
@@ -55,7 +55,7 @@ def solved_together(models: Sequence[Model]) -> list[Model]:
     out, groups = list(models), {}
     for case, model in enumerate(models):
         if not static.not_together(model.patch):
-            asked = kept.by_content(model.patch) if kept.shares(model.patch) else case
+            asked = store.content_key(model.patch) if store.is_shared(model.patch) else case
             groups.setdefault(group(model), {}).setdefault(asked, []).append(case)
     for alike in groups.values():
         first = [models[cases[0]] for cases in alike.values()]

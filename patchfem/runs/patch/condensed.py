@@ -1,7 +1,6 @@
 """The two pieces of a patch: their meshes, materials and the compliance of their common interface."""
 
 from dataclasses import dataclass
-from functools import lru_cache
 from time import perf_counter
 
 import numpy as np
@@ -11,9 +10,9 @@ from ...elasticity import cache, mortar, substructure
 from ...elasticity.elasticity import Layers, Piece, assemble, interface_compliance
 from ...mesh.tensor import TensorGrid
 from ...model.pieces import layers_of
+from . import store
 
 LEAST_CACHED = 150  # interface nodes from which a condensed operator is kept on disk
-SHARED = 16  # levels whose shared pieces are kept, of all geometries and of either plane state
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -106,58 +105,44 @@ def condensed(asked, grid, upper_grid=None, fresh: bool = False) -> Pair:
 
 
 def shared_pairs(asked) -> tuple:
-    """The condensed pieces of every level of a `PatchModel` that has `meshes`; those of the last levels are kept."""
+    """Return the condensed pieces (Pair) of every level of a `PatchModel` that has `meshes`."""
     return tuple(shared_pair(asked, level) for level in range(len(asked.meshes.levels)))
 
 
 def shared_pair(asked, level: int) -> Pair:
-    """The condensed pieces of one level of a `PatchModel`, as `shared_pairs` has them."""
-    return _shared(_keyed(asked, asked.meshes.name), level)
+    """Return the condensed pieces of one level of a `PatchModel` that has `meshes`."""
+    bodies = asked.meshes.levels[level]
+    return store.reuse(_pair_key(asked, asked.meshes.name, level), lambda: without_factors(condensed(asked, *bodies)))
 
 
-def hand_over(asked, meshes, pairs) -> None:
-    """Give the condensed pieces (Pair, level by level) of `Meshes` that are just made to `shared_pair`, in place of
-    those of the last ones; asked: one of the patches that share them."""
-    _HANDED.clear()
-    _HANDED.update(((_keyed(asked, meshes.name), level), pair) for level, pair in enumerate(pairs))
+def keep_pairs(asked, meshes, pairs) -> None:
+    """Keep condensed pieces (Pair, level by level) of `Meshes` that are just made, for `shared_pair`.
+
+    asked: one of the patches that share the meshes.
+    """
+    for level, pair in enumerate(pairs):
+        store.keep(_pair_key(asked, meshes.name, level), without_factors(pair))
 
 
-def _keyed(asked, name: str) -> "Keyed":
-    """What the condensed pieces of a `PatchModel` on meshes of this name depend on."""
-    return Keyed(asked, (name, asked.lower, asked.upper, asked.plane, asked.width * asked.pairs))
+def _pair_key(asked, name: str, level: int) -> tuple:
+    """Key of the condensed pieces of a `PatchModel` on one level of meshes of this name."""
+    return "pair", name, level, asked.lower, asked.upper, asked.plane, asked.width * asked.pairs
+
+
+def without_factors(pair: Pair) -> Pair:
+    """Delete the factors of pieces on grids: they are far larger than the compliance, and made again for fields."""
+    for piece in (pair.piece, pair.upper):
+        if isinstance(piece, Piece) and not piece.rounding:
+            piece.made.clear()
+    return pair
 
 
 def pair_beside(asked, pair: Pair) -> Pair:
-    """The pieces of a `PatchModel` on the bodies of another Pair; kept where these are of meshes that it shares."""
+    """Return the pieces of a `PatchModel` on the bodies of another Pair, shared ones where the bodies are shared."""
     for k, level in enumerate(() if asked.meshes is None else asked.meshes.levels):
         if np.array_equal(level[0].x, pair.grid.x) and (level[1] is None) == (pair.upper is pair.piece):
             return shared_pair(asked, k)
     return condensed(asked, pair.grid, None if pair.upper is pair.piece else pair.upper_grid)
-
-
-class Keyed:
-    """A `PatchModel` that is to a cache what its key is: it equals any other one with the same."""
-
-    def __init__(self, asked, key: tuple):
-        self.asked, self.key = asked, key
-
-    def __eq__(self, other) -> bool:
-        return self.key == other.key
-
-    def __hash__(self) -> int:
-        return hash(self.key)
-
-
-_HANDED: dict = {}  # (Keyed, level) -> Pair of meshes that are just made, until it is asked for
-
-
-@lru_cache(maxsize=SHARED)
-def _shared(one: Keyed, level: int) -> Pair:
-    pair = _HANDED.pop((one, level), None) or condensed(one.asked, *one.asked.meshes.levels[level])
-    for piece in (pair.piece, pair.upper):
-        if isinstance(piece, Piece) and not piece.rounding:
-            piece.made.clear()  # factors are far larger than the compliance, and made again where fields are wanted
-    return pair
 
 
 def _rise(body, x) -> np.ndarray:

@@ -3,7 +3,6 @@
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -14,12 +13,9 @@ from ...model.source import placed
 from ...response.rows import of_number
 from ...slip.fields import element_fields
 from ..results.result import at_rest, frames_of, surface_of
-from . import kept, result
-from .condensed import Keyed
+from . import derived, result, store
 from .press import Patch
 from .values import values
-
-KEPT = 16  # patches with those of their errors
 
 
 class Face(NamedTuple):
@@ -76,27 +72,17 @@ def patches_of(one, tolerance: float) -> tuple:
     the same; a patch with files, which may change, once for its model. PatchfemError with the key at fault."""
     asked = one.patch
     files = asked.mesh is not None or asked.gap.profile is not None
+    key = ("face", asked if files else store.content_key(asked), tolerance)
     try:
-        return _patches(asked, tolerance) if files else _alike(kept.by_content(asked), tolerance)
+        return store.reuse(key, lambda: result.solve_all(asked, tolerance))
     except PatchfemError as error:
         error.key = error.key and f"{one.key}.{error.key}"
         raise
 
 
-@lru_cache(maxsize=KEPT)
-def _patches(asked, tolerance: float) -> tuple:
-    return result.solve_all(asked, tolerance)
-
-
-@lru_cache(maxsize=KEPT)
-def _alike(asked: Keyed, tolerance: float) -> tuple:
-    return result.solve_all(asked.asked, tolerance)
-
-
 def condensed_anew(model) -> None:
     """Condense the pieces of every interface again, whatever is kept of them."""
-    _patches.cache_clear()
-    _alike.cache_clear()
+    store.clear()
     for one in model.rig.interfaces if model.rig is not None else ():
         if one.patch is not None:
             result.solve_all(one.patch, model.accuracy.tolerance, fresh=True)
@@ -110,8 +96,8 @@ def elements_of(one, tolerance: float, coarser: bool = False) -> tuple:
         return np.array([1 / patch.giving.mean()]), np.zeros(1), None
     length = record.law_from(one.numbers, one.load).element(one.load).length
     if patch.strips is not None:
-        return *map(np.concatenate, zip(*kept.strip_elements(patch, static, length))), None
-    found = kept.elements(patch, static, length)
+        return *map(np.concatenate, zip(*derived.strip_elements(patch, static, length))), None
+    found = derived.elements(patch, static, length)
     return found.stiffness, found.yield_slide, found
 
 

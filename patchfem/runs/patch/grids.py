@@ -7,7 +7,6 @@ tolerance are those of a wider one and more. How far the ladder is climbed a run
 """
 
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -18,8 +17,8 @@ from ...mesh.grading import Layout, columns, rows
 from ...mesh.nested import coarser, finer, plan_of
 from ...mesh.tensor import TensorGrid
 from ...model.pieces import grid_of, outlined, rounded_edges
-from . import slip_zones
-from .condensed import Pair, condensed
+from . import slip_zones, store
+from .condensed import Pair, condensed, without_factors
 from .press import Patch, pressed
 from .values import contact_ends
 
@@ -68,36 +67,28 @@ class ContactExtent:
         return self.span[1] - self.span[0]
 
 
-class Search:
-    """The pieces on the even columns of the first search for a contact, made once for patches of one geometry."""
-
-    def __init__(self, asked):
-        self.asked, self.cell = asked, search_layout(asked).inside
-
-    @cached_property
-    def pair(self) -> Pair:
-        return condensed(self.asked, *grids_of(self.asked, search_layout(self.asked)))
-
-    def of(self, asked) -> Pair | None:
-        """The pieces for another patch of this geometry; None where its gap asks for other columns."""
-        return self.pair if search_layout(asked).inside == self.cell else None
+def search_pair(asked) -> Pair:
+    """Return the pieces on the columns of the first search for a contact, shared by the patches of a geometry."""
+    layout = search_layout(asked)
+    key = ("search", layout, asked.lower, asked.upper, asked.plane, asked.width * asked.pairs, asked.still,
+           asked.gap.jumps)
+    return store.reuse(key, lambda: without_factors(condensed(asked, *grids_of(asked, layout))))
 
 
-def base_grids(asked, search: Search | None = None) -> list:
-    """The coarsest grids of a `PatchModel`, one where its pieces are alike, graded to the contact that they find.
-
-    search: of a patch of the same geometry, whose pieces serve where they are on the same columns.
+def base_grids(asked) -> list:
+    """Return the coarsest grids of a `PatchModel`, one where its pieces are alike, graded to the contact on them.
 
     Where a load that varies moves the edges of the contact, the columns are fine over the bands that they sweep between
     SWING of the load; where wear does, no column is longer than WORN of the interface.
     """
     sweep = [replace(asked, load=share * asked.load) for share in SWING
              if asked.sweeps == "load" and asked.load is not None]
-    layout, pair = search_layout(asked), search and search.of(asked)
-    for _ in range(SEARCHES if asked.nominal_load > 0 else 0):  # without a load nothing bears, and no edge is found
-        pair = pair or condensed(asked, *grids_of(asked, layout))
-        seen, x = [contact_extent(pressed(each, pair), asked.slip) for each in (asked, *sweep)], pair.grid.x
-        layout, pair = layout_of(asked, seen), None
+    layout = search_layout(asked)
+    for search in range(SEARCHES if asked.nominal_load > 0 else 0):  # without a load nothing bears
+        pair = condensed(asked, *grids_of(asked, layout)) if search else search_pair(asked)
+        x = pair.grid.x
+        seen = [contact_extent(pressed(each, pair), asked.slip) for each in (asked, *sweep)]
+        layout = layout_of(asked, seen)
         cells = max(one.cell / one.wide for one in seen)
         shows = _shows_crests(asked, x, layout) and _shows_slip(seen[0].slip_zones, x, layout)
         if cells <= 1 / (EDGE[asked.still] - 1) and shows:

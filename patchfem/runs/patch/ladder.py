@@ -1,16 +1,15 @@
 """A patch on its own mesh and on coarser ones, from which its errors are estimated."""
 
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import partial
 
 from ...core import NotConverged, Outcome
 from ...mesh import anymesh
 from ...mesh.nested import coarser, finer, plan_of
 from ...model.pieces import bodies_of
-from . import fine, slip_zones
-from .condensed import Keyed, condensed, shared_pairs
-from .grids import LEAST_LEVELS, SPENT, Search, base_grids, seconds_of
-from .kept import KEPT, by_content, shares
+from . import fine, slip_zones, store
+from .condensed import condensed, shared_pairs
+from .grids import LEAST_LEVELS, SPENT, base_grids, seconds_of
 from .measures import measures, met
 from .press import pressed, solve
 
@@ -46,8 +45,9 @@ def solve_all(asked, tolerance: float, estimate: bool = True, fresh: bool = Fals
     if asked.meshes is not None:
         if fresh:
             return on_pairs(asked, [condensed(asked, *level, fresh=True) for level in asked.meshes.levels], estimate)
-        if shares(asked):
-            return _kept(by_content(asked), estimate)
+        if store.is_shared(asked):
+            return store.reuse(("patches", store.content_key(asked), estimate),
+                               lambda: on_pairs(asked, shared_pairs(asked), estimate))
         found = on_pairs(asked, shared_pairs(asked), estimate)
         if estimate and _misses_trace(asked, found, asked.mesh_tolerance or tolerance):
             return climb(replace(asked, meshes=None), asked.mesh_tolerance or tolerance)
@@ -62,11 +62,6 @@ def _misses_trace(asked, patches: tuple, tolerance: float) -> bool:
     if not asked.chosen or asked.gap.profile is None or patches[1] is None:
         return False
     return not met(measures(*patches, tolerance=tolerance), tolerance)
-
-
-@lru_cache(maxsize=KEPT)
-def _kept(kept: Keyed, estimate: bool) -> tuple:
-    return on_pairs(kept.asked, shared_pairs(kept.asked), estimate)
 
 
 def on_pairs(asked, pairs, estimate: bool = True) -> tuple:
@@ -106,15 +101,14 @@ def meshes_beside(low, high) -> list:
     return out
 
 
-def climb(asked, tolerance: float, estimate: bool = True, fresh: bool = False, search: Search | None = None) -> tuple:
+def climb(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
     """A patch on the coarsest mesh of the ladder that meets its tolerance, and on all coarser ones, fine to coarse.
 
     Where the next mesh is dear, points as fine as a trace add sharper measures; then the mesh serves fields and motion.
     The climb ends where the next mesh would take more than the work that is spent on a patch. With a prescribed slip it
     also has to show the work of that. Without an estimate it is the third mesh, and nothing is solved on the others.
-    search: as of `base_grids`.
     """
-    grids, out, on_points = base_grids(asked, search), [], None
+    grids, out, on_points = base_grids(asked), [], None
     while True:
         try:
             wanted = estimate or len(out) == LEAST_LEVELS - 1

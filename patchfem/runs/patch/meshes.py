@@ -17,7 +17,7 @@ from ...mesh.nested import finer
 from ...mesh.tensor import TensorGrid
 from ...model.patch import Meshes
 from . import grids, ladder
-from .condensed import condensed, hand_over
+from .condensed import condensed, keep_pairs
 from .measures import measures, missed
 from .press import pressed
 from .static import missed_on, patches_on
@@ -55,11 +55,9 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None
     swept = [replace(one, load=share * one.load) for one in cases if one.sweeps == "load" and one.load is not None
              for share in grids.SWING]
     slips = any(one.gives_way for one in patches)
-    search = grids.Search(cases[0])
-    halvings = _halvings(cases, tolerance, search) if slips else {}
+    halvings = _halvings(cases, tolerance) if slips else {}
     common = min(halvings.values(), default=0)  # what all of them halve are levels of the ladder
-    layout = _layout([*cases, *swept], not (every and all_), {key: one - common for key, one in halvings.items()},
-                     search)
+    layout = _layout([*cases, *swept], not (every and all_), {key: one - common for key, one in halvings.items()})
     # a contact that moves on the way, or slips part by part, has measures that its first state tells nothing of
     shares, own = START[-1:] if asked.sweeps or slips else START, None
     if layout is None:
@@ -74,7 +72,7 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None
         pairs, missed_by = _climbed(cases, bodies, tolerance, bool(shares), grids.LEAST_LEVELS + common)
         if missed_by <= 1 or not shares:
             found = with_digest([(one.grid, None if one.upper is one.piece else one.upper_grid) for one in pairs])
-            hand_over(cases[0], found, pairs)
+            keep_pairs(cases[0], found, pairs)
             return found
         enough = share * missed_by**(-1 / FASTEST)  # times the cells, above which no mesh meets it
         shares = tuple(one for one in shares if one <= max(enough, START[-1]))
@@ -120,20 +118,19 @@ def _numbers(asked) -> tuple:
     return (*(float(value or 0.0) for value in own), *shapes, *skin)
 
 
-def _halvings(cases: list, tolerance: float, search: grids.Search) -> dict:
+def _halvings(cases: list, tolerance: float) -> dict:
     """How often the run of a case by itself halves its cells beyond the least levels, of CORNERS cases by `_numbers`.
     """
     out = {}
     for one in farthest_apart(cases, CORNERS)[0]:
         try:
-            out[_numbers(one)] = len(ladder.climb(one, one.mesh_tolerance or tolerance, search=search)) \
-                - grids.LEAST_LEVELS
+            out[_numbers(one)] = len(ladder.climb(one, one.mesh_tolerance or tolerance)) - grids.LEAST_LEVELS
         except PatchfemError:  # its own run says why
             continue
     return out
 
 
-def _layout(cases: list, between: bool, halvings: dict, search: grids.Search) -> Layout | None:
+def _layout(cases: list, between: bool, halvings: dict) -> Layout | None:
     """The layout of the coarsest grids, that no case wants finer; None where no case can be pressed.
 
     between: there are more cases than these, and their contacts end between those of neighbouring ones; halvings: as
@@ -142,7 +139,7 @@ def _layout(cases: list, between: bool, halvings: dict, search: grids.Search) ->
     first, along = cases[0], grids.EDGE[cases[0].still]
     layout = None
     for _ in range(ROUNDS):
-        pair = condensed(first, *grids.grids_of(first, layout)) if layout else search.pair
+        pair = condensed(first, *grids.grids_of(first, layout)) if layout else grids.search_pair(first)
         known = patches_on(cases, pair)
         seen = [(one, found) for one, patch in zip(cases, known) if (found := _loaded(one, pair, patch)) is not None]
         if not seen:

@@ -15,8 +15,7 @@ from ...scales import short
 from ...surface import nodes
 from ..results.patch_rows import TABLE
 from ..results.result import Result, at_rest
-from . import kept, skin
-from .kept import band
+from . import derived, skin
 from .ladder import solve_all, static_ladder
 from .measures import strip_error
 from .values import beyond_gentle, values
@@ -52,8 +51,9 @@ def measured(model, patch, coarse) -> dict:
     A measure that is a difference of larger terms has the tolerance times those as floor: of the approach the rotation
     times half the length, of the centre of pressure half the length, of the moment the load times that.
     """
-    tolerance = model.patch.mesh_tolerance or model.accuracy.tolerance
-    found = floored(model, kept.measured(model.patch, patch, coarse, tolerance if model.patch.chosen else None))
+    asked = model.patch
+    tolerance = (asked.mesh_tolerance or model.accuracy.tolerance) if asked.chosen else None
+    found = floored(model, derived.static_measures(asked, patch, coarse, tolerance))
     if patch.strips is None or coarse[0] is None or model.wear is not None:  # `wear.measures` adds that of worn strips
         return found
     return strip_error(model.patch, coarse[0], found)
@@ -154,7 +154,7 @@ def left_out(model, patch, coarse) -> list:
         out += frictionless(asked, patch)
     if coarse[0] is not None and patch.pressure.outcome is not Outcome.NO_CONTACT:
         # a mesh of any cells has no coarser one: its second patch is finer than its first
-        out += band(asked, patch if coarse[-1] is None else coarse[0])
+        out += derived.plane_notes(asked, patch if coarse[-1] is None else coarse[0])
     return out
 
 

@@ -19,7 +19,7 @@ from ...slip.shear_modes import FEW, gathered, on_gauss
 from ...structure.drive_sizes import omega_of
 from ..bench import averaged, rigid, shear
 from ..patch import faces
-from ..patch.kept import elements, strip_elements
+from ..patch.derived import elements, strip_elements
 from . import strips, varying_load
 from .lists import quadrature_of
 from .numerics import Numerics

@@ -7,9 +7,8 @@ from scene_texts import COATED, MODE, PLASTIC, SHEAR, SLIDE
 import patchfem as pf
 from patchfem.runs.many import many, one_by_one
 from patchfem.runs.many.meshes import meshed
-from patchfem.runs.patch import condensed, kept, ladder
+from patchfem.runs.patch import store
 
-STORES = (condensed._shared, ladder._kept, kept._measures, kept._band, kept.elements)
 PATCH = COATED + '[contact.tilt]\nangle = "0.02 mrad"\n'
 SINE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 20\n'
 YAW = '[[structure.mode]]\nname = "yaw"\nfrequency = "129 Hz"\ndamping = 0.003\nslide = 0.095\n'
@@ -45,8 +44,7 @@ def cases(kind: str, seed: int, count: int) -> list:
 
 def alone(model):
     """Answers of a run that finds nothing kept."""
-    for store in STORES:
-        store.cache_clear()
+    store.clear()
     return one_by_one.solve([model])
 
 
