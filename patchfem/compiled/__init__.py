@@ -211,6 +211,11 @@ class Entry:
         in every process: so is what runs as Python."""
         self.as_python = seconds + (self.as_python if self.as_python < inf else 0.0)
 
+    def is_kept(self, *arguments) -> bool:
+        """Return whether machine code is kept for arguments of these types."""
+        kinds = ",".join(self.words.of(argument)[0] for argument in arguments)
+        return any((folder / "code" / f"{self.kept}{digest(kinds)}.code").is_file() for folder in _kept())
+
     def held(self, *arguments) -> tuple:
         """(kinds, words, arguments) of last arguments that stay the same objects from call to call, for `held_call`:
         their words are made once. What is in their arrays may change."""
@@ -397,11 +402,6 @@ def ran(kind: str) -> None:
 def has_run(kind: str) -> bool:
     """Whether a run of this kind has come to its end with the kernels as they are, so that nothing of it compiles."""
     return PLAIN or any((one / "kinds" / digest(kind)).is_file() for one in _kept())
-
-
-def is_kept(function: str) -> bool:
-    """Whether machine code of a function is kept, such as "dynamics.events.march_kernels.march"."""
-    return any(any((one / "code").glob(f"{function}-*.code")) for one in _kept())
 
 
 def _kept(own_code: Path | None = None) -> list:

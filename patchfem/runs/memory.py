@@ -93,6 +93,13 @@ def _short(model: Model, engine: str) -> bool:
     return _as_python(model) <= compiled.PATIENCE
 
 
+def _is_loop_kept(model: Model) -> bool:
+    """Return whether machine code of the loop from event to event is kept for the modes of a rig."""
+    from ..dynamics.events.histories import is_loop_kept  # a plan without a rig does not load the engine
+
+    return is_loop_kept(model.rig.modes, model.rig.drive)
+
+
 def _as_python(model: Model) -> float:
     """CPU seconds of a run from event to event as Python, which is not compiled where they are few; of a density all
     its cells, which its error may ask for."""
@@ -119,8 +126,8 @@ def needs(model: Model, engine: str, steps: int, unknowns: dict, numerics=None, 
     """
     points = unknowns.get("interface_points", 0)
     runs = code(model, engine)
-    if _short(model, engine) and not compiled.is_kept("dynamics.events.march_kernels.march"):
-        runs = NONE
+    if _short(model, engine) and not _is_loop_kept(model):
+        runs = NONE  # such a run as Python takes 86 MB, and 152 MB with machine code, which loads the library of LLVM
     parts = [Need(PACKAGES, "packages", ""), Need(runs.bytes, CODE_PART if runs.compile else "code", "")]
     if points:
         asked = [model.patch] if model.patch is not None else [one.patch for one in model.rig.interfaces if one.patch]

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import plan_trial
 import pytest
-from scene_texts import BENCH, COULOMB, MODE, PATCH, PLASTIC, POINT, STRUCTURE
+from scene_texts import BENCH, COULOMB, DRIVE, MODE, PATCH, PLASTIC, POINT, SECOND, STRUCTURE
 
 from patchfem import compiled, rates
 from patchfem.core import Missing
@@ -171,6 +171,26 @@ def test_always_plans_hold_in_most_scenes(tmp_path):
 def test_always_plans_of_a_few_scenes_hold_in_memory(tmp_path, monkeypatch):
     monkeypatch.setattr(compiled, "PATIENCE", 2.0)  # that of the processes that run them
     assert [one.within(4.0, 1.5)[1] for one in plan_trial.told(1001, 1, tmp_path)] == [True]
+
+
+@pytest.mark.parametrize("modes", [1, 2])
+def test_exact_machine_code_is_counted_where_a_short_run_will_load_it(tmp_path, monkeypatch, modes):
+    """The loops for one mode and for several are compiled apart: one that is kept says nothing about the other."""
+    drive = DRIVE.replace("cycles = 30", "cycles = 5")  # so that a run of each is over soon as Python
+    scenes = {1: MODE + drive, 2: MODE + SECOND + drive}
+    monkeypatch.setattr(compiled, "_placed", lambda: (tmp_path, ""))
+    monkeypatch.setattr(compiled, "_folder", lambda: tmp_path)
+    monkeypatch.setattr(compiled, "PLAIN", False)
+    monkeypatch.setattr(compiled, "PATIENCE", 2.0)
+    looked = []
+    monkeypatch.setattr(compiled.machine, "found", looked.append)
+    found = {count: planned(text) for count, text in scenes.items()}
+    assert all("code" not in one.as_json()["memory"] for one in found.values())
+    run.run(found[modes])  # as Python, because nothing is kept
+    for path in looked:
+        path.parent.mkdir(exist_ok=True)
+        path.touch()
+    assert {count for count, text in scenes.items() if "code" in planned(text).as_json()["memory"]} == {modes}
 
 
 SHAKEN = """[structure]

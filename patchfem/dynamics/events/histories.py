@@ -5,7 +5,7 @@ from math import ceil
 
 import numpy as np
 
-from ...compiled import load, when_compiling
+from ...compiled import kernels, load, when_compiling
 from ...core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start, frozen_array
 from ...rates import PYTHON_READ
 from ...structure.drive_sizes import even_samples
@@ -92,6 +92,20 @@ def expect(modes: ModalBasis, drive, groups, cycles: float, window: int, runs: i
     march.stored.expect(runs * each)
     dense.evaluate.expect(runs * shown * SAMPLES * sample_seconds(modes))
     read.read.expect(PYTHON_READ * runs * shown * each)
+
+
+def is_loop_kept(modes: ModalBasis, drive) -> bool:
+    """Return whether machine code of the loop from event to event is kept for a plant of these modes.
+
+    The loop for one mode, whose frequency is a number, and that for several, whose frequencies are an array, are
+    compiled apart.
+    """
+    plant, table = plant_of(modes), table_of(())
+    motion, rows = np.zeros((2, modes.omega.size)), np.zeros((1, 1))
+    memory = virgin(table, np.zeros(len(plant.faces)))
+    march = kernels(f"{HERE}.march_kernels").march
+    return march.is_kept((0.0, 0.0), motion, plant, table, memory, past_of(plant, table), clock_of(drive, 0),
+                         books_of(1, np.zeros(1)), room_of(plant), rows)
 
 
 def started(modes: ModalBasis, drive, groups, cycles: float, window: int = 1, travel: float = np.inf,
