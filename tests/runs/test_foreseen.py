@@ -193,6 +193,38 @@ def test_exact_machine_code_is_counted_where_a_short_run_will_load_it(tmp_path, 
     assert {count for count, text in scenes.items() if "code" in planned(text).as_json()["memory"]} == {modes}
 
 
+RUBBED = """[structure]
+masses = ["1 kg", "2 kg"]
+[[structure.spring]]
+between = [1, 0]
+stiffness = "1 N/um"
+[[structure.spring]]
+between = [2, 1]
+stiffness = "2 N/um"
+[[structure.interface]]
+between = [1, 0]
+load = "30 N"
+law = "coulomb"
+static = 0.3
+[[structure.interface]]
+between = [2, 1]
+load = "20 N"
+law = "coulomb"
+static = 0.3
+[drive]
+kind = "base"
+acceleration = "2 m/s^2"
+frequency = "100 Hz"
+cycles = 2
+"""
+
+
+def test_always_a_short_run_of_several_interfaces_is_planned(monkeypatch):
+    monkeypatch.setattr(compiled, "PATIENCE", 2.0)
+    found = planned(RUBBED)
+    assert found.engine == "exact" and found.compile_seconds == 0 and 7e7 < found.bytes < 2e8
+
+
 SHAKEN = """[structure]
 moving_mass = "1 kg"
 [[structure.mode]]

@@ -10,7 +10,7 @@ from ...core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, 
 from ...rates import PYTHON_READ
 from ...structure.drive_sizes import even_samples
 from .cost import python_seconds, sample_seconds
-from .elements import stretches, table_of, virgin
+from .elements import coulomb, stretches, table_of, virgin
 from .event_list import BORDER, RELEASE, REVERSAL, ROOM, STOP, EventLog
 from .names_kernels import OF_FACE, OF_RUN
 from .plant import books_of, cleared, clock_of, into, past_of, place, plant_of, room_of
@@ -100,12 +100,13 @@ def is_loop_kept(modes: ModalBasis, drive) -> bool:
     The loop for one mode, whose frequency is a number, and that for several, whose frequencies are an array, are
     compiled apart.
     """
-    plant, table = plant_of(modes), table_of(())
+    plant = plant_of(modes)
+    table = table_of([coulomb(1.0)] * len(plant.faces))
     motion, rows = np.zeros((2, modes.omega.size)), np.zeros((1, 1))
     memory = virgin(table, np.zeros(len(plant.faces)))
     march = kernels(f"{HERE}.march_kernels").march
-    return march.is_kept((0.0, 0.0), motion, plant, table, memory, past_of(plant, table), clock_of(drive, 0),
-                         books_of(1, np.zeros(1)), room_of(plant), rows)
+    return march.is_kept((0.0, 0.0), motion, plant, table, memory, past_of(plant, table),
+                         clock_of(drive, len(plant.faces)), books_of(1, np.zeros(1)), room_of(plant), rows)
 
 
 def started(modes: ModalBasis, drive, groups, cycles: float, window: int = 1, travel: float = np.inf,
