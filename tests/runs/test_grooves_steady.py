@@ -10,8 +10,7 @@ from patchfem.dynamics.march.march import march
 from patchfem.model.model import build
 from patchfem.runs.rig import interface
 from patchfem.runs.rig.numerics import choose
-from patchfem.runs.rig.steady.marched import FINE, ROUGH, disturbed
-from patchfem.scene.scene import loads
+from patchfem.scene.scene import SceneError, loads
 
 RIG = """
 [normal]
@@ -69,7 +68,7 @@ def test_always_the_steady_motion_is_that_of_a_march(law, frequency):
 @pytest.mark.parametrize("law", KEYS)
 @pytest.mark.parametrize("frequency", [130, 139, 143, 150, 165])
 def test_always_the_steady_motion_with_a_lifted_mass_is_that_of_a_march(law, frequency):
-    """Of elements side by side, which slip a little further in every cycle, a march does not repeat in 600 cycles."""
+    """Elastic-plastic elements under a force that changes slip a little further in every cycle of a march."""
     asked = scene(law, f"drive.frequency={frequency} Hz", "normal.grooves.lifted_mass=0.3 kg")
     try:
         found = pf.run(asked)
@@ -99,25 +98,23 @@ def test_always_multipliers_tell_how_a_march_forgets(law):
     asked = scene(law, "drive.frequency=150 Hz")
     found, (model, contact) = pf.run(asked), contact_of(asked)
     largest = np.abs(found.extra["multipliers"]).max()
-    done = march(model.rig.modes, model.rig.drive, contact, 70, FINE, window=70).window
-    ends = done.modal[::FINE, 0] + 1j * done.modal_rate[::FINE, 0] / model.rig.drive.omega
+    steps = found.extra["steps_per_cycle"]
+    done = march(model.rig.modes, model.rig.drive, contact, 70, steps, window=70).window
+    ends = done.modal[::steps, 0] + 1j * done.modal_rate[::steps, 0] / model.rig.drive.omega
     miss = np.abs(ends - ends[-1])
     late = np.flatnonzero((miss < 1e-2 * miss[0]) & (miss > 1e-6 * miss[0]))
     seen = (miss[late[-1]] / miss[late[0]])**(1 / (late[-1] - late[0]))
-    assert seen == pytest.approx(largest, abs=0.1)
+    assert seen == pytest.approx(largest, abs=5e-3)
 
 
 def test_exact_the_multipliers_of_next_to_no_friction_are_those_of_the_valley():
     """A small motion about the bottom of the grooves: a linear oscillator of the stiffness N k^2 A beside its mode."""
     asked = scene("tanh", "friction.static=1e-9", "normal.grooves.amplitude=0.5 um", "drive.acceleration=1e-3 m/s^2")
-    model, contact = contact_of(asked)
+    found, (model, _) = pf.run(asked).extra["multipliers"], contact_of(asked)
     modes, drive, kept = model.rig.modes, model.rig.drive, 0.003 * model.rig.modes.omega[0]
-    square = modes.omega[0]**2 + model.grooves.stiffness(115.0) / modes.mass
-    own, answer = np.sqrt(square - kept**2), 1e-3j / (square - drive.omega**2 + 2j * kept * drive.omega)
-    found = disturbed(modes, drive, contact, np.array([[0.0], [answer]]))
+    own = np.sqrt(modes.omega[0]**2 + model.grooves.stiffness(115.0) / modes.mass - kept**2)
     np.testing.assert_allclose(np.abs(found), np.exp(-kept * drive.period), rtol=1e-4)
     assert np.abs(np.angle(found)) == pytest.approx(np.abs(np.angle(np.exp(1j * own * drive.period))), abs=1e-3)
-    assert ROUGH > 1e-3
 
 
 @pytest.mark.slow
@@ -142,8 +139,9 @@ def test_always_a_curve_over_frequency_passes_the_points_of_single_runs():
 
 def test_always_the_plan_says_how():
     said = "the steady motion is found by a time integration whose initial state is corrected until the motion repeats"
-    assert said in pf.plan(scene("coulomb")).verdict
-    assert "the steady motion is found by harmonic balance" in pf.plan(scene("elastic-plastic")).verdict
+    assert all(said in pf.plan(scene(law)).verdict for law in ("coulomb", "elastic-plastic"))
+    with pytest.raises(SceneError, match=r"accuracy.harmonics: harmonic balance .* was removed in patchfem 1.0; leave"):
+        scene("elastic-plastic", "accuracy.harmonics=15")
 
 
 def test_always_pieces_that_give_way_move_as_a_march_has_them():

@@ -62,8 +62,7 @@ def cycle_energy(periodic: Periodic, modes) -> dict:
 def periodic_response(periodic: Periodic, modes, drive, samples: int = 1000) -> Response:
     """One cycle of a steady motion on `samples` + 1 equal times, for measures; slide, friction force and slip of row 0.
 
-    The forces are the laws' own at each instant, so the accelerations have no ringing of cut-off harmonics; `extra` has
-    normal_load [N] where a law's load changes on the way.
+    The forces are the laws' own at each instant, so the accelerations have no ringing of cut-off harmonics.
     """
     omega, group = periodic.omega, periodic.group
     inner = samples * max(1, -(-2 * periodic.samples // samples))
@@ -81,9 +80,7 @@ def periodic_response(periodic: Periodic, modes, drive, samples: int = 1000) -> 
     track = Track(periodic.coefficients[0], omega, inner)
     found = [law.sample(track) for law in group.laws[0]]
     floor = base if drive.moving else 0 * base
-    loads = [cycle(s.load) for s in found if s.load is not None]
     return Response(np.arange(samples + 1) * (2 * np.pi / omega / samples), cycle(z), cycle(rate), cycle(track.q),
                     cycle(omega * track.rate), cycle(modes.output @ z), cycle(modes.output @ rate),
                     cycle(modes.output @ accel + floor), cycle(floor), cycle(friction_force(group.laws[0], found)),
-                    cycle(slip_of(track, found)),
-                    {"normal_load": loads[0]} if loads else {})
+                    cycle(slip_of(track, found)))

@@ -42,16 +42,14 @@ class Fading:
     limit: float | np.ndarray
 
 
-def monodromy(modes: ModalBasis, rows, omega: float, slope, by_rate, marks=(), fading=(), by_bend=None) -> np.ndarray:
+def monodromy(modes: ModalBasis, rows, omega: float, slope, by_rate, marks=(), fading=()) -> np.ndarray:
     """Map over one cycle of (z, dz/dtheta, memories), theta = omega t from 0.
 
-    rows (i, n); slope, by_rate (i, N): means per cell of the local stiffness [N/m] and damping [N s/m] of every row;
-    by_bend (i, N): of the mass that rises with it [kg], None of none.
+    rows (i, n); slope, by_rate (i, N): means per cell of the local stiffness [N/m] and damping [N s/m] of every row.
     """
     n, count = modes.omega.size, slope.shape[1]
     remembered = [np.broadcast_to(part, count) for one in fading for part in (one.gain, one.loss, one.limit)]
-    first = _runs([slope, by_rate, *([] if by_bend is None else [by_bend]), *(mark.hold for mark in marks),
-                   *remembered], marks)
+    first = _runs([slope, by_rate, *(mark.hold for mark in marks), *remembered], marks)
     width, cells = np.diff(first, append=count) * (2 * np.pi / count), first.size
     slope, by_rate = slope[:, first], by_rate[:, first]
     size = 2 * n + len(marks) + len(fading)
@@ -66,9 +64,6 @@ def monodromy(modes: ModalBasis, rows, omega: float, slope, by_rate, marks=(), f
         a[:, n:2 * n, k] = -np.multiply.outer(np.broadcast_to(one.limit, count)[first], grip[:, one.row])
         a[:, k, n:2 * n] = one.gain[first][:, None] * rows[one.row]
         a[:, k, k] = -one.loss[first]
-    if by_bend is not None:
-        risen = np.eye(n) + np.einsum("ia,in,ib->nab", rows, by_bend[:, first], rows) / modes.mass
-        a[:, n:2 * n] = np.linalg.solve(risen, a[:, n:2 * n])
     steps = exponentials(a * width[:, None, None])
     for k, mark in enumerate(marks, 2 * n):
         across = np.zeros(size)

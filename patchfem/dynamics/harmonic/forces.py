@@ -102,13 +102,14 @@ def fold(tracks: list, sampled: list) -> Fold:
         return [_sum([getattr(s, name) for s in laws if getattr(s, name) is not None
                       and (s.tangent is None or name == "force")]) for laws in sampled]
 
-    rates, bends, holds = added("by_rate"), added("by_bend"), added("hold")
-    moving, lifting = (any(one is not None for one in some) for some in (rates, bends))
-    lines = [*added("force"), *added("slope"), *(rates if moving else ()), *(bends if lifting else ())]
+    rates = added("by_rate")
+    holds = added("hold")
+    moving = any(one is not None for one in rates)
+    lines = [*added("force"), *added("slope"), *(rates if moving else ())]
     lines = [np.zeros(samples) if line is None else line for line in lines]
     found = analysis(np.concatenate([np.array(lines), *(hold for hold in holds if hold is not None)]), 2 * h)
     slope, rate = local(found[rows:2 * rows]), np.zeros((rows, h + 1), complex)
-    turns = moving or lifting or any(s.tangent is not None for laws in sampled for s in laws)
+    turns = moving or any(s.tangent is not None for laws in sampled for s in laws)
     at, k = 2 * rows, np.arange(1, h + 1)
 
     def by_omega(turned, change):
@@ -120,10 +121,6 @@ def fold(tracks: list, sampled: list) -> Fold:
         slope[..., 1:h + 1] += turned[..., h + 1:] * (k * omega)
         slope[..., h + 1:] -= turned[..., 1:h + 1] * (k * omega)
         rate += by_omega(turned, 1j * k * x[:, 1:])
-    if lifting:
-        turned, at = local(found[at:at + rows]), at + rows
-        slope[..., 1:] -= turned[..., 1:] * np.tile((k * omega)**2, 2)
-        rate += by_omega(turned, -2 * omega * k**2 * x[:, 1:])
     for i, (track, hold) in enumerate(zip(tracks, holds)):
         if hold is not None and len(hold):
             phase = np.arange(h + 1) * track.turning[0][:, None]

@@ -41,8 +41,7 @@ class Sampled(NamedTuple):
     """Along N samples: force [N], slope over the slide [N/m], over the rate of the slide [N s/m], derivatives (R, N) to
     the places of the R turning points, friction limit [N] and limit-weighted elastic stretch [N m]; tangent() of a law
     whose memory is not that of turning points: derivatives (N, 2 H + 1) of the force to the harmonics of the slide,
-    real parts and then imaginary ones, and (N,) to the frequency of the cycle; slope over the acceleration of the
-    slide [kg]; normal load [N] where it changes on the way."""
+    real parts and then imaginary ones, and (N,) to the frequency of the cycle."""
 
     force: np.ndarray
     slope: np.ndarray | None = None
@@ -51,8 +50,6 @@ class Sampled(NamedTuple):
     limit: float = 0.0
     stretch: np.ndarray | None = None
     tangent: Callable | None = None
-    by_bend: np.ndarray | None = None
-    load: np.ndarray | None = None
 
 
 class Track:
@@ -66,11 +63,6 @@ class Track:
         self.x, self.omega, self.samples = x, omega, samples
         self.q = synthesis(x, samples) if q is None else q
         self.rate = synthesis(1j * np.arange(x.size) * x, samples) if rate is None else rate
-
-    @cached_property
-    def bend(self) -> np.ndarray:
-        """Second derivative (N,) of the slide to omega t [m]."""
-        return synthesis(-np.arange(self.x.size)**2 * self.x, self.samples)
 
     @cached_property
     def turning(self) -> tuple:

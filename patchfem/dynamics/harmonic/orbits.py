@@ -63,15 +63,6 @@ def shown(run, frames: int = 0) -> tuple:
     return mark_of(run, [part], ends_of([part], run)), snapshots
 
 
-def departures(run) -> np.ndarray:
-    """How far SEEN cycles of a Run come from the state as it stands (SEEN,) [m], which is left as it is."""
-    twin, here, gone = run.fork(run.drive), _state(run), []
-    for _ in range(SEEN):
-        twin.cycle(twin.prop.steps, 0, [])
-        gone.append(_size(_state(twin) - here))
-    return np.array(gone)
-
-
 def multipliers(run) -> np.ndarray:
     """Floquet multipliers (2 n,), the largest first: what a cycle makes of small disturbances of the modes.
 

@@ -24,7 +24,7 @@ def monodromy_of(periodic, modes, cells: int = 0) -> np.ndarray:
     cells: of the cycle, in each of which the slopes of the laws are constant; 0 as in `with_stability`.
     """
     group, n = periodic.group, cells or max(1024, 2 ** (periodic.samples - 1).bit_length())
-    slope, by_rate, by_bend = np.zeros((3, len(group.rows), n))
+    slope, by_rate = np.zeros((2, len(group.rows), n))
     marks, fading = [], []
     for i, (track, laws) in enumerate(zip(group.tracks(periodic.coefficients, periodic.omega, n), group.laws)):
         for law in laws:
@@ -37,11 +37,9 @@ def monodromy_of(periodic, modes, cells: int = 0) -> np.ndarray:
             share = _weights(track, found)
             slope[i] += _mean(found.slope, share) if found.slope is not None else 0.0
             by_rate[i] += _mean(found.by_rate, 0.5) if found.by_rate is not None else 0.0
-            by_bend[i] += _mean(found.by_bend, 0.5) if found.by_bend is not None else 0.0
             if found.hold is not None:
                 marks += _marks(i, track, found.hold, share, slope[i])
-    return monodromy(modes, group.rows, periodic.omega, slope, by_rate, marks, fading,
-                     by_bend if by_bend.any() else None)
+    return monodromy(modes, group.rows, periodic.omega, slope, by_rate, marks, fading)
 
 
 def _mean(values, share) -> np.ndarray:
@@ -54,7 +52,7 @@ def _weights(track, found):
     the mean is the secant of the force over the cell; half of a force that does not follow the slide alone."""
     if found.slope is None:
         return 0.5
-    if found.by_rate is not None or found.by_bend is not None:
+    if found.by_rate is not None:
         return 0.5 if found.hold is None else _turned(track, np.full(track.samples, 0.5))
     after = np.roll(found.slope, -1)
     rise, jump = np.roll(track.q, -1) - track.q, after - found.slope

@@ -143,14 +143,15 @@ FINDERS = {one.name: one for one in (
 
 
 def steady_by(model: Model) -> Finder:
-    """How the steady motion of a model is found: by the map of events or of yields, which are exact, by a balance of
-    harmonics, or, over grooves where no balance knows the law, by a march that is brought to repeat.
+    """Choose how the steady motion of a model is found.
 
-    A scene that names its harmonics has its balance. So has one whose springs ring without end between yields.
+    Maps of events or of yields are exact. A march whose initial state is corrected until the motion repeats serves
+    grooves. Harmonic balance serves all else, also a scene that names `harmonics`, or whose springs ring without end
+    between yields.
     """
     if not EXACT.lacks(model, steady=True):
         return FINDERS["events"]
-    if model.grooves is not None and (model.soft or not methods.balances_over_grooves(model.friction)):
+    if model.grooves is not None:
         return FINDERS["march"]
     named = model.accuracy.harmonics is not None
     return FINDERS["balance" if named or PIECES.lacks(model) or pieces_per_cycle(model) > MOST_PIECES else "yields"]

@@ -5,7 +5,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from ...dynamics.grooves import climbing, periodic, run
+from ...dynamics.grooves import run
 from ...dynamics.march import joints, models
 from ...effects import has
 from ...friction.laws.elastic_plastic import parallel
@@ -84,15 +84,6 @@ def _climbing(model: Model, patch, count: int | None = None):
     kinetic = f.static if f.kinetic is None else f.kinetic
     climbs = run.model_of(model.grooves, load, f.static, kinetic, speed, model.rig.modes)
     return replace(climbs, swing=rigid.swing_of(model))
-
-
-def flank_of(model: Model, patch):
-    """The law along the flanks of grooves of a harmonic balance."""
-    f, load = model.friction, patch.pressure.load if patch is not None else model.point.load
-    if has(f.law, "memoryless"):
-        climbing.refuse_heavy(model.grooves, f.static, model.rig.modes)
-        return periodic.PacedFlank(model.grooves, load, f.static, f.reference_speed)
-    return periodic.ElasticFlank(_climbing(model, patch))
 
 
 def element_of(one: InterfaceLaw, load: float, speed: float) -> Element:

@@ -79,6 +79,9 @@ def _beside(draft: Draft, at: str, grooves: Any, law: Any) -> None:
     if has(law.law, "bonds") and accuracy is not None and accuracy.quadrature not in (None, "auto", "recursion"):
         draft.say("accuracy.quadrature", unbuilt(f"'{accuracy.quadrature}' {beside}",
                                                  "use 'recursion' or 'auto'"))
+    if accuracy is not None and accuracy.method == "harmonic" and accuracy.harmonics is not None:
+        draft.say("accuracy.harmonics", f"harmonic balance {beside} was removed in patchfem 1.0; leave `harmonics` "
+                                        "out: method 'harmonic' then integrates in time until the motion repeats")
     if contact is not None and contact.gives_way:
         if contact.holder is not None and contact.holder.tangential_stiffness is not None:
             draft.say("contact.holder.tangential_stiffness", unbuilt(beside, "out"))

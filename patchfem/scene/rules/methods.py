@@ -170,11 +170,6 @@ def beside_load(cause: str) -> str:
     return f"with a mode's {cause.rpartition('.')[2]}"
 
 
-def balances_over_grooves(law) -> bool:
-    """Whether the harmonic balance takes the law of a [friction] table along the flanks of grooves."""
-    return carries(law, "varying-load") and carries(law, "harmonic") and not has(law.law, "bonds")
-
-
 def _exact(m: Motion, method: str) -> str:
     reasons = {engine: lacking(engine, m) for engine in METHODS[method]}
     if not all(reasons.values()):
@@ -196,7 +191,7 @@ def _harmonic(m: Motion, method: str) -> str:
     if why := lacking(method, m):
         return unbuilt(f"'{method}' {why}", "march")
     if not m.laws or not all(lacking(engine, m) for engine in METHODS["exact"]) or m.spring.endswith("grooves]"):
-        return ""  # over grooves by a balance, or a march that is brought to repeat
+        return ""  # over grooves a march is brought to repeat
     law = m.laws[0]
     if len(m.laws) > 1:
         return unbuilt("'harmonic' with several interfaces and a law without exact solution or a nonlinear spring",

@@ -6,31 +6,24 @@ from time import perf_counter
 import numpy as np
 
 from ....compiled import load
-from ....core import BaseSine, NotConverged, Outcome, Start, say
-from ....dynamics.grooves import climbing
+from ....core import BaseSine, NotConverged, Outcome, say
 from ....dynamics.harmonic import branch as branches
 from ....dynamics.harmonic.balance import cycle_energy, periodic_response
 from ....dynamics.harmonic.balance import regime as balanced_regime
 from ....dynamics.harmonic.forces import Group
-from ....dynamics.harmonic.harmonic import pack
-from ....dynamics.harmonic.laws import Interlock, Spring, analysis
-from ....dynamics.harmonic.point import balance_of, finer
+from ....dynamics.harmonic.laws import Interlock, Spring
+from ....dynamics.harmonic.point import finer
 from ....dynamics.harmonic.point import point as periodic_point
 from ....dynamics.harmonic.stability import with_stability
 from ....dynamics.integrated import Integrated, Run
-from ....dynamics.march.march import march
 from ....response.errors import finer_errors
 from ....response.measures import acceleration_peak
 from ....response.spectrum import odd_harmonics, wave_measures
-from ..interface import contact_model, contact_of, flank_of
+from ..interface import contact_model
 from ..reading import Reader, friction_works
 from ..solution import Solution, sampled_loop
 from .curves import LAST, SHOWN, Shown, unlasting
-from .marched import disturbed, lasts, left_grooves
 
-ADRIFT = ('the steady motion that harmonic balance found on the grooves is unstable, and from rest another steady '
-          'motion is reached; use accuracy.method = "march"')
-CYCLES, STEPS, FEW = 30, 256, 31  # of the march that a balance over grooves starts from, and its harmonics
 SAMPLES = 4096  # of the cycle that measures are read off
 
 
@@ -65,8 +58,7 @@ class BalanceFinder:
         rig = model.rig
         parts = []
         if model.friction is not None:
-            parts.append((0, flank_of(model, patch) if model.grooves is not None else
-                          contact_model(model, numerics, patch)))
+            parts.append((0, contact_model(model, numerics, patch)))
         if rig.interlock is not None:
             parts.append((0, Interlock(*rig.interlock)))
         if rig.cubic is not None:
@@ -74,34 +66,14 @@ class BalanceFinder:
         self.model, self.modes, self.patch, self.harmonics = model, rig.modes, patch, model.accuracy.harmonics
         self.numerics = numerics
         self.group, self.tolerance = Group(rig.modes, parts), model.accuracy.tolerance
-        self.climbing = contact_of(model, numerics, patch) if model.grooves is not None else None
-
-    def _near(self, drive, near):
-        """A start: the Periodic `near`; over grooves, where there are several motions, the unknowns of the last cycle
-        of a short march from rest; else None."""
-        if near is not None or self.climbing is None:
-            return near
-        done = march(self.modes, drive, self.climbing, CYCLES, STEPS, 1, whole=False)
-        if done.outcome is not None:
-            raise NotConverged(done.message)
-        slides = analysis(done.window.slide[None, -STEPS - 1:-1], FEW)
-        balance = balance_of(self.modes, self.group, 0)
-        held = sum(1 if k == 0 else 2 for k, *_ in balance.linear(drive.omega, FEW).free)
-        return np.concatenate([pack(balance.lift.T @ slides), np.zeros(held)])
 
     def point(self, drive, near=None) -> tuple:
         """The steady motion, from the point `near` of a curve where there are several, its measures read off one cycle,
         and its Periodic; errors from twice its harmonics, its samples and those it is read at."""
         begin = perf_counter()
-        try:
-            near = self._near(drive, near)
-        except NotConverged:
-            if (gone := self._left(drive)) is None:
-                raise
-            return gone, None
         found = periodic_point(self.modes, drive, self.group, self.harmonics, self.tolerance, start=near)
-        stable, notes = self._judged(found, drive), ()
-        if self.climbing is None and not stable.stable:
+        stable, notes = with_stability(found, self.modes), ()
+        if not stable.stable:
             found, stable, notes = self._lasting(drive, found, stable)
         values, response, book = self._measured(found, drive)
         errors = self._errors(values, found, drive, lambda *of: self._measured(*of, 2 * SAMPLES)[0])
@@ -114,15 +86,8 @@ class BalanceFinder:
                  "residual": found.residual, "harmonics": found.harmonics}
         amplitude = np.array([values["relative_displacement_amplitude"]])
         outcome, message = Outcome.STUCK if held else Outcome.STEADY, ""
-        grooves, load = self.model.grooves, response.extra.get("normal_load")
-        if grooves is not None and not stable.stable:
-            outcome, message = Outcome.NOT_CONVERGED, ADRIFT
-        elif not stable.stable:
+        if not stable.stable:
             outcome, message = Outcome.NOT_CONVERGED, unlasting(stable.multipliers)
-        if load is not None and load.min() <= 0:
-            if (gone := self._left(drive, Start(response.modal[0], response.modal_rate[0]))) is not None:
-                return gone, None
-            outcome, message = Outcome.NOT_CONVERGED, climbing.lifts(grooves, response.time[int(np.argmin(load))])
         return Solution(values, response, response, amplitude, (None, None), outcome, [], book, perf_counter() - begin,
                         message=message, errors=errors, extra=extra, notes=notes), found
 
@@ -140,10 +105,6 @@ class BalanceFinder:
         better = read(better, drive) if np.isfinite(better.error) else {}
         return out | {name: error + abs(values[name]) * left for name, error in finer_errors(values, better).items()}
 
-    def _left(self, drive, start=None) -> Solution | None:
-        """As of `left_grooves`."""
-        return left_grooves(self.model, self.numerics, self.patch, drive, self.climbing, start)
-
     def _lasting(self, drive, found, stable) -> tuple:
         """In place of a Periodic that does not last the smallest one under the same drive that does, with its
         multipliers and a note on it; what is given, where none is found."""
@@ -160,18 +121,8 @@ class BalanceFinder:
 
     def shown(self, drive, near=None) -> Shown:
         """A point of a curve, its errors unknown."""
-        found = periodic_point(self.modes, drive, self.group, self.harmonics, self.tolerance,
-                               start=self._near(drive, near))
-        return self._shown(self._judged(found, drive))
-
-    def _judged(self, found, drive):
-        """The Periodic with its multipliers; over grooves those of a march that begins in it, which leaves nothing of
-        the changing normal force out."""
-        if self.climbing is None:
-            return with_stability(found, self.modes)
-        sine = BaseSine(found.level, found.omega, drive.moving)
-        there = disturbed(self.modes, sine, self.climbing, found.modal)
-        return replace(found, multipliers=there, stable=lasts(there))
+        found = periodic_point(self.modes, drive, self.group, self.harmonics, self.tolerance, start=near)
+        return self._shown(with_stability(found, self.modes))
 
     def _shown(self, found) -> Shown:
         """What a Periodic with its multipliers shows."""
@@ -226,7 +177,7 @@ class BalanceFinder:
 
     def _of_branch(self, found, drive) -> Shown:
         """A Periodic of a branch as a point of a curve with its errors."""
-        found = self._judged(found, drive) if self.climbing is not None or found.stable is None else found
+        found = with_stability(found, self.modes) if found.stable is None else found
         point = self._shown(found)._replace(regime="stable" if found.stable else "unstable")
         errors = self._errors(point.values, point.near, point.drive, self._read)
         least = {"acceleration_distortion": LAST}  # besides that of the value

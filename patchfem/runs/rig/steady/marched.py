@@ -1,16 +1,13 @@
-"""The steady motion over grooves of laws that no balance takes: a march that is brought to repeat; its curve."""
+"""The steady motion over grooves: a march that is brought to repeat, and the curve of such motions."""
 
 from dataclasses import replace
 from time import perf_counter
 
 import numpy as np
 
-from ....core import NotConverged, Outcome, Start
-from ....dynamics.grooves.run import GroovesModel
+from ....core import NotConverged, Outcome
 from ....dynamics.harmonic import orbits
-from ....dynamics.harmonic.laws import synthesis
 from ....dynamics.march import march as engine
-from ....dynamics.periodic import is_stable
 from ....effects import SINE
 from ....response.measures import peaks_between
 from ..interface import contact_of
@@ -19,18 +16,16 @@ from ..solution import Solution
 from .curves import Followed, Shown, curve_point, traced, unlasting
 
 STEPS, MOST = 256, 4096  # of a cycle, at first and at most
-FINE = 512  # of a cycle of marches that a balance is disturbed in
 EXACT = 1024  # of a law without memory, whose steps their error chooses: samples
 LEAD = 30  # cycles within which a lifted mass leaves its grooves, or stays in them
 READ = 1e-9  # relative error of a step's end
-LEFT = 0.1  # of the size of a motion: a march that is so far from it has left it
 LOOSE = 1e-6  # change from cycle to cycle, over the size of a motion, up to which it repeats
 ROUGH = 1e-2  # change of the multipliers beyond 1 that the steps of a march leave open
 
 
-def left_grooves(model, numerics, patch, drive, contact, start=None) -> Solution | None:
+def left_grooves(model, numerics, patch, drive, contact) -> Solution | None:
     """The Solution of a motion under the sine `drive` whose lifted mass leaves the grooves within LEAD cycles of a
-    march from rest, or from a Start; None where it stays in them, or nothing is lifted.
+    march from rest; None where it stays in them, or nothing is lifted.
 
     contact: its model of grooves. The errors are what half the steps change.
     """
@@ -39,7 +34,7 @@ def left_grooves(model, numerics, patch, drive, contact, start=None) -> Solution
     begin, found = perf_counter(), []
     rig = replace(model.rig, drive=drive, levels=(), waveform=SINE)
     for steps in (STEPS, STEPS // 2):
-        done = engine.march(rig.modes, drive, contact, LEAD, steps, 1, rig.travel, start=start, whole=False)
+        done = engine.march(rig.modes, drive, contact, LEAD, steps, 1, rig.travel, whole=False)
         if done.outcome is not Outcome.LEAVES_GROOVES:
             return None
         few = replace(numerics, cycles=LEAD, steps=steps, window=1)
@@ -51,7 +46,7 @@ def left_grooves(model, numerics, patch, drive, contact, start=None) -> Solution
 
 
 class MarchFinder(Followed):
-    """Laws over grooves by a march that is brought to repeat."""
+    """Finds the steady motion over grooves by a march that is brought to repeat."""
 
     tries_another, leaves = True, (0.3, 30.0)  # its points have errors of a tolerance
 
@@ -140,32 +135,3 @@ class MarchFinder(Followed):
     def curve(self, drive) -> tuple:
         """(points of the curve over the frequency, each found from the one before it, no folds)."""
         return traced(self.model.rig.modes, drive, self.shown), ()
-
-
-def disturbed(modes, drive, contact, motion) -> np.ndarray:
-    """Multipliers of a motion that repeats with the drive, by marches of a contact that begin in it.
-
-    motion: harmonics (H + 1, n) of the modal coordinates [m]. The contact is slid along it for two cycles. Where a
-    march leaves the motion, by LEFT of its size, only the pace is told at which it does so, (1,): what it misses after
-    a cycle over what it missed before.
-    """
-    turn = 1j * np.arange(len(motion)) * drive.omega
-    run = engine.fresh(modes, drive, contact, FINE, start=Start(motion.sum(axis=0).real, (turn @ motion).real))
-    slide = synthesis(motion.T, FINE).T @ modes.slide
-    before = np.concatenate([np.linspace(0.0, slide[0], FINE // 8, endpoint=False), slide, slide, slide[:1]])
-    if not isinstance(contact, GroovesModel):
-        run.contact = contact.build()
-        run.loops.follow_path(before, drive.period / FINE, contact.kind, run.contact, engine.GOAL * contact.limit,
-                            np.zeros((before.size, 2)), np.zeros((before.size, 3)))
-    run.placed(*run.state)
-    gone = orbits.departures(run)
-    size = np.abs(motion[1:]).sum(axis=0).max()
-    if gone.max() > LEFT * size:
-        last = int(np.argmax(gone > LEFT * size))
-        return np.array([(gone[last] / gone[0])**(1 / last) if last > 0 else gone[0] / (LEFT * size)])
-    return orbits.multipliers(run)
-
-
-def lasts(found) -> bool:
-    """Whether no disturbance grows, but for what the steps of a march leave open."""
-    return is_stable(found / (1 + ROUGH))

@@ -1,7 +1,7 @@
 """The engine `harmonic`: the steady motion of a scene found directly, and its curve over frequency or level.
 
 Coulomb interfaces and elastic-plastic elements by shooting on the map of their events and yields (`maps`), other laws
-by harmonic balance (`balance`), some over grooves by a march (`marched`). What is found is a
+by harmonic balance (`balance`), those over grooves by a march (`marched`). What is found is a
 motion that repeats with the drive; its regime, multipliers and stability are named.
 """
 
