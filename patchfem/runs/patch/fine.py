@@ -21,7 +21,7 @@ from ...model import profile
 from ...model.pieces import layers_of
 from .measures import OFFSET, Hidden, combined, least_of
 from .press import Surface
-from .values import peak_pressure
+from .values import vertex
 
 LEAST_LEVELS, MOST_POINTS, MOST_WORK = 3, 60_000, 2.5e7  # of a level; its iterations times its points
 POINTS = 500  # of the first level at least
@@ -205,7 +205,9 @@ def _values(asked, both: tuple, force, gap) -> tuple:
               for at in np.flatnonzero(bears[1:] != bears[:-1])]
     stretches = np.array(places).reshape(-1, 2)
     long = np.maximum(np.diff(stretches).ravel(), 0.0)
-    peak = float(max(peak_pressure(x, sigma), sigma.max())) if 0 < np.argmax(sigma) < x.size - 1 else float(sigma.max())
+    peak, top = float(sigma.max()), int(np.argmax(sigma))
+    if 0 < top < x.size - 1:
+        peak = max(peak, float(vertex(x, sigma[None], np.array([top]))[0]))
     moment = float(force @ x)
     out = {"normal_load": load, "contact_fraction": float(long.sum()) / asked.length, "pressure_peak": peak,
            "moment": moment, "contact_half_width": float(places[-1] - places[0]) / 2, "pressure_centre": moment / load,

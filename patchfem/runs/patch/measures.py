@@ -140,56 +140,74 @@ def _cornered(found: dict, fine: Patch, coarse: Patch) -> dict:
     return found | {"pressure_peak": peak, "loaded_fraction": _of_peak(found["loaded_fraction"], peak)}
 
 
+class Converged(NamedTuple):
+    """Static measures from nested meshes: values and errors by name, numbers or (q,) of q patches."""
+
+    values: dict
+    errors: dict
+
+
+def converge(series: list, least: dict, wanted, nested: bool, alike: float, rough: float = 1.0) -> Converged:
+    """Estimate the limits of static measures on nested meshes, and their errors.
+
+    Parameters
+    ----------
+    series : list of dict
+        Values on two meshes or more by name, coarse to fine; numbers or (q,).
+    least : dict
+        Errors that the meshes may agree to hide, by name.
+    wanted : float or None
+        Tolerance; a value whose error is within it is not extrapolated, None: no value is.
+    nested : bool
+        Whether every mesh halves the cells of the one before.
+    alike : float
+        Relative error below which no error is estimated.
+    rough : float
+        Factor of the errors.
+    """
+    names = list(series[-1])
+    known = np.array([[values[name] for name in names] for values in series])
+    hidden, floors = np.zeros((2, *known.shape[1:]))
+    for row, name in enumerate(names):
+        hidden[row], floors[row] = least.get(name, 0.0), TABLE[name].floor
+    enough = np.inf if wanted is None else allowed(wanted, known[-1], floors)
+    with np.errstate(invalid="ignore", divide="ignore"):  # of patches that were not solved
+        seen = limit(known, nested)
+        plain = np.maximum(rough * seen.error, hidden)
+        is_extrapolated = (seen.extrapolated != seen.value) & (plain > enough)
+        left = np.where(is_extrapolated, np.maximum(rough * seen.left, EXTRAPOLATED * hidden), np.inf)
+        best = np.where(left < plain, seen.extrapolated, seen.value)
+        error = np.maximum(np.minimum(left, plain), alike * np.abs(known[-1]))
+        found = Converged(dict(zip(names, best)), dict(zip(names, error)))
+        fraction, peak = found.values["loaded_fraction"], found.values["pressure_peak"]
+        relative = np.where(peak > 0, found.errors["pressure_peak"] / peak, 0.0)
+        found.errors["loaded_fraction"] = of_peak(fraction, found.errors["loaded_fraction"], relative)
+    return found
+
+
 def combined(series: list, least: dict, nested: bool = True, tolerance: float | None = None, alike: float = ALIKE,
              rough: float = 1.0) -> dict:
-    """Measures by name from their values on meshes, coarse to fine, each a dict by name.
+    """Return measures by name from their values on meshes of one patch, coarse to fine; parameters as of `converge`.
 
-    least: errors that the meshes may agree to hide; nested, tolerance: as `measures` has them; alike: relative error
-    that stays; rough: factor of the errors. Without a coarser mesh there are no errors, without a load they are 0.
+    Without a coarser mesh there are no errors, without a load they are 0.
     """
-    mine, floors, names = series[-1], _floors(), list(series[-1])
+    mine = series[-1]
     if len(series) == 1 or not mine["normal_load"] > 0:
         error = None if len(series) == 1 else 0.0
-        return {name: Measure(value, TABLE[name].unit, error, floors[name], engine=patch_rows.ON_FINEST_MESH)
-                for name, value in mine.items()}
-    known, (hidden, floor) = np.array([[one[name] for name in names] for one in series]), \
-        np.array([(least.get(name, 0.0), floors[name]) for name in names]).T
-    wanted = np.inf if tolerance is None else allowed(tolerance, known[-1], floor)
-    best, error = settled(known, hidden, wanted, nested, rough)
-    out = {name: Measure(value, TABLE[name].unit, wide, floors[name], engine=mesh_engine(value, mine[name]))
-           for name, value, wide in
-           zip(names, best.tolist(), np.maximum(error, alike * np.abs(known[-1])).tolist())}
-    if mine["pressure_peak"] > 0:
-        out["loaded_fraction"] = _of_peak(out["loaded_fraction"], out["pressure_peak"])
+        found = Converged(mine, dict.fromkeys(mine, error))
+    else:
+        found = converge(series, least, tolerance, nested, alike, rough)
+    out = {}
+    for name, value in found.values.items():
+        error = found.errors[name]
+        out[name] = Measure(float(value), TABLE[name].unit, None if error is None else float(error),
+                            TABLE[name].floor, engine=mesh_engine(value, mine[name]))
     return out
 
 
 def mesh_engine(value: float, finest: float) -> str:
     """Return what computed a value of nested meshes, of which the finest gives `finest`."""
     return patch_rows.ON_FINEST_MESH if value == finest else patch_rows.EXTRAPOLATED
-
-
-def settled(known, hidden, wanted, nested: bool = True, rough: float = 1.0) -> tuple:
-    """Return values (n, ...) and errors (n, ...) of n measures from their values on meshes.
-
-    Parameters
-    ----------
-    known : (levels, n, ...)
-        Values on the meshes, coarse to fine.
-    hidden : (n, ...)
-        Least errors on the finest mesh.
-    wanted : float or (n, ...)
-        Errors up to which nothing is extrapolated.
-    nested : bool
-        Whether every mesh halves the cells of the one before.
-    rough : float
-        Factor of the errors.
-    """
-    seen = limit(known, nested)
-    plain = np.maximum(rough * seen.error, hidden)
-    further = (seen.extrapolated != seen.value) & (plain > wanted)
-    left = np.where(further, np.maximum(rough * seen.left, EXTRAPOLATED * hidden), np.inf)
-    return np.where(left < plain, seen.extrapolated, seen.value), np.minimum(left, plain)
 
 
 def met(found: dict, tolerance: float) -> bool:
@@ -248,11 +266,6 @@ def cells_halved(fine, coarse) -> bool:
                for a, b in plans)
 
 
-def _floors() -> dict:
-    """Floor of the error of each measure, by name."""
-    return {name: row.floor for name, row in TABLE.items()}
-
-
 class Hidden(NamedTuple):
     """What a pressed patch is told by that three meshes may agree to hide, or (q,) of many.
 
@@ -278,18 +291,43 @@ class Hidden(NamedTuple):
     between: float = 0.0
 
 
+def hidden_by_meshes(pair, pieces, force, gap_range, turns: bool) -> Hidden:
+    """Return what meshes hide of q patches on one Pair.
+
+    Parameters
+    ----------
+    pair : Pair
+    pieces : Compliance
+        That of the pair with its skin.
+    force : (q, m) ndarray
+        Nodal forces [N].
+    gap_range : float or (q,) ndarray
+        Range of the gap [m].
+    turns : bool
+        Whether the rotation is free.
+    """
+    interface, active = pieces.interface, force > 0
+    cells = np.where(active[:, 1:] != active[:, :-1], np.diff(interface.x), 0.0)
+    longest = cells.max(axis=1)
+    spread = gap_range + np.abs(force @ pieces.normal).max(axis=1)
+    corner = 0.0
+    if pieces is pair.compliance:  # a skin evens the pressure out
+        corner = corner_layer(pair, (force / interface.weight)[:, [0, -1]], np.diff(interface.x)[[0, -1]])
+    return Hidden(interface.length, np.maximum(active.sum(axis=1), 1), longest, cells.sum(axis=1),
+                  offset(pair, longest), turns, spread, corner, 0.0)
+
+
 def _hidden(patch: Patch, missed_peak: float) -> Hidden:
-    """The Hidden of a Patch under load; missed_peak [Pa]: `unresolved_rounding`."""
-    cells, count = edge_cells(patch.x, patch.active), max(int(patch.active.sum()), 1)
+    """Return what meshes hide of a Patch under load; missed_peak [Pa]: `unresolved_rounding`."""
+    force = patch.pressure.sigma_n * patch.pieces.interface.weight
+    out = hidden_by_meshes(patch.pair, patch.pieces, force[None], np.ptp(patch.gap),
+                           "moment_balance" in patch.pressure.residuals)
+    out = Hidden(*(np.ravel(value)[0] for value in out))
+    cells = edge_cells(patch.x, patch.active)
     first, last = ~patch.active[[0, -1]]
-    moved = np.abs(patch.pieces.normal @ (patch.pressure.sigma_n * patch.pieces.interface.weight)).max()
-    corner = 0.0 if patch.pieces is not patch.pair.compliance else \
-        corner_layer(patch.pair, patch.pressure.sigma_n[[0, -1]], np.diff(patch.x)[[0, -1]])  # a skin evens it out
-    return Hidden(patch.pieces.interface.length, count, float(cells.max(initial=0.0)), float(cells.sum()),
-                  offset(patch.pair, cells.max(initial=0.0)), "moment_balance" in patch.pressure.residuals,
-                  float(np.ptp(patch.gap) + moved), corner,
-                  _wedge(patch) if count <= POINT and cells.any() else 0.0, missed_peak, float(open_ends(patch)),
-                  patch.skin is not None, float(cells[int(first):cells.size - int(last)].sum()))
+    return out._replace(wedge=_wedge(patch) if out.count <= POINT and cells.any() else 0.0, missed=missed_peak,
+                        open_ends=float(open_ends(patch)), skin=patch.skin is not None,
+                        between=float(cells[int(first):cells.size - int(last)].sum()))
 
 
 def least_of(hidden: Hidden, mine: dict) -> dict:
@@ -328,13 +366,16 @@ def offset(pair, cell):
     return out
 
 
-def corner_layer(pair, sigma, cells) -> float:
-    """Pressure [Pa] that the free end of a coating may add at a loaded corner, unresolved by cells longer than it is
-    thick; it falls with the square of the cells. sigma [Pa], cells [m]: at both ends."""
+def corner_layer(pair, sigma, cells):
+    """Return pressures (...) [Pa] that the free end of a coating may add at a loaded corner.
+
+    They are not resolved by cells longer than the coating is thick, and fall with the square of the cells. sigma
+    (..., 2) [Pa], cells (2,) [m]: at both ends.
+    """
     thick = [grid.coating for grid in (pair.grid, pair.upper_grid) if grid.coating > 0]
     if not thick:
-        return 0.0
-    return max(CORNER * s * min(1.0, (h / min(thick))**2) for s, h in zip(sigma, cells, strict=True))
+        return np.zeros(np.shape(sigma)[:-1])
+    return (CORNER * sigma * np.minimum(1.0, (cells / min(thick))**2)).max(axis=-1)
 
 
 def _wedge(patch: Patch) -> float:

@@ -11,18 +11,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contact.many.intervals import SOLVED, Intervals
-from ...core import Measure, Outcome, Pressure, allowed, frozen_array
+from ...contact.many.intervals import SOLVED, Intervals, Pressed
+from ...core import Measure, Outcome, Pressure, frozen_array
 from ...elasticity.lapack import one_thread
 from ...mesh.tensor import TensorGrid
 from ..results.patch_rows import TABLE
 from . import measures as one_by_one
 from .condensed import Pair, shared_pair, shared_pairs
-from .measures import Hidden, least_of, settled
 from .press import as_patch, with_linear_skin
-from .values import peak_pressure, vertex
+from .values import EdgeValues, peak_pressures, static_values
 
-BORDER = 3  # nodes whose means give the pressure at an end
 BEYOND = 2  # cells beyond a contact on coarser cells in which the one on these may end
 
 
@@ -57,28 +55,23 @@ class Asked(NamedTuple):
         return np.broadcast_to(self.shapes[0].at(x[:, None])[0].T, (self.load.size, x.size))
 
 
-class LevelValues(NamedTuple):
-    """What q patches have on one level: values: name -> (q,); first, stop: (q,) the nodes in contact; ends: (2, q) [m]
-    cells in which the contact ends on the left and on the right, 0 where it reaches the border; spread, corner: (q,) as
-    `Hidden` has them; top: (q,) largest nodal pressure [Pa]; good: (q,) whether it was solved; force (q, m) [N] and
-    opening (q, m) [m] of the nodes; x: (m,) [m]."""
+class Level(NamedTuple):
+    """q patches pressed on one mesh.
+
+    values: static measures by name, (q,) each; pressure: a Pressure whose fields have a row or a number for each patch;
+    contacts: the stretches in contact; gap_range: (q,) [m]; x: (m,) nodes [m].
+    """
 
     values: dict
-    first: np.ndarray
-    stop: np.ndarray
-    ends: np.ndarray
-    spread: np.ndarray
-    corner: np.ndarray
-    top: np.ndarray
-    good: np.ndarray
-    force: np.ndarray
-    opening: np.ndarray
+    pressure: Pressure
+    contacts: Pressed
+    gap_range: np.ndarray
     x: np.ndarray
 
     @property
-    def count(self) -> np.ndarray:
-        """Nodes (q,) in contact."""
-        return self.stop - self.first
+    def is_solved(self) -> np.ndarray:
+        """Whether each patch (q,) is a contact of one stretch that was found."""
+        return self.contacts.flaw <= SOLVED
 
 
 class Together(NamedTuple):
@@ -169,7 +162,7 @@ def patches_on(patches, pair: Pair) -> list:
         with one_thread():
             level = pressed_on(asked_of([patches[k] for k in cases]), pair)
         for place, k in enumerate(cases):
-            if level.good[place] and level.count[place] > one_by_one.POINT:
+            if level.is_solved[place] and level.contacts.count[place] > one_by_one.POINT:
                 out[k] = _patch_of(patches[k], pair, level, place)
     return out
 
@@ -208,110 +201,71 @@ def pressed_together(asked: Asked, tolerance: float, pieces: list | None = None)
             levels.insert(0, level)
         theirs = () if pieces else _in_other_plane(asked, levels[1])
     fine, pair = levels[0], pairs[0]
-    good = np.logical_and.reduce([level.good for level in (*levels, *theirs)])
-    good &= (fine.count > one_by_one.POINT) & (not any(one.closing.any() for one in pairs))
-    nested = all(one_by_one.cells_halved(a, b) for a, b in pairwise(pairs))
-    cell = fine.ends.max(axis=0)
-    hidden = Hidden(pair.compliance.interface.length, np.maximum(fine.count, 1), cell, fine.ends.sum(axis=0),
-                    one_by_one.offset(pair, cell), first.moment is not None, fine.spread, fine.corner, 0.0)
-    names, mine = list(fine.values), fine.values
-    known = np.array([[one.values[name] for name in names] for one in reversed(levels)])
-    least = least_of(hidden, mine)
-    floors = np.array([[TABLE[name].floor] for name in names])
-    wanted = allowed(first.mesh_tolerance or tolerance, known[-1], floors) if first.chosen else np.inf
-    with np.errstate(invalid="ignore", divide="ignore"):
-        best, error = settled(known, np.array([np.broadcast_to(least.get(name, 0.0), cell.shape) for name in names]),
-                              wanted, nested)
-        error = np.maximum(error, max(one_by_one.ALIKE, pair.rounding) * np.abs(known[-1]))
-        values, errors = dict(zip(names, best)), dict(zip(names, error))
-        peak, fraction = values["pressure_peak"], values["loaded_fraction"]
-        errors["loaded_fraction"] = one_by_one.of_peak(fraction, errors["loaded_fraction"],
-                                                       errors["pressure_peak"] / peak)
-    return Together(values, errors, good, fine.top, mine["approach"],
-                    tuple(one.values for one in (levels[1], *theirs)) if theirs else (), levels)
+    good = np.logical_and.reduce([level.is_solved for level in (*levels, *theirs)])
+    good &= (fine.contacts.count > one_by_one.POINT) & (not any(one.closing.any() for one in pairs))
+    hidden = one_by_one.hidden_by_meshes(pair, _with_skin(first, pair), fine.contacts.force, fine.gap_range,
+                                         first.moment is not None)
+    found = one_by_one.converge(
+        [level.values for level in reversed(levels)], one_by_one.least_of(hidden, fine.values),
+        (first.mesh_tolerance or tolerance) if first.chosen else None,
+        all(one_by_one.cells_halved(a, b) for a, b in pairwise(pairs)), max(one_by_one.ALIKE, pair.rounding))
+    return Together(found.values, found.errors, good, fine.pressure.sigma_n.max(axis=1), fine.values["approach"],
+                    tuple(level.values for level in (levels[1], *theirs)) if theirs else (), levels)
 
 
-def _patch_of(asked, pair: Pair, level: LevelValues, k: int):
-    """The k-th patch of a level, of the PatchModel `asked`, as `press.pressed` gives it by itself."""
-    x, weight, bare = pair.compliance.interface.x, pair.compliance.interface.weight, pair.compliance
-    gap, notes, seconds = asked.gap.at(x)
-    value = {name: float(column[k]) for name, column in level.values.items()}
-    pressure = Pressure(frozen_array(level.force[k] / weight), frozen_array(level.opening[k]), value["approach"],
-                        value["rotation"], value["normal_load"], value["moment"], Outcome.DONE, 1,
+def _patch_of(asked, pair: Pair, level: Level, k: int):
+    """Return the k-th patch of a level, of the PatchModel `asked`, as `press.pressed` gives it by itself."""
+    gap, notes, seconds = asked.gap.at(level.x)
+    rows = level.pressure
+    pressure = Pressure(frozen_array(rows.sigma_n[k]), frozen_array(rows.gap[k]), float(rows.approach[k]),
+                        float(rows.rotation[k]), float(rows.load[k]), float(rows.moment[k]), Outcome.DONE, 1,
                         MappingProxyType({}))
-    pieces = bare if asked.skin is None else with_linear_skin(asked.skin, bare)
-    return as_patch(asked, pair, gap + pair.rise, notes, seconds, (pieces, pressure, None, None))
+    return as_patch(asked, pair, gap + pair.rise, notes, seconds, (_with_skin(asked, pair), pressure, None, None))
 
 
-def _in_other_plane(asked: Asked, known: LevelValues) -> tuple:
-    """The patches on the second mesh in the other plane state, whose values in their own are known; () where nobody
-    asks."""
+def _with_skin(asked, pair: Pair):
+    """Return the Compliance of a pair with the linear skin of a `PatchModel`, that of the pair where it has none."""
+    return pair.compliance if asked.skin is None else with_linear_skin(asked.skin, pair.compliance)
+
+
+def _in_other_plane(asked: Asked, known: Level) -> tuple:
+    """Return the patches on the second mesh in the other plane state; () where its values in their own are enough."""
     other = one_by_one.other_plane(asked.first)
     return () if other is None else (pressed_on(asked._replace(first=other), shared_pair(other, 1), known),)
 
 
-def pressed_on(asked: Asked, pair: Pair, coarse: LevelValues | None = None) -> LevelValues:
-    """Values of patches on one Pair; coarse: those on coarser cells, about which the contacts end."""
-    bare, first = pair.compliance, asked.first
-    pieces = bare if first.skin is None else with_linear_skin(first.skin, bare)
-    x, weight, m = bare.interface.x, bare.interface.weight, bare.interface.x.size
-    gap, held = asked.gaps(x) + pair.rise, asked.moment is None
-    wide, turned = np.ptp(gap, axis=1), np.zeros(asked.load.size) if held else asked.angle
+def pressed_on(asked: Asked, pair: Pair, coarse: Level | None = None) -> Level:
+    """Press patches on one Pair; coarse: the same on coarser cells, about which the contacts end."""
+    bare, pieces = pair.compliance, _with_skin(asked.first, pair)
+    x, held = bare.interface.x, asked.moment is None
+    gap = asked.gaps(x) + pair.rise
+    gap_range = np.ptp(gap, axis=1)
+    turned = np.zeros(asked.load.size) if held else asked.angle
     gap = gap - turned[:, None] * x  # a free piece is counted from no angle, so that its rotation keeps its digits
-    normal, tangential, low = Intervals(pieces.normal, x), Intervals(pieces.tangential, x), gap.min(axis=1)
-    found = normal.press(gap - low[:, None], asked.load, None if held else asked.moment - asked.spring * turned,
-                         asked.spring, coarse and _about(x, coarse))
-    tangential.fill(found.first)
-    soft = normal.c.diagonal() - bare.normal.diagonal()
-    left, right = normal.places(found, soft, pair.row)
-    left, right = np.minimum(left, (left + right) / 2), np.maximum(right, (left + right) / 2)
-    sigma = found.force / weight
-    peak = peak_pressures(x, sigma, found.count, None if first.skin is None else soft / normal.c.diagonal())
-    total, moved = found.force.sum(axis=1), np.abs(found.force @ normal.c).max(axis=1)
-    pull, top, cells = found.force @ x, sigma.max(axis=1), np.diff(x)
-    with np.errstate(invalid="ignore", divide="ignore"):  # of those that were not solved
-        values = {"normal_load": total, "contact_fraction": (right - left) / np.ptp(x), "pressure_peak": peak,
-                  "moment": pull, "rotation": found.theta + asked.angle - turned, "approach": low + found.closing,
-                  "contact_half_width": (right - left) / 2, "pressure_centre": pull / total,
-                  "loaded_fraction": total / (weight.sum() * peak), "normal_stiffness": normal.stiffness(found),
-                  "tangential_stiffness": tangential.stiffness(found),
-                  "rotational_stiffness": normal.stiffness(found, True)}
-    ends = np.stack([np.where(found.first > 0, cells[np.maximum(found.first - 1, 0)], 0.0),
-                     np.where(found.stop < m, cells[np.clip(found.stop - 1, 0, m - 2)], 0.0)])
-    corner = np.zeros(total.size) if first.skin is not None else \
-        corner_layers(pair, sigma[:, [0, -1]].T, cells[[0, -1]])  # a skin evens it out
-    return LevelValues(values, found.first, found.stop, ends, wide + moved, corner, top, found.flaw <= SOLVED,
-                       found.force, found.opening, x)
+    low = gap.min(axis=1)
+    normal, tangential = Intervals(pieces.normal, x), Intervals(pieces.tangential, x)
+    contacts = normal.press(gap - low[:, None], asked.load, None if held else asked.moment - asked.spring * turned,
+                            asked.spring, coarse and _about(x, coarse))
+    tangential.fill(contacts.first)
+    sigma = contacts.force / bare.interface.weight
+    pressure = Pressure(sigma, contacts.opening, low + contacts.closing, contacts.theta + asked.angle - turned,
+                        contacts.force.sum(axis=1), contacts.force @ x, Outcome.DONE, 1, MappingProxyType({}))
+    softness = normal.c.diagonal() - bare.normal.diagonal()
+    left, right = normal.places(contacts, softness, pair.row)
+    width = np.maximum(right - left, 0.0)
+    edge_values = EdgeValues(width, width, normal.stiffness(contacts), tangential.stiffness(contacts),
+                             normal.stiffness(contacts, lever=True))
+    peak = peak_pressures(x, sigma, None if asked.first.skin is None else softness / normal.c.diagonal())
+    return Level(static_values(bare.interface, pressure, peak, edge_values), pressure, contacts, gap_range, x)
 
 
-def _about(x, coarse: LevelValues) -> tuple:
-    """(nodes (q,) from which on, nodes (q,) before which) contacts at x (m,) [m] lie, by those on other cells."""
-    before, after = coarse.x[np.maximum(coarse.first - 1, 0)], coarse.x[np.minimum(coarse.stop, coarse.x.size - 1)]
-    first = np.searchsorted(x, before) - np.where(coarse.first > 0, 0, 1)
-    stop = np.searchsorted(x, after) + 1 + BEYOND
-    return np.where(coarse.good, np.maximum(first, 0), 0), np.where(coarse.good, np.minimum(stop, x.size), x.size)
+def _about(x, coarse: Level) -> tuple:
+    """Return the nodes at x (m,) [m] between which contacts lie that are known on other cells.
 
-
-def corner_layers(pair: Pair, sigma, cells):
-    """`measures.corner_layer` of many patches: sigma (2, q) [Pa] at both ends, cells (2,) [m]."""
-    sides = [one_by_one.corner_layer(pair, (1.0,), (cell,)) for cell in cells]
-    return np.maximum(sides[0] * sigma[0], sides[1] * sigma[1])
-
-
-def peak_pressures(x, sigma, count, skin=None):
-    """`values.peak_pressure` (q,) [Pa] of pressures sigma (q, m) [Pa] on stretches of `count` (q,) nodes at x (m,) [m].
+    (q,) nodes from which on and (q,) nodes before which they lie.
     """
-    top, out = np.argmax(sigma, axis=1), sigma.max(axis=1)
-    inner = (top > 0) & (top < x.size - 1)
-    out[inner] = vertex(x, sigma[inner], top[inner])
-    for border, turned in ((0, slice(None, None, 1)), (x.size - 1, slice(None, None, -1))):
-        there = (top == border) & (count >= BORDER)
-        if there.any():  # the pressure at the end is one linear form of the first means
-            near, plain = np.abs(x[turned][:BORDER + 1] - x[border]), np.array([3.0, 2.0, 1.0, 0.0])
-            form = [peak_pressure(near, plain + np.eye(4)[k] * 0.5) - peak_pressure(near, plain) for k in range(BORDER)]
-            share = 0.0 if skin is None else skin[border]
-            means = sigma[there][:, turned][:, :BORDER]
-            out[there] = share * means[:, 0] + (1 - share) * (means @ (2 * np.array(form)))
-    for k in np.flatnonzero(~inner & (count < BORDER) & (count > 0)):
-        out[k] = peak_pressure(x, sigma[k], skin)
-    return out
+    known, solved = coarse.contacts, coarse.is_solved
+    before, after = coarse.x[np.maximum(known.first - 1, 0)], coarse.x[np.minimum(known.stop, coarse.x.size - 1)]
+    first = np.searchsorted(x, before) - np.where(known.first > 0, 0, 1)
+    stop = np.searchsorted(x, after) + 1 + BEYOND
+    return np.where(solved, np.maximum(first, 0), 0), np.where(solved, np.minimum(stop, x.size), x.size)

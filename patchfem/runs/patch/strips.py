@@ -56,20 +56,16 @@ def rotational_stiffness(state, c, x, weight) -> float:
     return out
 
 
-def strip_values(patch, peak_of) -> dict:
-    """Values of the measures that strips change, by name.
+def strip_values(patch) -> dict:
+    """Return the values of the measures that strips change, by name.
 
-    These are the peak of any strip, the share of the area, the stiffnesses, and the lateral place of the pressure with
-    its roll moment. peak_of: largest pressure of one strip from (x, pressure).
+    These are the extent of the contact, the stiffnesses, and the lateral place of the pressure with its roll moment.
     """
-    state, count = patch.strips, len(patch.strips.offsets)
-    weight = patch.pair.compliance.interface.weight / count
-    out = {"contact_fraction": 0.0, "pressure_centre_lateral": state.centre_y, "roll_moment": state.roll_moment,
-           "roll": state.roll, "pressure_peak": max(peak_of(patch.x, row) for row in state.pressure),
-           "loaded_fraction": 0.0, "normal_stiffness": 0.0, "tangential_stiffness": 0.0, "rotational_stiffness": 0.0}
+    state = patch.strips
+    weight = patch.pair.compliance.interface.weight / len(state.offsets)
+    out = {"pressure_centre_lateral": state.centre_y, "roll_moment": state.roll_moment, "roll": state.roll}
     if not state.load > 0:
         return out
-    out["loaded_fraction"] = state.load / (count * weight.sum() * out["pressure_peak"])
     return out | (_behind_skin if smooth(patch.skin) else _between_nodes)(patch, weight)
 
 

@@ -1,13 +1,13 @@
 """Values read off a pressed patch: peak, edges, half-width, stiffnesses, and the peak beside rounded ends that the
 cells are too long to show."""
 
-from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
 from ...closed_forms import contact
 from ...contact import edges
-from ...core import Outcome
+from ...core import Outcome, Pressure
 from ...elasticity.lapack import one_thread
 from ...slip import shear_modes
 from . import strips
@@ -17,20 +17,32 @@ LIKE = 2.0  # times less bent than its neighbour is still one smooth curve with 
 FINE = 4  # cells within the reach of the contact onto the rounding from which meshes show how its peak converges
 
 
-def peak_pressure(x, sigma, skin=None) -> float:
-    """Largest pressure [Pa] of the nodal pressures sigma (m,) [Pa] at x (m,) [m].
+def peak_pressures(x, sigma, skin=None) -> np.ndarray:
+    """Return the largest pressures (q,) [Pa] of patches by their nodal pressures.
 
-    Inside it is the vertex of the parabola through the largest node and its neighbours (`vertex`). At a border of the
-    interface the nodal forces of bare pieces are means over half a cell, so it is the end of the curve that has these
-    means; a skin holds the pressure at the node. skin: (m,) [1] share of the skin in the compliance of a node, None
-    without one.
+    Inside the interface it is the vertex of the parabola through the largest node and its neighbours (`vertex`). At a
+    border of the interface the nodal forces of bare pieces are means over half a cell, so it is the end of the curve
+    that has these means; a skin holds the pressure at the node.
+
+    Parameters
+    ----------
+    x : (m,) ndarray
+        Places of the nodes [m].
+    sigma : (q, m) ndarray
+        Nodal pressures [Pa].
+    skin : (m,) ndarray or None
+        Fraction [1] of the compliance of a node that the skin contributes, None without a skin.
     """
-    top = int(np.argmax(sigma))
-    if top in (0, x.size - 1):
-        bare = _at_border(x, sigma) if top == 0 else _at_border(-x[::-1], sigma[::-1])
-        share = 0.0 if skin is None else float(skin[top])
-        return share * float(sigma[top]) + (1 - share) * bare
-    return float(vertex(x, sigma[None], np.array([top]))[0])
+    top = np.argmax(sigma, axis=1)
+    peaks = sigma.max(axis=1)
+    inner = (top > 0) & (top < x.size - 1)
+    peaks[inner] = vertex(x, sigma[inner], top[inner])
+    for border, step in ((0, 1), (x.size - 1, -1)):
+        rows = np.flatnonzero(top == border)
+        bare = _border_pressures(np.abs(x[::step] - x[border]), sigma[rows, ::step])
+        fraction = 0.0 if skin is None else skin[border]
+        peaks[rows] = fraction * peaks[rows] + (1 - fraction) * bare
+    return peaks
 
 
 def vertex(x, sigma, top) -> np.ndarray:
@@ -52,15 +64,59 @@ def vertex(x, sigma, top) -> np.ndarray:
     return sigma[rows, top] + np.where(loaded, alike * slope**2 / (-4 * own), 0.0)
 
 
-def _at_border(x, sigma) -> float:
-    """Pressure [Pa] at the first node: a parabola, of fewer loaded nodes a line, by its means over their cells."""
-    count = min(3, int(np.argmin(np.append(sigma, 0.0) > 0)), x.size - 1)
-    if count < 2:
-        return float(sigma[0])
-    cuts = np.concatenate([[0.0], (x[1:count + 1] + x[:count]) / 2 - x[0]]) / (x[1] - x[0])
-    power = np.arange(1, count + 1)
-    means = np.diff(cuts[:, None]**power, axis=0) / power / np.diff(cuts)[:, None]
-    return float(np.linalg.solve(means, sigma[:count])[0])
+def _border_pressures(x, sigma) -> np.ndarray:
+    """Return the pressures (q,) [Pa] at the first node, where a curve begins whose means are the nodal pressures.
+
+    The curve is a parabola through three loaded nodes, a line through two.
+    """
+    peaks = sigma[:, 0].copy()
+    loaded = np.argmin(np.pad(sigma > 0, ((0, 0), (0, 1))), axis=1)  # nodes from the border to the first open one
+    counts = np.minimum(loaded, min(3, x.size - 1))
+    for count in (2, 3):
+        rows = counts == count
+        if rows.any():
+            cuts = np.concatenate([[0.0], (x[1:count + 1] + x[:count]) / 2]) / x[1]
+            power = np.arange(1, count + 1)
+            means = np.diff(cuts[:, None]**power, axis=0) / power / np.diff(cuts)[:, None]
+            peaks[rows] = np.linalg.solve(means, sigma[rows, :count].T)[0]
+    return peaks
+
+
+class EdgeValues(NamedTuple):
+    """Quantities of contacts that depend on where they end, numbers or (q,).
+
+    length [m] in contact; width [m] from the first to the last end; normal, tangential [N/m] and rotational [N m/rad]
+    stiffness.
+    """
+
+    length: float
+    width: float
+    normal: float
+    tangential: float
+    rotational: float
+
+
+def static_values(interface, pressed: Pressure, peak, edge_values: EdgeValues) -> dict:
+    """Return the values of the static measures by name, numbers or (q,) of q patches.
+
+    Parameters
+    ----------
+    interface : Interface
+    pressed : Pressure
+        Its load, moment, rotation and approach are numbers or (q,).
+    peak : float or (q,) ndarray
+        Largest pressure [Pa].
+    edge_values : EdgeValues
+    """
+    is_loaded = np.greater(pressed.load, 0)
+    out, force = np.zeros(np.shape(peak)), interface.weight.sum() * peak
+    return {"normal_load": pressed.load, "contact_fraction": edge_values.length / np.ptp(interface.x),
+            "pressure_peak": peak, "moment": pressed.moment, "rotation": pressed.rotation,
+            "approach": pressed.approach, "contact_half_width": edge_values.width / 2,
+            "pressure_centre": np.divide(pressed.moment, pressed.load, out=out.copy(), where=is_loaded)[()],
+            "loaded_fraction": np.divide(pressed.load, force, out=out.copy(), where=is_loaded)[()],
+            "normal_stiffness": edge_values.normal, "tangential_stiffness": edge_values.tangential,
+            "rotational_stiffness": edge_values.rotational}
 
 
 def values(patch: Patch) -> dict:
@@ -76,31 +132,26 @@ def values(patch: Patch) -> dict:
 
 
 def _values(patch: Patch) -> dict:
-    p, interface = patch.pressure, patch.pieces.interface
-    area, peak = interface.weight.sum(), peak_pressure(patch.x, p.sigma_n, patch.skin_share)
-    out = {"normal_load": p.load, "contact_fraction": 0.0, "pressure_peak": peak, "moment": p.moment,
-           "rotation": p.rotation, "approach": p.approach, "contact_half_width": 0.0,
-           "pressure_centre": p.moment / p.load if p.load > 0 else 0.0, "loaded_fraction": 0.0, "normal_stiffness": 0.0,
-           "tangential_stiffness": 0.0, "rotational_stiffness": 0.0}
-    if p.outcome is not Outcome.NO_CONTACT:
-        out["loaded_fraction"] = p.load / (area * peak)
-        if patch.strips is None:
-            with one_thread():
-                out |= _on_edges(patch)
+    pressure, interface = patch.pressure, patch.pieces.interface
     if patch.strips is not None:
-        out |= strips.strip_values(patch, partial(peak_pressure, skin=patch.skin_share))
-    return out
+        peak = peak_pressures(patch.x, patch.strips.pressure, patch.skin_share).max()
+        found = static_values(interface, pressure, peak, EdgeValues(0.0, 0.0, 0.0, 0.0, 0.0))
+        return found | strips.strip_values(patch)
+    peak = peak_pressures(patch.x, pressure.sigma_n[None], patch.skin_share)[0]
+    if pressure.outcome is Outcome.NO_CONTACT:
+        return static_values(interface, pressure, peak, EdgeValues(0.0, 0.0, 0.0, 0.0, 0.0))
+    with one_thread():
+        return static_values(interface, pressure, peak, _edge_values(patch))
 
 
-def _on_edges(patch: Patch) -> dict:
-    """The values that hang on where the contact ends."""
-    x, normal, found, active = patch.x, patch.pieces.normal, contact_ends(patch), patch.active
+def _edge_values(patch: Patch) -> EdgeValues:
+    """Return the quantities of a patch that depend on where its contact ends."""
+    x, normal, active = patch.x, patch.pieces.normal, patch.active
+    found = contact_ends(patch)
     stretches = stretches_of(patch, found)
-    return {"contact_fraction": float(np.diff(stretches).sum() / np.ptp(x)),
-            "contact_half_width": float(stretches[-1, 1] - stretches[0, 0]) / 2,
-            "normal_stiffness": edges.stiffness(normal, active, np.ones(x.size), found),
-            "tangential_stiffness": shear_stiffness(patch, found),
-            "rotational_stiffness": edges.stiffness(normal, active, x, found)}
+    return EdgeValues(length=float(np.diff(stretches).sum()), width=float(stretches[-1, 1] - stretches[0, 0]),
+                      normal=edges.stiffness(normal, active, np.ones(x.size), found),
+                      tangential=shear_stiffness(patch, found), rotational=edges.stiffness(normal, active, x, found))
 
 
 def stretches_of(patch: Patch, found: list) -> np.ndarray:
