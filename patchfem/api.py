@@ -25,12 +25,13 @@ from .campaigns.sweeps import ask, executors
 from .campaigns.sweeps import asked as case_models
 from .core import Measure, Missing, NotConverged, Outcome, PatchfemError
 from .export import backbone as backbone_files
-from .export import chosen, fits, histories, shown
+from .export import chosen, histories, shown
 from .export import cost as cost_files
 from .export import folder as results_folder
 from .export import reports as page_of_several
 from .export import summary as summaries
 from .export.drawing import pictures, swept
+from .export.fits import request as fits
 from .export.pages import lead, released, words
 from .export.surfaces import compare as compared_data
 from .export.surfaces import pairs as pairs_data
@@ -329,7 +330,7 @@ def fit(scene: str | Path | Scene, /, *, to: str | Path = "", free: Mapping[str,
     measured = "" if isinstance(to, str) and not to else str(_path(to, "fit: to"))
     with TemporaryDirectory() as room:
         target = Path(room) / "fit" if out is None else Path(out)
-        return fits.fit_into(found, measured, asked, options, target, fits.Heard(tell))
+        return fits.fit_into(found, measured, asked, options, target, fits.Listener(tell)).answer
 
 
 def _ends_of(key: str, ends: Any) -> str:

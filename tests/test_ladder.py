@@ -18,8 +18,8 @@ from house import DEFS, circles, graph_of, imports, nodes_of, sources
 
 HERE = Path(__file__).parents[1]
 SCENE = ("", "__main__", "api", "commands.*", "scene", "scene.*", "model", "model.*")  # may know a Scene
-SCENE_ALSO = ("campaigns.fit", "campaigns.fit_decay", "campaigns.fit_model",  # and so may these, each with its reason
-              "campaigns.fit_patch",  # a scene whose patch is replaced
+SCENE_ALSO = ("campaigns.fits.*",  # and so may these: values of keys of a scene, a scene whose patch is replaced
+              "export.fits.request", "export.fits.wear", "export.fits.patch",  # the fitted scene, which they write
               "campaigns.sweeps.asked", "campaigns.rows.asked")  # one scene asked again with other values of its keys
 OUTSIDE = {"numba": ("*kernels", "compiled", "compiled.*"), "pyvista": ("export.drawing.view",),
            "meshio": ("mesh.files", "export.*")}

@@ -11,7 +11,8 @@ from ..campaigns import backbone as backbones
 from ..campaigns import cost as cost_curves
 from ..export import backbone as backbone_files
 from ..export import cost as cost_files
-from ..export import fits, results
+from ..export import results
+from ..export.fits import request as fits
 from ..runs import joint
 from ..scene import axes
 from .shared import (
@@ -142,16 +143,16 @@ def fit(scene: Path, /, *, to: word(
     """
     found, target = scene_of(scene, set_), placed(out, f"{scene.stem}-fit")
     options = fits.Options(hold, offset, warm_up, from_patch=from_patch, amplitudes=amplitudes, **vars(rows))
-    with progress_bar(quiet or json_ or from_patch or fits.kind_of(found, to) in ("loop", "curve")) as progress:
-        heard = fits.Heard(None if quiet else say, progress, lambda name: f"--{name.replace('_', '-')}")
-        answer = fits.fit_into(found, to, free, options, target, heard)
+    with progress_bar(quiet or json_ or from_patch or fits.choose_kind(found, to) in ("loop", "curve")) as progress:
+        listener = fits.Listener(None if quiet else say, progress, lambda name: f"--{name.replace('_', '-')}")
+        files = fits.fit_into(found, to, free, options, target, listener)
     if json_:
-        print(json.dumps(answer, ensure_ascii=False))
+        print(json.dumps(files.answer, ensure_ascii=False))
     else:
-        print("\n".join(fits.lines_of(answer)))
-        for text in answer["warnings"]:
+        print("\n".join(files.lines))
+        for text in files.answer["warnings"]:
             say(f"warning: {text}")
         print(f"page: {target / 'report.html'}")
         print(f"results: {target}")
-    if answer["outcome"] == "not_converged":
+    if files.answer["outcome"] == "not_converged":
         raise NotReached

@@ -20,16 +20,9 @@ In: a `Result`. Out: files. A module imports its own entry of this list and the 
 16. `reports`   one page over runs or sweeps
 17. `surfaces`  pages about measured surfaces
 18. `cost`      error against time of the knobs of a scene
-19. `fit`       a fitted loop on paper
-20. `fit_folder` a fit on disk
-21. `fitted_decay` a rig fitted to frequency and damping over the amplitude
-22. `fitted_patch` laws of one point fitted to a patch
-23. `fit_rows`  a rig fitted to rows
-24. `wear_fit`  a fitted wear coefficient on disk
-25. `fit_page`  the page of a fit
-26. `fits`      a fit of any kind, from its options to its folder
-27. `backbone`  frequency and damping over the amplitude on disk
-28. `chosen`    a results folder in the format, or the picture, that the ending of a file asks for
+19. `fits`      fits of any kind, from their options to their folder
+20. `backbone`  frequency and damping over the amplitude on disk
+21. `chosen`    a results folder in the format, or the picture, that the ending of a file asks for
 
 Read `folder` first.
 """

@@ -22,8 +22,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 
-from patchfem.campaigns.fit import LOAD_UNITS, fit_loop
-from patchfem.campaigns.fit_path import LoopOptions
+from patchfem.campaigns.fits.loop import LOAD_UNITS, fit_loop
+from patchfem.campaigns.fits.loop_path import LoopOptions
 from patchfem.inputs.loops import read_loop
 from patchfem.scene.scene import loads
 
@@ -126,8 +126,9 @@ if __name__ == "__main__":
     print(f"cycles repeat to {repeat(table[0].fitted.loop)[1]:.0f} N")
     for row in table:
         values = ", ".join(f"{one.key.partition('.')[2]} {value:.4g} {one.unit}" for one, value in
-                           zip(row.fitted.free, row.fitted.found.values))
+                           zip(row.fitted.keys.ranges, row.fitted.keys.fit.values))
+        keys = row.fitted.keys
         print(f"{row.law:20s} rms {row.rms:6.0f} N, plateau {row.plateau:5.0f} N, work {row.work:5.1f} J of "
-              f"{row.measured:5.1f} J, counted rows {row.fitted.found.rows:.0f}, {row.fitted.seconds:.0f} s: {values}")
+              f"{row.measured:5.1f} J, counted rows {keys.fit.rows:.0f}, {keys.seconds:.0f} s: {values}")
     if len(sys.argv) > 2:
         draw([row for row in table if row.law in ("coulomb", "stretch", "iwan")], Path(sys.argv[2]))

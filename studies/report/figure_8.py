@@ -33,8 +33,8 @@ from drawing import drawing
 from told import told
 
 import patchfem as pf
-from patchfem.campaigns.fit import fit_loop
-from patchfem.campaigns.fit_path import LoopOptions
+from patchfem.campaigns.fits.loop import fit_loop
+from patchfem.campaigns.fits.loop_path import LoopOptions
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.scene.scene import loads
 
@@ -118,7 +118,7 @@ def read_as_rigid(one: Loop) -> tuple:
         np.savetxt(path, rows, "%.9g", ",", header="time [s],displacement [um],force [N]", comments="")
         free = ["friction.static=0.2..0.5,friction.bond_length=0.2 um..20 um"]
         found = fit_loop(loads(BENCH), path, free, options=LoopOptions((), True))
-    return tuple(float(value) for value in found.found.values[:2])
+    return tuple(float(value) for value in found.keys.fit.values[:2])
 
 
 def picture(loops: list, path: Path) -> Path:

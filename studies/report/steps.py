@@ -151,7 +151,7 @@ def main(path: Path | None = HERE / "steps.svg", fits: bool = True) -> tuple:
     for one in fit.values():
         names = [free.key.rpartition(".")[2] for free in one.asked.wanted]
         values = ", ".join(f"{name} {value:.4g} [{low:.4g}, {high:.4g}]" for name, value, (low, high)
-                           in zip(names, one.fit.values, one.fit.intervals))
+                           in zip(names, one.keys.fit.values, one.keys.fit.intervals))
         best = int((one.found.rms < 1.01 * np.nanmin(one.found.rms)).sum())
         scored = one.scored(one.logs, one.left)
         print(f"{values}; fitted {shown(scored['fitted'])}, predicted {shown(scored['held_out'])}; {best} of {STARTS} "

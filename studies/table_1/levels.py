@@ -58,7 +58,8 @@ def runaway(question, values, frequency: float) -> float | None:
 def row(rung: str, reading: str, values, frequency: float) -> dict:
     """{"rung", "frequency", "onset" [g], "runaway" [g], "slip_phase" [degrees]} of a rung with fitted values."""
     question = RUNGS[rung].question(reading)
-    scene = question.asked([(frequency, 5 * G_N)]).fitted(values)
+    asked = question.asked([(frequency, 5 * G_N)])
+    scene = asked.base.changed([one.assigned(value) for one, value in zip(asked.wanted, values)])
     place = bisect_left(ONSETS, True, key=lambda level: (measured(scene, frequency, level, "acceleration_distortion")
                                                          or 0.0) > DISTORTED)
     phase = measured(scene, frequency, 5.0, "slip_start_phase")

@@ -76,9 +76,10 @@ def main(starts: int = 8) -> dict:
                 one = scored[part]
                 print(f"{name if what == 'model' else 'null':<8}{part.replace('_', ' '):<12}"
                       f"{one['acceleration']:>14.3f}{one['displacement']:>14.3f}{one['all']:>8.3f}")
-        print("  " + ", ".join(f"{one.key} {value:.4g}" for one, value in zip(found.asked.wanted, found.fit.values)) +
-              f"; {np.sum(found.found.rms < 1.01 * found.fit.rms)} of {starts} starts end here; {seconds:.0f} s")
-        out[name] = {**each["model"], "values": found.fit.values, "seconds": seconds}
+        keys = found.keys
+        print("  " + ", ".join(f"{one.key} {value:.4g}" for one, value in zip(keys.ranges, keys.fit.values)) +
+              f"; {np.sum(found.found.rms < 1.01 * keys.fit.rms)} of {starts} starts end here; {seconds:.0f} s")
+        out[name] = {**each["model"], "values": keys.fit.values, "seconds": seconds}
     return out
 
 

@@ -11,11 +11,11 @@ from page_data import unheard
 from scipy.integrate import solve_ivp
 from scipy.stats import t as student
 
-from patchfem.campaigns.fit import LOAD_UNITS, fit_loop
-from patchfem.campaigns.fit_model import BenchModel
+from patchfem.campaigns.fits.loop import LOAD_UNITS, fit_loop
+from patchfem.campaigns.fits.loop_model import BenchModel
 from patchfem.core import PatchfemError
-from patchfem.export.fit import told_of
-from patchfem.export.fit_folder import fitted_scene
+from patchfem.export.fits.files import fitted_scene_text
+from patchfem.export.fits.text import format_fitted
 from patchfem.inputs.loops import read_loop
 from patchfem.model.model import build
 from patchfem.runs.bench import bench
@@ -134,10 +134,10 @@ def test_exact_known_values_are_found_again(tmp_path, law):
     time, slide = rows()
     loop = table(tmp_path / "loop.csv", time, slide, forces(law, time, slide, TRUTH[law]))
     found = fit_loop(scene_of(tmp_path, law), loop, free_of(*TRUTH[law]))
-    assert found.found.values == pytest.approx(list(TRUTH[law].values()), rel=1e-6)
+    assert found.keys.fit.values == pytest.approx(list(TRUTH[law].values()), rel=1e-6)
     assert found.rms < 1e-7 * LOAD and found.held_rms is None and found.step_error == 0
-    assert (found.found.intervals[:, 0] <= found.found.values).all() and found.warnings == []
-    assert np.ptp(found.found.intervals, axis=1) == pytest.approx(0, abs=1e-6)
+    assert (found.keys.fit.intervals[:, 0] <= found.keys.fit.values).all() and found.keys.warnings == []
+    assert np.ptp(found.keys.fit.intervals, axis=1) == pytest.approx(0, abs=1e-6)
 
 
 @pytest.mark.slow
@@ -147,7 +147,7 @@ def test_exact_growth_is_found_again_from_an_integrated_loop(tmp_path):
     loop = table(tmp_path / "loop.csv", time, slide, forces("growth", time, slide, TRUTH["growth"]))
     scene = scene_of(tmp_path, "growth", "accuracy.tolerance=2e-5")
     found = fit_loop(scene, loop, free_of(*TRUTH["growth"]))
-    assert found.found.values == pytest.approx(list(TRUTH["growth"].values()), rel=1e-3)
+    assert found.keys.fit.values == pytest.approx(list(TRUTH["growth"].values()), rel=1e-3)
     assert found.step_error < 2e-6 * 31
 
 
@@ -161,7 +161,7 @@ def test_exact_growth_is_found_again(tmp_path):
                                    "friction.slip_growth=1.1e-6 m"])
     force = bench.run(build(true), None, 4, path=(time, slide, 0, 0.0)).force
     found = fit_loop(scene, table(tmp_path / "loop.csv", time, slide, force), free_of(*names))
-    assert found.found.values == pytest.approx([TRUTH["growth"][name] for name in names], rel=1e-6)
+    assert found.keys.fit.values == pytest.approx([TRUTH["growth"][name] for name in names], rel=1e-6)
     assert found.pieces == 1 and found.rms < 1e-6
 
 
@@ -195,7 +195,7 @@ def test_exact_a_ratio_column_and_a_patch_fit_alike(tmp_path):
     (tmp_path / "patch.toml").write_text(text + LAWS["bonds"] + SINE, "utf-8")
     for scene in (scene_of(tmp_path, "bonds", "normal.load=7 N"), load(tmp_path / "patch.toml")):
         found = fit_loop(scene, loop, free_of(*TRUTH["bonds"]))
-        assert found.found.values == pytest.approx(list(TRUTH["bonds"].values()), rel=1e-6)
+        assert found.keys.fit.values == pytest.approx(list(TRUTH["bonds"].values()), rel=1e-6)
 
 
 def test_exact_a_moved_patch_is_condensed_once_whatever_was_asked_before(tmp_path):
@@ -229,7 +229,7 @@ def covered(tmp_path, law, seeds):
     for seed in seeds:
         loop = table(tmp_path / "loop.csv", *noisy(law, seed))
         found = fit_loop(scene, loop, free_of(*TRUTH[law]))
-        inside.append([a <= x <= b for (a, b), x in zip(found.found.intervals, TRUTH[law].values())])
+        inside.append([a <= x <= b for (a, b), x in zip(found.keys.fit.intervals, TRUTH[law].values())])
         assert found.rms == pytest.approx(0.6, rel=0.25)
     return np.array(inside)
 
@@ -239,7 +239,7 @@ def test_exact_intervals_of_a_noisy_loop_are_those_of_its_normal_equations(tmp_p
     """Design matrix from the force of this test, not from the package, at the fitted values."""
     time, slide, force = noisy(law, 0)
     found = fit_loop(scene_of(tmp_path, law), table(tmp_path / "loop.csv", time, slide, force), free_of(*TRUTH[law]))
-    best, names = found.found.values, list(TRUTH[law])
+    best, names = found.keys.fit.values, list(TRUTH[law])
 
     def at(k, share):
         return forces(law, time, slide, dict(zip(names, best * np.where(np.arange(best.size) == k, 1 + share, 1.0))))
@@ -252,8 +252,8 @@ def test_exact_intervals_of_a_noisy_loop_are_those_of_its_normal_equations(tmp_p
     ends = np.stack([best * (1 - half), best * (1 + half)], axis=1)
     if law == "elastic-plastic":  # the bond length is searched in logarithms
         ends[1] = best[1] * np.exp([-half[1], half[1]])
-    assert found.found.methods == ("linear",) * best.size
-    assert found.found.intervals == pytest.approx(ends, rel=2e-4)
+    assert found.keys.fit.methods == ("linear",) * best.size
+    assert found.keys.fit.intervals == pytest.approx(ends, rel=2e-4)
 
 
 @pytest.mark.slow
@@ -277,7 +277,7 @@ def test_exact_intervals_of_growing_bonds_cover_the_truth_in_19_of_20(tmp_path):
     for seed in range(100):
         noise = 0.1 * np.random.default_rng(seed).normal(size=force.size)
         found = fit_loop(scene, table(tmp_path / "loop.csv", time, slide, force + noise), free_of(*names))
-        inside.append([a <= TRUTH["growth"][name] <= b for (a, b), name in zip(found.found.intervals, names)])
+        inside.append([a <= TRUTH["growth"][name] <= b for (a, b), name in zip(found.keys.fit.intervals, names)])
     inside = np.array(inside)
     assert inside.mean() == pytest.approx(0.95, abs=0.04) and (inside.mean(axis=0) > 0.88).all()
 
@@ -288,12 +288,12 @@ def test_exact_static_and_load_are_known_by_their_product(tmp_path):
     found = fit_loop(scene_of(tmp_path, "elastic-plastic"),
                      table(tmp_path / "loop.csv", *noisy("elastic-plastic", 3, 0.1, 24)),
                      free_of("friction.static", "friction.bond_length", "normal.load"))
-    static, _, load_ = found.found.values
+    static, _, load_ = found.keys.fit.values
     assert static * load_ == pytest.approx(31, rel=5e-3)
-    assert np.isnan(found.found.intervals[[0, 2]]).all() and np.isfinite(found.found.intervals[1]).all()
+    assert np.isnan(found.keys.fit.intervals[[0, 2]]).all() and np.isfinite(found.keys.fit.intervals[1]).all()
     assert any("friction.static and normal.load "
                "cannot be determined separately" in text and "only their product is known" in text
-               for text in found.warnings)
+               for text in found.keys.warnings)
 
 
 def test_exact_keys_without_effect_are_named(tmp_path):
@@ -301,9 +301,9 @@ def test_exact_keys_without_effect_are_named(tmp_path):
     loop = table(tmp_path / "loop.csv", time, slide, play(slide, 0.31, 2.3e-6))
     found = fit_loop(scene_of(tmp_path, "elastic-plastic"), loop,
                      [*free_of("friction.static"), "slide.cycles=1..3,friction.bond_length=50 m..70 m"])
-    assert "slide.cycles has no effect on the computed data, so its value is not determined" in found.warnings
+    assert "slide.cycles has no effect on the computed data, so its value is not determined" in found.keys.warnings
     found = fit_loop(scene_of(tmp_path, "elastic-plastic"), loop, ["friction.static=0.1..0.25"])
-    assert found.found.values[0] == 0.25 and "at its high bound 0.25" in found.warnings[0]
+    assert found.keys.fit.values[0] == 0.25 and "at its high bound 0.25" in found.keys.warnings[0]
 
 
 def test_exact_rows_held_out_are_driven_through_but_not_fitted(tmp_path):
@@ -313,12 +313,12 @@ def test_exact_rows_held_out_are_driven_through_but_not_fitted(tmp_path):
     wrong = table(tmp_path / "wrong.csv", time, slide, force * cycle, cycle)
     scene = scene_of(tmp_path, "elastic-plastic")
     found = fit_loop(scene, wrong, free_of("friction.static", "friction.bond_length"), ["cycle=2.0"])
-    assert found.found.values == pytest.approx([0.31, 2.3e-6], rel=1e-6) and found.rms < 1e-6
+    assert found.keys.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6) and found.rms < 1e-6
     assert found.held_rms == pytest.approx(np.sqrt(np.mean(force[cycle == 2]**2)), rel=1e-6)
     assert found.held.sum() == 40
     first = fit_loop(scene, table(tmp_path / "late.csv", time, slide, np.where(cycle == 1, 5.0, force), cycle),
                      free_of("friction.static", "friction.bond_length"), ["cycle=1"])
-    assert first.found.values == pytest.approx([0.31, 2.3e-6], rel=1e-6)
+    assert first.keys.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6)
 
 
 def test_always_doubtful_records_are_named(tmp_path):
@@ -327,7 +327,7 @@ def test_always_doubtful_records_are_named(tmp_path):
     found = fit_loop(scene_of(tmp_path, "elastic-plastic", "slide.amplitude=12 um"),
                      table(tmp_path / "loop.csv", time[20:], slide[20:], late + 3 * np.sin(np.arange(61) / 9)),
                      free_of("friction.static", "friction.bond_length"))
-    assert [any(text in one for one in found.warnings) for text in
+    assert [any(text in one for one in found.keys.warnings) for text in
             ("rows are correlated", "the force in the first row is", "slide.amplitude is 1.2e-05 m")] == [True] * 3
 
 
@@ -340,7 +340,8 @@ def test_exact_time_is_made_up_only_where_no_law_feels_it(tmp_path):
     loop = tmp_path / "loop.csv"
     loop.write_text(text)
     found = fit_loop(scene_of(tmp_path, "elastic-plastic"), loop, free_of("friction.static", "friction.bond_length"))
-    assert found.found.values == pytest.approx([0.31, 2.3e-6], rel=1e-6) and "evenly spaced" in found.warnings[0]
+    assert found.keys.fit.values == pytest.approx([0.31, 2.3e-6], rel=1e-6)
+    assert "evenly spaced" in found.keys.warnings[0]
     with pytest.raises(PatchfemError, match=r"loop.csv:1: law 'tanh' needs the times of the rows of this record"):
         fit_loop(scene_of(tmp_path, "tanh"), loop, free_of("friction.static"))
     pace = '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "2 mm/s"\n'
@@ -350,7 +351,8 @@ def test_exact_time_is_made_up_only_where_no_law_feels_it(tmp_path):
     loop.write_text("displacement [um],force [N]\n" + "\n".join(f"{q},{31 * s}" for q, s in zip(where, both)))
     found = fit_loop(scene_of(tmp_path, "tanh", "friction.static=0.31", slide=pace), loop,
                      free_of("friction.reference_speed"))
-    assert found.found.values == pytest.approx([1.7e-3], rel=1e-6) and "computed from slide" in found.warnings[0]
+    assert found.keys.fit.values == pytest.approx([1.7e-3], rel=1e-6)
+    assert "computed from slide" in found.keys.warnings[0]
 
 
 # ---- the verb
@@ -374,7 +376,7 @@ def test_exact_the_verb_writes_a_scene_that_runs_to_the_fitted_loop(tmp_path, as
     one = found["values"]["friction.static"]
     page = (tmp_path / "out/report.html").read_text("utf-8")
     assert unheard(page) == [] and page.count("<svg") == 1 and "Brackets enclose 95 % intervals" in page
-    value, _, (low, high) = told_of(one)
+    value, _, (low, high) = format_fitted(one)
     assert f"<b>friction.static = {value} ({low} to {high});" in page
     assert f"<td>friction.static</td><td class=n>{value}</td><td class=n>{low} .. {high}</td>" in page
     assert "rms of the residual" in page and "rms of held-out rows" in page
@@ -484,6 +486,6 @@ def test_exact_the_rest_speed_of_the_measured_motion_is_written_out(tmp_path):
     loop = table(tmp_path / "loop.csv", time, slide, play(slide, 0.31, 2.3e-6))
     found = fit_loop(scene, loop, free_of("friction.static"))
     speed = np.abs(np.diff(slide) / np.diff(time)).max()
-    text = fitted_scene(found, tmp_path)
+    text = fitted_scene_text(found.keys, loop.name, tmp_path)
     assert math.isclose(loads(text).friction.rest_speed, 1e-3 * speed, rel_tol=1e-9)
     assert text.startswith("# friction.static fitted to loop.csv: ")

@@ -7,8 +7,8 @@ import pytest
 from command_line import cli
 from test_fit import LAWS, LOAD, POINT, SINE, dahl, free_of, play, rows, scene_of, table
 
-from patchfem.campaigns.fit import fit_loop
-from patchfem.campaigns.fit_path import LoopOptions, lead_in, whole_cycles
+from patchfem.campaigns.fits.loop import fit_loop
+from patchfem.campaigns.fits.loop_path import LoopOptions, count_whole_cycles, prepend_lead_in
 from patchfem.core import PatchfemError
 from patchfem.inputs.loops import read_loop
 from patchfem.model.model import build
@@ -27,10 +27,10 @@ def test_exact_a_steady_loop_with_an_offset_of_the_force(tmp_path):
     loop = table(tmp_path / "loop.csv", time[cut], slide[cut], force[cut])
     scene = scene_of(tmp_path, "bonds")
     found = fit_loop(scene, loop, free_of(*NAMES), options=LoopOptions(("force",), True))
-    assert found.found.values == pytest.approx([*TRUTH, 7.0], rel=1e-5)
-    assert found.rms < 1e-5 * LOAD and found.warnings == []
+    assert found.keys.fit.values == pytest.approx([*TRUTH, 7.0], rel=1e-5)
+    assert found.rms < 1e-5 * LOAD and found.keys.warnings == []
     plain = fit_loop(scene, loop, free_of(*NAMES))
-    assert plain.rms > 1.0 and any("--warm-up" in one for one in plain.warnings)
+    assert plain.rms > 1.0 and any("--warm-up" in one for one in plain.keys.warnings)
 
 
 def test_exact_the_unstressed_place_is_found(tmp_path):
@@ -41,7 +41,7 @@ def test_exact_the_unstressed_place_is_found(tmp_path):
     loop = table(tmp_path / "loop.csv", time, slide, force)
     found = fit_loop(scene_of(tmp_path, "elastic-plastic"), loop, free_of(*NAMES),
                      options=LoopOptions(("displacement",)))
-    assert found.found.values == pytest.approx([*TRUTH, 1.1e-6], rel=1e-5)
+    assert found.keys.fit.values == pytest.approx([*TRUTH, 1.1e-6], rel=1e-5)
 
 
 def test_exact_a_lead_in_ends_where_the_record_begins(tmp_path):
@@ -49,9 +49,9 @@ def test_exact_a_lead_in_ends_where_the_record_begins(tmp_path):
     time, slide = rows(50, 2)
     place = slide[3:] - slide[3]
     loop = read_loop(table(tmp_path / "loop.csv", time[3:], place, np.ones(place.size)))
-    warm = whole_cycles(loop)
+    warm = count_whole_cycles(loop)
     assert warm == 50 or warm == 51
-    moments, path, before = lead_in(loop.time, loop.displacement, warm, 2e-6)
+    moments, path, before = prepend_lead_in(loop.time, loop.displacement, warm, 2e-6)
     assert before == warm + 1 and path[0] == 0 and np.diff(moments).min() > 0
     assert path[before:] - 2e-6 == pytest.approx(loop.displacement, abs=1e-18)
     assert moments[before] - moments[1] == pytest.approx(1e-2, abs=2e-4 * 1e-2 + 1e-9)

@@ -8,8 +8,8 @@ from page_data import unheard
 from scene_texts import DRIVE, KILOGRAM, POINT, friction_of, shaken
 
 import patchfem as pf
-from patchfem.campaigns import fit_decay
-from patchfem.campaigns.fit_decay import read_curve
+from patchfem.campaigns.fits import curve as curves
+from patchfem.campaigns.fits.curve import read_curve
 from patchfem.core import PatchfemError
 
 IWAN = POINT + friction_of("iwan").replace("1e7 N/m", "1e6 N/m").replace("chi = -0.5", "chi = -0.35") + KILOGRAM + DRIVE
@@ -60,14 +60,14 @@ def test_exact_trials_that_do_not_oscillate_are_passed_over(tmp_path):
 
 @pytest.mark.slow
 def test_a_row_that_the_balance_lacks_is_corrected_as_its_neighbour(tmp_path, monkeypatch):
-    path, plain = written(tmp_path / "decay.csv", HEAVY, amplitudes=np.geomspace(1e-5, 2e-5, 4)), fit_decay._curve
+    path, plain = written(tmp_path / "decay.csv", HEAVY, amplitudes=np.geomspace(1e-5, 2e-5, 4)), curves._compute_curve
 
     def lacking(model, amplitude, method):
         found = plain(model, amplitude, method)
         found[:, 1] = np.where(method == "balance", np.nan, found[:, 1])
         return found
 
-    monkeypatch.setattr(fit_decay, "_curve", lacking)
+    monkeypatch.setattr(curves, "_compute_curve", lacking)
     found = pf.fit(HEAVY, to=path, free={"friction.static": (0.005, 0.1)}, out=tmp_path / "out", starts=1)
     assert found["values"]["friction.static"]["value"] == pytest.approx(0.02, rel=0.02)
     assert "balance found no oscillation at the amplitudes 12.6 um" in found["warnings"][0]
@@ -107,14 +107,14 @@ def test_the_verb_reads_a_curve_and_refuses_what_is_none(tmp_path, monkeypatch):
 
 def test_always_a_fit_says_how_long_it_has_run(tmp_path, monkeypatch):
     """A fit to 41 amplitudes printed nothing for four minutes."""
-    monkeypatch.setattr(fit_decay, "SECONDS", 0.0)
-    monkeypatch.setattr(fit_decay, "_curve", lambda model, amplitude, method: np.outer(
+    monkeypatch.setattr(curves, "PROGRESS_SECONDS", 0.0)
+    monkeypatch.setattr(curves, "_compute_curve", lambda model, amplitude, method: np.outer(
         [1e-4 * model.friction.stiffness, 0.01], np.ones(amplitude.size)))
     path = tmp_path / "decay.csv"
     path.write_text("amplitude [m],frequency [Hz],damping\n" + "".join(f"{k}e-6,100,0.01\n" for k in range(1, 5)))
     lines = []
-    found = fit_decay.fit_decay(pf.load(START), path, ["friction.stiffness=3e5 N/m..3e6 N/m"], lines.append)
-    assert found.found.values[0] == pytest.approx(1e6)
+    found = curves.fit_curve(pf.load(START), path, ["friction.stiffness=3e5 N/m..3e6 N/m"], lines.append)
+    assert found.keys.fit.values[0] == pytest.approx(1e6)
     said = [line for line in lines if "curves of the model computed in" in line]
     assert said[0] == "0 curves of the model computed in 0 s" and len(said) > 3
 
@@ -125,7 +125,7 @@ def test_too_few_amplitudes_say_how_many_are_needed(tmp_path):
     path.write_text("amplitude [m],frequency [Hz],damping [1]\n1e-6,100,0.01\n2e-6,99,0.01\n")
     free = {**FREE, "friction.static": (0.1, 0.6), "friction.beta": (0.1, 2)}
     with pytest.raises(PatchfemError, match="too few to determine 4 values; at least 3 are needed"):
-        fit_decay.fit_decay(pf.load(IWAN), path, [f"{key}={low}..{high}" for key, (low, high) in free.items()])
+        curves.fit_curve(pf.load(IWAN), path, [f"{key}={low}..{high}" for key, (low, high) in free.items()])
 
 
 CHAIN = """\

@@ -8,7 +8,7 @@ from command_line import cli
 from scene_texts import DRIVE, KILOGRAM, PIECE, POINT, friction_of
 
 import patchfem as pf
-from patchfem.campaigns.fit_patch import Curves, fit_law, fit_patch
+from patchfem.campaigns.fits.patch import Curves, fit_law, fit_patch
 from patchfem.friction.laws.elastic_plastic import masing
 from patchfem.friction.laws.iwan import sliders
 from patchfem.friction.record import loop_from
@@ -41,7 +41,7 @@ def test_exact_a_law_finds_itself_in_its_own_loops(law, keys):
     slides = np.geomspace(2e-7, 6e-5, 20)
     found = fit_law(law, 0.3, 100.0, slides, Curves(*loop_from(own, 100.0, slides)), 5e6)
     assert found.values == pytest.approx(keys, rel=1e-6)
-    assert np.abs(found.off).max() < 1e-6
+    assert np.abs(found.deviations).max() < 1e-6
 
 
 def test_exact_the_cells_of_an_iwan_law_are_that_law():
@@ -67,8 +67,9 @@ def test_a_mesh_is_refined_until_the_exponent_of_mindlins_contact_is_known():
     pinned = fit_patch(pf.load(JOINT + SLIDE))
     assert "energy loss has an error" in pinned.warnings[0] and "leave contact.element_size out" in pinned.warnings[0]
     found = fit_patch(pf.load(JOINT.replace('element_size = "0.2 mm"\n', "") + SLIDE))
-    assert found.laws["iwan"].values["chi"] > -0.02 and not found.warnings and found.nodes > 2 * pinned.nodes
-    assert np.sqrt(np.mean(found.mesh[1]**2)) < 0.1
+    assert found.laws["iwan"].values["chi"] > -0.02 and not found.warnings
+    assert found.patch.nodes > 2 * pinned.patch.nodes
+    assert np.sqrt(np.mean(found.patch.mesh_change[1]**2)) < 0.1
 
 
 def test_exact_a_rough_wedge_is_an_iwan_law():
@@ -78,7 +79,7 @@ def test_exact_a_rough_wedge_is_an_iwan_law():
     one = found.laws["iwan"]
     assert one.values["chi"] == 0.0 and one.values["beta"] == pytest.approx(0.0, abs=2e-2)
     assert one.values["stiffness"] == pytest.approx(0.8e12 * 12.7e-3**2, rel=1e-3)
-    assert np.abs(one.off).max() < 2e-3 and found.best == "iwan"
+    assert np.abs(one.deviations).max() < 2e-3 and found.best == "iwan"
 
 
 def test_a_rig_of_the_fitted_law_swings_as_that_of_the_patch(tmp_path):
@@ -104,8 +105,8 @@ def test_a_rig_of_the_fitted_law_swings_as_that_of_the_patch(tmp_path):
 def test_exact_the_slip_force_is_that_of_the_load(table):
     """Whatever gives way, all elements together slip at mu N, which each law keeps."""
     found = fit_patch(pf.load(RIG.replace("[contact.shear]\n", "[contact.shear]\n" + table)), [1e-8, 1e-6, 1e-4])
-    assert found.limit == pytest.approx(0.3 * found.load, rel=1e-9)
-    assert all(one.curves.force[-1] == pytest.approx(found.limit, rel=1e-6) for one in found.laws.values())
+    assert found.patch.slip_force == pytest.approx(0.3 * found.patch.load, rel=1e-9)
+    assert all(one.curves.force[-1] == pytest.approx(found.patch.slip_force, rel=1e-6) for one in found.laws.values())
 
 
 def test_the_verb_prints_what_a_law_leaves_out(tmp_path, monkeypatch):

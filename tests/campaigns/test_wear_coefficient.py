@@ -7,7 +7,7 @@ from command_line import cli
 from scene_texts import COATED, COULOMB, POINT
 
 import patchfem as pf
-from patchfem.campaigns.wear_coefficient import measured_of
+from patchfem.campaigns.fits.wear import read_depth
 from patchfem.core import PatchfemError
 from patchfem.scene.scene import loads
 
@@ -66,4 +66,4 @@ def test_refuses_what_cannot_be_fitted(scene, tmp_path):
     scene.write_text(POINT + COULOMB + SINE + WEAR)
     assert "use [contact]" in said("--to", "worn_depth_max=1 um", *FREE)
     with pytest.raises(PatchfemError, match="above zero"):
-        measured_of("worn_depth_max=0 um")
+        read_depth("worn_depth_max=0 um")

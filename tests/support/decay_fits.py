@@ -25,7 +25,7 @@ import numpy as np
 
 import patchfem as pf
 from patchfem.campaigns.backbone import backbone
-from patchfem.campaigns.fit_decay import fit_decay, read_curve
+from patchfem.campaigns.fits.curve import fit_curve, read_curve
 from patchfem.core import PatchfemError
 from patchfem.export.lab import imported
 from patchfem.identify.least_squares import descend
@@ -131,8 +131,9 @@ def made(seed: int, place: Path) -> Made:
 
 
 def chi_square(fitted) -> float:
-    """Sum of squares over their errors of a FittedDecay."""
-    return float(np.square((fitted.model - fitted.measured) / fitted.error).sum())
+    """Sum of squares over their errors of a FittedCurve."""
+    measured = fitted.measured
+    return float(np.square((fitted.model - measured.value) / measured.error).sum())
 
 
 def least(one: Made, place: Path, wanted: list) -> float:
@@ -161,8 +162,8 @@ def compared(seed: int, known: dict) -> dict:
         sets = {key: f"{value!r}{UNITS[key]}" if key in UNITS else value for key, value in one.start.items()}
         begin = process_time()
         try:
-            fitted = fit_decay(pf.load(one.scene, **sets), place, free)
-            chi, count, values = chi_square(fitted), fitted.found.evaluations, fitted.found.values.tolist()
+            fitted = fit_curve(pf.load(one.scene, **sets), place, free)
+            chi, count, values = chi_square(fitted), fitted.keys.fit.evaluations, fitted.keys.fit.values.tolist()
         except PatchfemError as reason:
             chi, count, values = np.inf, 0, str(reason)
         return {"seed": seed, "rows": int(read_curve(place)[0].size), "least": best, "found": chi, "ratio": chi / best,

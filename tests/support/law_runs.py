@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from scene_texts import DRIVE, MODE
 
-from patchfem.campaigns.fit import fit_loop
+from patchfem.campaigns.fits.loop import fit_loop
 from patchfem.model.model import build
 from patchfem.runs.bench import bench
 from patchfem.runs.run import run

@@ -7,9 +7,9 @@ from dataclasses import replace
 from ...core import BaseSine, PatchfemError
 from ...effects import waveform_of
 from ...model.model import Model, build
-from ...runs import joint
 from ...scene.changed import Base
 from ...scene.scene import Scene, SceneError, loads
+from ..fits.problem import model_without_joint
 
 READINGS = ("measured.acceleration_gain", "measured.displacement_gain")  # never in the model
 
@@ -77,16 +77,9 @@ class Asked:
                           "'harmonic'")
 
     def model(self, values) -> Model:
-        """The model with values (n,) of the free keys, at the drive of the scene; SceneError where they make none."""
-        try:
-            return joint.freed(build(self.base.changed([self.wanted[k].assigned(values[k]) for k in self.inner])))
-        except SceneError as error:
-            raise PatchfemError(error.mistakes[0]) from None
-
-    def fitted(self, values) -> Scene:
-        """The scene with values (n,) of all free keys, those of the reading too."""
-        sets = [*self.sets, *(one.assigned(value) for one, value in zip(self.wanted, values))]
-        return loads(self.scene.text, self.scene.path, [*self.scene.sets, *sets])
+        """Return the model with values (n,) of the free keys, at the drive of the scene."""
+        sets = [self.wanted[k].assigned(values[k]) for k in self.inner]
+        return model_without_joint(self.base, sets)
 
     def at(self, model: Model, condition: int) -> Model:
         """The model under the drive of a condition."""

@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from ...core import Outcome, PatchfemError
 from ...model.source import placed
 from ...response.spectrum import reading
 from ...runs.many.watched import Watcher
-from ...runs.patch import ladder
+from ..fits.problem import press_patch
 from .asked import READINGS, Asked
 
 
@@ -79,7 +78,5 @@ class Computed:
         if model.patch is None:
             return None
         if self.patch is None or self.asked.moves_pieces:
-            self.patch = ladder.solve_all(model.patch, model.accuracy.tolerance, False)[0]
-            if self.patch.pressure.outcome is Outcome.NO_CONTACT:
-                raise PatchfemError(self.patch.pressure.outcome.sentence, "")
+            self.patch = press_patch(model)
         return self.patch

@@ -1,7 +1,8 @@
-"""Values of a rig identified from measured responses, with scores of what was fitted, held out and left out.
+"""Fit of a rig to rows of measured responses, with scores of readings fitted, held out and left out.
 
-A score is the root mean square of ln(computed/measured). Beside each stand those of models without mechanics, fitted to
-the same readings (`nulls`). What is held or left out is seen by nothing but the last evaluation.
+A score is the root mean square of ln(computed/measured). It is given for the rig and for models without
+mechanics that are fitted to the same readings (`nulls`). A search does not see the readings that are
+held out or left out; only the last evaluation predicts them.
 """
 
 from __future__ import annotations
@@ -9,22 +10,27 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from time import perf_counter
+from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Outcome, PatchfemError
-from ...identify.least_squares import Fit
-from ...identify.words import remarks
+from ...core import PatchfemError
+from ..fits.problem import FittedKeys, Problem
 from .asked import Asked, Question
 from .cells import MOST, Cells, cells_of, scores
 from .computed import Computed
 from .nulls import NULLS, predicted
-from .search import Found, Search, searched
+from .search import Found, Search, residual_of, searched
+
+SAME_SCORE = 1.01  # Ratio of two scores, below which two searches found the same fit.
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Fold:
-    """One value of the column that is left out: its name, readings (n,) bool, and the Found of all others."""
+    """A value of the column that is left out.
+
+    name: the value; readings: (n,) bool, those left out; found: the fit of all others.
+    """
 
     name: str
     readings: np.ndarray
@@ -33,23 +39,56 @@ class Fold:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Placebo:
-    """A key at a value that the fit did not choose: its --set string, the Found with it, and its logs (n,)."""
+    """A repeated fit with a key at a value that the fit did not choose.
+
+    text: the "key=value" string; found: the fit; logs: (n,) ln(computed/measured).
+    """
 
     text: str
     found: Found
     logs: np.ndarray
 
 
+class NullPrediction(NamedTuple):
+    """Logarithms (n,) of a model without mechanics, those of readings left out (n,), its numbers."""
+
+    logs: np.ndarray
+    left: np.ndarray
+    numbers: dict
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class FittedRows:
     """A rig fitted to rows.
 
-    asked; cells; how: the Search; held (n,) bool; found: of the readings that are not held; computed (2, c):
-    acceleration reading [m s-2] and displacement [m] of every condition; logs (n,): ln(computed/measured); folds, and
-    left (n,): logs of each reading by the fit that did not see it, NaN where none was left out; placebos; nulls: name
-    -> (logs (n,), left (n,), numbers by kind); runs: motions computed; warnings.
+    Attributes
+    ----------
+    keys : FittedKeys
+        The fit of all readings that are not held out.
+    asked : Asked
+        The models of the scene.
+    cells : Cells
+        The n measured readings.
+    how : Search
+    held : (n,) bool
+        Readings held out.
+    found : Found
+        The searches of the fit.
+    computed : (2, c) array
+        Acceleration reading [m s-2] and displacement [m] of every condition.
+    logs : (n,) array
+        ln(computed/measured).
+    folds : tuple of Fold
+    left : (n,) array
+        ln(computed/measured) by the fit that left the reading out; NaN if none did.
+    placebos : tuple of Placebo
+    nulls : dict of NullPrediction
+        The models without mechanics by name.
+    runs : int
+        Number of motions computed.
     """
 
+    keys: FittedKeys
     asked: Asked
     cells: Cells
     how: Search
@@ -62,33 +101,39 @@ class FittedRows:
     placebos: tuple
     nulls: dict
     runs: int
-    warnings: list
-    seconds: float
 
-    @property
-    def fit(self) -> Fit:
-        """Values with their intervals."""
-        return self.found.fit
+    def score(self, logs, left, *, stable: bool = False) -> dict:
+        """Return the scores of the readings that were fitted, held out and left out.
 
-    @property
-    def outcome(self) -> Outcome:
-        """How the fit ended: done, or not_converged where the descent ran out of evaluations and no other found its
-        valley."""
-        return self.fit.outcome
+        Parameters
+        ----------
+        logs : (n,) array
+            ln(computed/measured) of any prediction.
+        left : (n,) array
+            Those of the readings left out, by a prediction that did not see them.
+        stable : bool
+            Whether to leave out the readings flagged U.
 
-    def scored(self, logs, left, stable: bool = False) -> dict:
-        """{"fitted", "held_out", "left_out"}: `cells.scores` of logs (n,) and of those of left-out readings (n,), the
-        same readings whoever predicts them; stable: without the readings flagged U."""
+        Returns
+        -------
+        dict
+            `cells.scores` by "fitted", "held_out" and "left_out".
+        """
         among = ~self.cells.unstable if stable else np.ones(self.held.size, bool)
-        return {"fitted": scores(self.cells, logs, among & ~self.held),
-                "held_out": scores(self.cells, logs, among & self.held),
-                "left_out": scores(self.cells, left, among & ~np.isnan(self.left))}
+        return {
+            "fitted": scores(self.cells, logs, among & ~self.held),
+            "held_out": scores(self.cells, logs, among & self.held),
+            "left_out": scores(self.cells, left, among & ~np.isnan(self.left)),
+        }
 
 
 @dataclass(frozen=True, slots=True)
 class RowsOptions:
-    """What stands beside a fit: rows held out ("column=value,value" texts), the column of which each value is left out
-    in turn, placebos ("key=value,value" texts), and how it searches."""
+    """What is computed besides a fit, and how the fit searches.
+
+    hold: rows held out, "column=value,value"; leave_out: the column of which each value is left out in
+    turn; placebos: "key=value,value" texts; how: the Search.
+    """
 
     hold: tuple = ()
     leave_out: str = ""
@@ -96,59 +141,114 @@ class RowsOptions:
     how: Search = field(default_factory=Search)
 
 
-def fit_rows(question: Question, options: RowsOptions, say: Callable | None = None,
-             progress: Callable | None = None) -> FittedRows:
-    """Fit what a Question asks for.
+def fit_rows(
+    question: Question,
+    options: RowsOptions,
+    say: Callable | None = None,
+    progress: Callable | None = None,
+) -> FittedRows:
+    """Fit keys of a rig to rows of measured responses.
 
-    say: called with one line when compiled code has to be made; progress: called with the share of starts that is done.
-    SceneError and PatchfemError name bad input, NotConverged a fit of which every start fails.
+    Parameters
+    ----------
+    question : Question
+        The scene, its free keys and the file of rows.
+    options : RowsOptions
+    say : Callable, optional
+        Takes a line of text before code is compiled.
+    progress : Callable, optional
+        Takes the fraction of starts that are done.
+
+    Returns
+    -------
+    FittedRows
+
+    Raises
+    ------
+    SceneError, PatchfemError
+        For input that cannot be used.
+    NotConverged
+        If all starts of a search fail.
     """
-    begin, how, count = perf_counter(), options.how, len(question.wanted)
+    begin = perf_counter()
+    how = options.how
+    count = len(question.wanted)
     cells = cells_of(question.measured)
     held = np.zeros(cells.row.size, bool)
-    for one in options.hold:
-        held |= cells.chosen(one)
-    _enough(cells, ~held, count, how)
+    for text in options.hold:
+        held |= cells.chosen(text)
+    _require_enough_readings(cells, ~held, count, how)
     asked = question.asked(cells.conditions)
     computed = Computed(asked, say)
     parts = cells.parts(options.leave_out, ~held) if options.leave_out else []
     if len(parts) == 1:
-        raise PatchfemError(f"--leave-out {options.leave_out}: all rows that are not held out have the same value in "
-                            "this column, so leaving this value out leaves no rows for the fit; choose another column")
+        raise PatchfemError(
+            f"--leave-out {options.leave_out}: all rows that are not held out have the same value "
+            "in this column, so leaving this value out leaves no rows for the fit; choose another "
+            "column"
+        )
     for _, part in parts:
-        _enough(cells, ~held & ~part, count, how)
-    placebos = [(text, question.asked(cells.conditions, text)) for one in options.placebos
-                for text in _texts(one, question.wanted)]  # what is wrong with them is said before hours of work
-    tell = _told(progress, how.starts * (1 + len(parts) + len(placebos)))
+        _require_enough_readings(cells, ~held & ~part, count, how)
+    # The texts of placebos are checked before the search, which can take hours.
+    texts = [text for given in options.placebos for text in _split_placebo(given, question.wanted)]
+    placebos = [(text, question.asked(cells.conditions, text)) for text in texts]
+    tell = _count_starts(progress, how.starts * (1 + len(parts) + len(placebos)))
     found = searched(cells, computed, ~held, how, name="all", tell=tell)
-    answer = _predicted(computed, found.fit.values, range(len(cells.conditions)))
-    logs, left, folds = cells.logs(*answer), np.full(held.size, np.nan), []
+    answer = _predict_from_rest(computed, found.fit.values, range(len(cells.conditions)))
+    logs = cells.logs(*answer)
+    left = np.full(held.size, np.nan)
+    folds = []
     for name, part in parts:
-        fold = Fold(name, part, searched(cells, computed, ~held & ~part, how, "", f"without {name}", tell))
-        seen = _predicted(computed, fold.found.fit.values, sorted(set(cells.condition[part].tolist())))
+        training = ~held & ~part
+        fold = searched(cells, computed, training, how, "", f"without {name}", tell)
+        conditions = sorted(set(cells.condition[part].tolist()))
+        seen = _predict_from_rest(computed, fold.fit.values, conditions)
         left[part] = cells.logs(*seen)[part]
-        folds.append(fold)
-    tried = tuple(_tried(*one, cells, held, how, (say, tell)) for one in placebos)
-    nulls = {name: _null(cells, name, held, parts) for name in NULLS}
-    warnings = [*asked.scene.remarks, *asked.notes, *_said(cells, asked, found, logs, how)]
-    return FittedRows(asked, cells, how, held, found, answer, logs, tuple(folds), left, tried, nulls, computed.runs,
-                      warnings, perf_counter() - begin)
+        folds.append(Fold(name, part, fold))
+    tried = []
+    for text, other in placebos:
+        model = Computed(other, say)
+        refit = searched(cells, model, ~held, how, "", text, tell)
+        seen = _predict_from_rest(model, refit.fit.values, range(len(cells.conditions)))
+        tried.append(Placebo(text, refit, cells.logs(*seen)))
+    nulls = {name: _predict_null(cells, name, held, parts) for name in NULLS}
+    residual = residual_of(cells, computed, ~held, how.unstable)
+    problem = Problem(asked.scene, asked.wanted, residual, sets=asked.sets, notes=asked.notes)
+    keys = problem.conclude(found.fit, begin, _doubts(cells, found, logs, how))
+    return FittedRows(
+        keys=keys,
+        asked=asked,
+        cells=cells,
+        how=how,
+        held=held,
+        found=found,
+        computed=answer,
+        logs=logs,
+        folds=tuple(folds),
+        left=left,
+        placebos=tuple(tried),
+        nulls=nulls,
+        runs=computed.runs,
+    )
 
 
-def _enough(cells: Cells, training, count: int, how: Search) -> None:
-    used = int((training & ~cells.unstable).sum() if how.unstable == "out" else training.sum())
-    if used <= count:
-        raise PatchfemError(f"{cells.path}: only {used} readings are used for the fit (neither held out nor left out), "
-                            f"too few to determine {count} values and their intervals")
+def _require_enough_readings(cells: Cells, training, count: int, how: Search) -> None:
+    used = training & ~cells.unstable if how.unstable == "out" else training
+    if used.sum() <= count:
+        raise PatchfemError(
+            f"{cells.path}: only {int(used.sum())} readings are used for the fit (neither held out "
+            f"nor left out), too few to determine {count} values and their intervals"
+        )
 
 
-def _predicted(computed: Computed, values, conditions) -> np.ndarray:
-    """(2, c) of the conditions from motions that begin at rest, as a run makes them."""
+def _predict_from_rest(computed: Computed, values, conditions) -> np.ndarray:
+    """Compute the conditions (2, c) from motions that begin at rest, as a run does."""
     computed.forget()
     return np.array(computed(values, list(conditions)))
 
 
-def _told(progress: Callable | None, total: int) -> Callable | None:
+def _count_starts(progress: Callable | None, total: int) -> Callable | None:
+    """Return a function that adds finished starts and reports the fraction of `total`."""
     if progress is None:
         return None
     done = [0]
@@ -160,55 +260,73 @@ def _told(progress: Callable | None, total: int) -> Callable | None:
     return tell
 
 
-def _texts(one: str, wanted) -> list:
-    """The --set strings of a placebo; PatchfemError where the fit or the rows would put another value in its place."""
-    key, equals, values = (part.strip() for part in one.partition("="))
+def _split_placebo(text: str, wanted) -> list:
+    """Return the key=value strings of a placebo.
+
+    PatchfemError for a key that the fit or the rows would set to another value.
+    """
+    key, equals, values = (part.strip() for part in text.partition("="))
     if not equals or not values:
-        raise PatchfemError(f"--placebo {one}: write table.key=value,value, for example "
-                            "structure.mode.yaw.frequency=110 Hz,138 Hz")
+        raise PatchfemError(
+            f"--placebo {text}: write table.key=value,value, for example "
+            "structure.mode.yaw.frequency=110 Hz,138 Hz"
+        )
     if key in ("drive.frequency", "drive.acceleration"):
-        raise PatchfemError(f"--placebo {one}: the rows of the file give the drive; choose a key of the rig")
-    if any(key == each.key for each in wanted):
-        raise PatchfemError(f"--placebo {one}: --free already fits this key, so a placebo value would have no effect; "
-                            "leave the key out of --free, or choose another key")
+        raise PatchfemError(
+            f"--placebo {text}: the rows of the file give the drive; choose a key of the rig"
+        )
+    if any(key == bound.key for bound in wanted):
+        raise PatchfemError(
+            f"--placebo {text}: --free already fits this key, so a placebo value would have no "
+            "effect; leave the key out of --free, or choose another key"
+        )
     return [f"{key}={value.strip()}" for value in values.split(",")]
 
 
-def _tried(text: str, asked: Asked, cells: Cells, held, how: Search, heard: tuple) -> Placebo:
-    """A whole fit with a key at another value, by a --set string; heard: (say, tell)."""
-    computed = Computed(asked, heard[0])
-    found = searched(cells, computed, ~held, how, "", text, heard[1])
-    logs = cells.logs(*_predicted(computed, found.fit.values, range(len(cells.conditions))))
-    return Placebo(text, found, logs)
-
-
-def _null(cells: Cells, name: str, held, parts) -> tuple:
-    """(logs (n,), left (n,), numbers by kind) of a null model."""
+def _predict_null(cells: Cells, name: str, held, parts) -> NullPrediction:
     logs, numbers = predicted(cells, name, ~held)
     left = np.full(held.size, np.nan)
     for _, part in parts:
         left[part] = predicted(cells, name, ~held & ~part)[0][part]
-    return logs, left, numbers
+    return NullPrediction(logs, left, numbers)
 
 
-def _said(cells: Cells, asked: Asked, found: Found, logs, how: Search) -> list:
-    """What a person must know of the rows and of the fit."""
-    out = remarks(found.fit, [one.key for one in asked.wanted])
+def _doubts(cells: Cells, found: Found, logs, how: Search) -> list:
+    """Return warnings on the rows and on the search."""
+    out = []
     if cells.empty:
-        out.append(f"{len(cells.empty)} of {len(cells.rows)} rows have no reading and are left out: rows "
-                   f"{', '.join(str(k + 1) for k in cells.empty)}")
+        numbers = ", ".join(str(k + 1) for k in cells.empty)
+        out.append(
+            f"{len(cells.empty)} of {len(cells.rows)} rows have no reading and are left out: rows "
+            f"{numbers}"
+        )
     count = int(cells.unstable.sum())
     if count:
-        means = {"bound": "count in the fit as lower bounds", "out": "are left out of the fit",
-                 "read": "count in the fit like all other readings"}[how.unstable]
-        out.append(f"{count} readings flagged U (unstable) {means}; scores_stable leaves these readings out")
-    lost = sorted({f"{cells.rows[k].frequency:.6g} Hz, {cells.rows[k].input:.4g} m/s^2"
-                   for k, log in zip(cells.row, logs) if abs(log) >= MOST})
+        meaning = {
+            "bound": "count in the fit as lower bounds",
+            "out": "are left out of the fit",
+            "read": "count in the fit like all other readings",
+        }[how.unstable]
+        out.append(
+            f"{count} readings flagged U (unstable) {meaning}; scores_stable leaves these readings "
+            "out"
+        )
+    lost = sorted(
+        {
+            f"{cells.rows[k].frequency:.6g} Hz, {cells.rows[k].input:.4g} m/s^2"
+            for k, log in zip(cells.row, logs)
+            if abs(log) >= MOST
+        }
+    )
     if lost:
-        out.append(f"no bounded motion is found at {'; '.join(lost)}: each row at these inputs counts as if the model "
-                   f"were wrong by a factor of {np.exp(MOST):.0f}")
-    alone = int((found.rms <= np.nanmin(found.rms) * 1.01).sum())
-    if alone == 1 and how.starts > 1:
-        out.append(f"only one of {how.starts} searches ended within 1 % of the best training score, so a better fit "
-                   "may exist; raise --starts")
+        out.append(
+            f"no bounded motion is found at {'; '.join(lost)}: each row at these inputs counts as "
+            f"if the model were wrong by a factor of {np.exp(MOST):.0f}"
+        )
+    alike = int((found.rms <= np.nanmin(found.rms) * SAME_SCORE).sum())
+    if alike == 1 and how.starts > 1:
+        out.append(
+            f"only one of {how.starts} searches ended within 1 % of the best training score, so a "
+            "better fit may exist; raise --starts"
+        )
     return out

@@ -44,6 +44,11 @@ def mark(kind: str, colour: str, name: str = "", **numbers) -> dict:
     return {"kind": kind, "colour": colour, "name": name, **numbers}
 
 
+def dots(x, y, colour: str, name: str = "", **style) -> dict:
+    """Return points; style: errors (n,), shape, size [points]."""
+    return mark("dots", colour, name, x=x, y=y, **style)
+
+
 def line(x, y, colour: str, name: str = "", most: int = LINE, **style) -> dict:
     """A line of at most `most` points; of a longer one those that `sampled` keeps."""
     x, y = np.asarray(x, float), np.asarray(y, float)

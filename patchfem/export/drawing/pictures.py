@@ -11,7 +11,7 @@ STYLE = {"svg.hashsalt": "patchfem", "svg.fonttype": "none", "font.family": "san
          "axes.axisbelow": True, "axes.titlesize": 11, "axes.formatter.useoffset": False, "legend.frameon": False,
          "legend.fontsize": 9, "figure.constrained_layout.use": True, "lines.linewidth": 1.4}
 COLOURS = {"accent": BLUE, "warm": ORANGE, "soft": GREY}  # those of a chart by name
-SHAPES = {"circle": "o", "square": "s", "diamond": "D"}
+SHAPES = {"circle": "o", "square": "s", "diamond": "D", "triangle": "^"}
 TALL = 3.6  # inches
 
 

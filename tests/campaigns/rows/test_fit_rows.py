@@ -14,7 +14,7 @@ from patchfem.campaigns.rows.computed import Computed
 from patchfem.campaigns.rows.fit import RowsOptions, Search, fit_rows
 from patchfem.campaigns.rows.search import residual_of
 from patchfem.core import G_N, PatchfemError
-from patchfem.export.fit_rows import Starts, answer_of
+from patchfem.export.fits.rows import Starts, describe_answer
 from patchfem.model.model import build
 from patchfem.response.spectrum import reading
 from patchfem.runs.many.watched import Watcher
@@ -118,11 +118,11 @@ def test_exact_a_linear_rig_is_found_from_closed_forms(tmp_path):
     gains = "measured.acceleration_gain=0.5..2", "measured.displacement_gain=0.5..2"
     found = fitted(scene_of(tmp_path, LINEAR), table(tmp_path, linear_rows(scale=1.3, seen=0.8)),
                    free(*LINEAR_FREE, *gains), starts=3)
-    assert found.fit.values == pytest.approx([141.0, 0.03, 1.3, 0.8], rel=1e-6)
-    assert answer_of(found)["reading"] == {"reading": "peak", "reading_cutoff": None,
-                                           "acceleration_gain": found.fit.values[2],
-                                           "displacement_gain": found.fit.values[3]}
-    assert found.scored(found.logs, found.left)["fitted"]["all"] < 1e-6
+    assert found.keys.fit.values == pytest.approx([141.0, 0.03, 1.3, 0.8], rel=1e-6)
+    assert describe_answer(found)["reading"] == {"reading": "peak", "reading_cutoff": None,
+                                           "acceleration_gain": found.keys.fit.values[2],
+                                           "displacement_gain": found.keys.fit.values[3]}
+    assert found.score(found.logs, found.left)["fitted"]["all"] < 1e-6
 
 
 def test_intervals_of_a_linear_rig_hold_the_truth(tmp_path):
@@ -132,7 +132,7 @@ def test_intervals_of_a_linear_rig_hold_the_truth(tmp_path):
     for seed in range(10):
         path = table(tmp_path, linear_rows(0.05, seed=seed))
         found = fitted(scene_of(tmp_path, LINEAR), path, free(*LINEAR_FREE), starts=1)
-        ends = found.fit.intervals
+        ends = found.keys.fit.intervals
         held += sum(low <= value <= high for (low, high), value in zip(ends, (141.0, 0.03)))
     assert held >= 16
 
@@ -157,8 +157,8 @@ def rubbed(tmp_path_factory):
 
 def test_exact_a_rubbing_rig_is_found_from_its_own_rows(tmp_path, rubbed):
     found = fitted(scene_of(tmp_path, RUBS), table(tmp_path, rubbed), free(*RUBS_FREE))
-    assert found.fit.values == pytest.approx([0.45, 2.4e6], rel=1e-5)
-    assert any("steady motions are computed" in text for text in found.warnings)
+    assert found.keys.fit.values == pytest.approx([0.45, 2.4e6], rel=1e-5)
+    assert any("steady motions are computed" in text for text in found.keys.warnings)
 
 
 @pytest.mark.slow
@@ -167,9 +167,9 @@ def test_a_noisy_rubbing_rig_lies_within_its_intervals(tmp_path, rubbed):
     noisy = [(f, level, *(value * np.exp(0.05 * draw.standard_normal()) for value in (a, y)), flag)
              for f, level, a, y, flag in rubbed]
     found = fitted(scene_of(tmp_path, RUBS), table(tmp_path, noisy), free(*RUBS_FREE), starts=1)
-    for (low, high), value in zip(found.fit.intervals, (0.45, 2.4e6)):
+    for (low, high), value in zip(found.keys.fit.intervals, (0.45, 2.4e6)):
         assert low < value < high and high / low < 1.5
-    assert 0.02 < found.fit.rms < 0.08
+    assert 0.02 < found.keys.fit.rms < 0.08
 
 
 def test_always_the_fit_does_not_see_what_is_held_or_left_out(tmp_path, rubbed):
@@ -178,14 +178,14 @@ def test_always_the_fit_does_not_see_what_is_held_or_left_out(tmp_path, rubbed):
     wanted, rows = free("friction.static=0.3..0.6"), rubbed[1::2]
     other = [(f, level, a * 3, y / 2, flag) if f == 150 else (f, level, a, y, flag) for f, level, a, y, flag in rows]
     first, second = (fitted(scene, table(tmp_path, each), wanted, hold=("frequency=150 Hz",)) for each in (rows, other))
-    assert np.array_equal(first.fit.values, second.fit.values)
+    assert np.array_equal(first.keys.fit.values, second.keys.fit.values)
     assert np.array_equal(first.found.ends, second.found.ends) and np.array_equal(first.found.rms, second.found.rms)
     assert not np.array_equal(first.logs, second.logs)
     one, two = (fitted(scene, table(tmp_path, each), wanted, leave_out="frequency", starts=1) for each in (rows, other))
     assert [fold.name for fold in one.folds] == ["135 Hz", "143 Hz", "150 Hz"]
     assert np.array_equal(one.folds[2].found.fit.values, two.folds[2].found.fit.values)
     assert not np.array_equal(one.folds[0].found.fit.values, two.folds[0].found.fit.values)
-    assert one.scored(one.logs, one.left)["left_out"]["all"] < 1e-3 < two.scored(two.logs, two.left)["left_out"]["all"]
+    assert one.score(one.logs, one.left)["left_out"]["all"] < 1e-3 < two.score(two.logs, two.left)["left_out"]["all"]
 
 
 def test_exact_a_watched_motion_is_that_of_a_run(tmp_path, rubbed):
@@ -235,7 +235,7 @@ def test_rows_flagged_u_are_lower_bounds(tmp_path):
         wanted = np.where(cells.unstable, np.minimum(logs, 0), logs)
         assert np.array_equal(found["bound"], wanted)
     stable = fitted(scene_of(tmp_path, LINEAR), path, free(*LINEAR_FREE), starts=1)
-    whole, without = (stable.scored(stable.logs, stable.left, part)["fitted"] for part in (False, True))
+    whole, without = (stable.score(stable.logs, stable.left, stable=part)["fitted"] for part in (False, True))
     among = ~cells.unstable
     assert without["all"] == pytest.approx(np.sqrt(np.mean(stable.logs[among]**2))) and whole != without
 
@@ -249,8 +249,8 @@ def test_a_motion_without_a_bound_counts_as_a_thousand(tmp_path, wanted):
                                                                          text.index("[drive]")], "")
     path = table(tmp_path, [(143.0, 8 * G_N, 9 * G_N, 2e-5, ""), (150.0, 4 * G_N, 5 * G_N, 1e-5, "")])
     found = fitted(scene_of(tmp_path, text, "friction.static=0.2"), path, free(wanted), starts=1)
-    assert found.fit.failures == 0
-    assert any("no bounded motion is found at 143 Hz" in text for text in found.warnings)
+    assert found.keys.fit.failures == 0
+    assert any("no bounded motion is found at 143 Hz" in text for text in found.keys.warnings)
     assert np.abs(found.logs).max() == pytest.approx(np.log(1e3))
 
 
@@ -325,7 +325,8 @@ def test_exact_a_fit_goes_on_from_the_starts_that_are_done(tmp_path):
     half, other = go("one", True), go("other", True)
     assert again.runs < half.runs < first.runs == other.runs
     for one in (again, half, other):
-        assert np.array_equal(one.fit.values, first.fit.values) and np.array_equal(one.found.rms, first.found.rms)
+        assert np.array_equal(one.keys.fit.values, first.keys.fit.values)
+        assert np.array_equal(one.found.rms, first.found.rms)
 
 
 @pytest.mark.parametrize("text", ["[]", "3", "{", "[" * 100_000, '{"ends": {"all/0": [[1], 2]}}'])
@@ -342,7 +343,7 @@ def test_placebos_are_whole_fits_of_their_own(tmp_path):
                    placebos=("structure.mode.axial.damping=0.03,0.1",), starts=1)
     own, other = found.placebos
     assert own.text == "structure.mode.axial.damping=0.03" and other.text == "structure.mode.axial.damping=0.1"
-    assert own.found.fit.values == pytest.approx(found.fit.values, rel=1e-12)
+    assert own.found.fit.values == pytest.approx(found.keys.fit.values, rel=1e-12)
     rms = [float(np.sqrt(np.mean(one.logs**2))) for one in (own, other)]
     assert rms[0] < 1e-6 and rms[1] > 0.1
 
@@ -368,7 +369,7 @@ def test_exact_the_reading_and_the_gain_of_the_scene_are_those_of_the_instrument
     scene = scene_of(tmp_path, LINEAR, "measured.file=rows.csv", "measured.acceleration_gain=1.3",
                      "measured.reading=rms", "measured.displacement_gain=0.8")
     one, two = (fitted(scene, path, free(*LINEAR_FREE), starts=1, seed=seed) for seed in (0, 1))
-    assert one.fit.values == pytest.approx([141.0, 0.03], rel=1e-4)
+    assert one.keys.fit.values == pytest.approx([141.0, 0.03], rel=1e-4)
     assert not np.array_equal(one.found.starts, two.found.starts)
 
 
@@ -406,7 +407,7 @@ def test_always_an_interrupted_fit_keeps_its_starts_for_the_same_table_alone(tmp
     for k, path in enumerate(tables):
         out, kept = f"out{k}", tmp_path / f"out{k}.partial"
         with monkeypatch.context() as patched:
-            patched.setattr("patchfem.campaigns.rows.fit._null", stopped)
+            patched.setattr("patchfem.campaigns.rows.fit._predict_null", stopped)
             assert cli(*words, "--to", str(tables[0]), "-o", str(tmp_path / out))[0] == 130
         assert [one.name for one in kept.iterdir()] == ["starts.json"] and not (tmp_path / out).exists()
         whole, resumed = answer(path, f"whole{k}"), answer(path, out, "--resume")

@@ -137,7 +137,7 @@ def test_exact_a_fit_finds_the_numbers_of_a_loop(tmp_path):
     force = LIMIT * integrated(slide, 1.8, 0.7)
     found = fitted(tmp_path, law_of(1.0, 0.5).replace("0.31", "0.4"), (time, slide, force),
                    "friction.static=0.1..0.7,friction.exponent=1..4,friction.shape=0.3..1")
-    assert found.found.values == pytest.approx([0.31, 1.8, 0.7], rel=1e-5)
+    assert found.keys.fit.values == pytest.approx([0.31, 1.8, 0.7], rel=1e-5)
 
 
 def test_refuses_what_the_law_cannot_do():

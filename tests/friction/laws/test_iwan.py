@@ -112,7 +112,7 @@ def test_exact_a_fit_finds_the_numbers_of_a_loop(tmp_path):
     force = bench_along(LAW, time, slide).force
     found = fitted(tmp_path, LAW.replace("0.31", "0.4").replace("-0.4", "-0.6"), (time, slide, force),
                    "friction.static=0.1..0.7,friction.chi=-0.9..-0.1")
-    assert found.found.values == pytest.approx([0.31, -0.4], rel=1e-5)
+    assert found.keys.fit.values == pytest.approx([0.31, -0.4], rel=1e-5)
 
 
 def test_refuses_what_the_law_cannot_do():

@@ -1,0 +1,412 @@
+"""Fit of a rig to frequency and damping against amplitude: a measured decay, or any backbone.
+
+The model's curve is that of a periodic motion at the measured amplitudes, by harmonic balance. The
+search uses the curve of one static force, which takes a hundredth of the time, corrected so that it has
+the value and the slopes of the balance (`identify.two_models`). Where this does not settle, the search
+uses the balance itself; where one of the two methods has no result, it uses the other.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import NotConverged, PatchfemError, frozen_array
+from ...core import say as format_length
+from ...identify.least_squares import Fit
+from ...identify.space import spread_points
+from ...identify.two_models import TwoModels
+from ...inputs.cells import text_of
+from ...inputs.columns import read_columns
+from ...model.source import placed
+from ...response.errors import error_of_change
+from ...scene.changed import Base
+from ...scene.scene import Scene
+from ..backbone import backbone
+from .problem import FittedKeys, Problem, model_without_joint, parse_ranges
+
+UNITS = {
+    "amplitude": {"m": 1.0, "mm": 1e-3, "um": 1e-6},
+    "frequency": {"Hz": 1.0},
+    "damping": {"": 1.0, "1": 1.0},
+}
+HEADER = "decay_amplitude [m],decay_frequency [Hz],decay_damping [1]"
+DEFAULT_ERRORS = np.array(
+    [1e-3, 5e-2]
+)  # Of frequency and damping, relative, of rows without errors.
+MIN_SPREAD = 1e-6  # Smallest standard deviation of a value, relative; an error of 0 has no weight.
+METHODS = ("balance", "quasi-static")  # The first is the reference, the last is quick.
+DEFAULT_STARTS = 6  # Starts of a search by the quick method.
+MAX_TRIALS = 8  # Values that are tried besides the scene's own until both methods have a curve.
+PROGRESS_SECONDS = 10.0  # Time from one line of progress to the next.
+MAX_LISTED = 6  # Amplitudes that a sentence lists.
+N_KEPT_CURVES = 8  # Curves that are remembered: a step of the search asks again for the last ones.
+
+
+class MeasuredCurve(NamedTuple):
+    """Amplitude (k,) [m]; frequency [Hz] and damping (2, k), and their standard deviations (2, k)."""
+
+    amplitude: np.ndarray
+    value: np.ndarray
+    error: np.ndarray
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FittedCurve:
+    """A fit to a curve.
+
+    Attributes
+    ----------
+    keys : FittedKeys
+    path : Path
+        File of the measured curve.
+    measured : MeasuredCurve
+    model : (2, k) array
+        Fitted frequency [Hz] and damping ratio.
+    method : {"balance", "quasi-static"}
+        How the model's curve was computed.
+    notes : tuple of str
+        Sentences on what is compared, and on the error of the modes that a reduced structure lacks.
+    """
+
+    keys: FittedKeys
+    path: Path
+    measured: MeasuredCurve
+    model: np.ndarray
+    method: str
+    notes: tuple = ()
+
+
+def is_curve(path) -> bool:
+    """Whether a file is a table of damping against amplitude, by its header."""
+    path = Path(path)
+    if path.suffix.lower() != ".csv" or not path.is_file():
+        return False
+    head = text_of(path, "a measured table").split("\n", 1)[0]
+    return "amplitude" in head and "damping" in head
+
+
+def read_curve(path) -> MeasuredCurve:
+    """Read a table that `import --decay` or `backbone` wrote; PatchfemError names mistakes."""
+    table = _read_table(path)
+    if len(set(table.labels.get("method", ("",)))) > 1:
+        raise PatchfemError(
+            f"{path}: the file contains the curves of several methods; keep the rows of one method "
+            "only"
+        )
+    columns = {name.removeprefix("decay_"): column for name, column in table.values.items()}
+    value = np.array([columns["frequency"], columns["damping"]])
+    # An error is half the width of a 95 % interval: two standard deviations.
+    spread = np.array(
+        [
+            columns.get(f"{name}_error", default * np.abs(row)) / 2
+            for name, default, row in zip(("frequency", "damping"), DEFAULT_ERRORS, value)
+        ]
+    )
+    if (spread < 0).any():
+        raise PatchfemError(
+            f"{path}: errors must be 0 or more; of a value with a confidence interval, give half "
+            "the width of this interval as the error, or leave out the column of errors"
+        )
+    amplitude = columns["amplitude"]
+    if not (amplitude > 0).all() or not (value[0] > 0).all():
+        raise PatchfemError(f"{path}: amplitudes and frequencies must be above 0")
+    order = np.argsort(amplitude, kind="stable")
+    spread = np.maximum(spread, MIN_SPREAD * np.abs(value))
+    return MeasuredCurve(amplitude[order], value[:, order], spread[:, order])
+
+
+def _read_table(path):
+    units = {
+        f"{prefix}{name}{suffix}": unit
+        for prefix in ("decay_", "")
+        for name, unit in UNITS.items()
+        for suffix in ("", "_error")
+    }
+    wanted = tuple(f"decay_{name} {name}" for name in UNITS)
+    return read_columns(path, units, wanted, HEADER, "a decay", labels=True)
+
+
+class CurveModel:
+    """Frequency [Hz] and damping ratio (2, k) of a rig at measured amplitudes, by free values.
+
+    A method raises PatchfemError for values that have no curve.
+    """
+
+    def __init__(self, scene: Scene, wanted: list, amplitude: np.ndarray, say=None):
+        self.base = Base(scene)
+        self.wanted = wanted
+        self.amplitude = amplitude
+        self.distinct, self.rows = np.unique(amplitude, return_inverse=True)
+        self.say = say
+        self.begin = perf_counter()
+        self.last_said = self.begin
+        self.count = 0
+        self.methods = list(METHODS)
+        self._cached = lru_cache(N_KEPT_CURVES)(self._compute)
+
+    def by(self, method: str, values) -> np.ndarray:
+        """Return the curve by a method, NaN at amplitudes at which the mode does not oscillate."""
+        return self._cached(tuple(map(float, values)), method)
+
+    def model(self, values):
+        """Build the rig with these values, with the modes that it has without the joint."""
+        return model_without_joint(
+            self.base, [bound.assigned(value) for bound, value in zip(self.wanted, values)]
+        )
+
+    def curve_of(self, model, method: str) -> np.ndarray:
+        """Compute the curve of any model at the measured amplitudes."""
+        return _compute_curve(model, self.distinct, method)[:, self.rows]
+
+    def _compute(self, values: tuple, method: str) -> np.ndarray:
+        if self.say and perf_counter() - self.last_said >= PROGRESS_SECONDS:
+            self.last_said = perf_counter()
+            elapsed = self.last_said - self.begin
+            self.say(f"{self.count} curves of the model computed in {elapsed:.0f} s")
+        self.count += 1
+        return self.curve_of(self.model(values), method)
+
+    def choose_methods(self, trials: list) -> None:
+        """Keep the METHODS that have a curve at the first values at which all of them, or most, do."""
+        reasons: list = []
+        best: list = []
+        for values in trials:
+            known = []
+            for method in METHODS:
+                try:
+                    self.by(method, values)
+                    known.append(method)
+                except PatchfemError as reason:
+                    reasons.append(f"{method}: {reason}")
+            best = max(best, known, key=len)
+            if len(best) == len(METHODS):
+                break
+        if not best:
+            raise PatchfemError(
+                "no curve of frequency and damping could be computed within the ranges of --free; "
+                f"{'; '.join(reasons[: len(METHODS)])}; leave out the rows with the largest "
+                "damping, or change the ranges of --free"
+            )
+        self.methods = best
+
+    def reference(self, values) -> np.ndarray:
+        """Return the curve by the best method, NaN where the mode does not oscillate."""
+        return self.by(self.methods[0], values)
+
+    def quick(self, values) -> np.ndarray:
+        """Return the curve by the quick method; PatchfemError where the mode does not oscillate."""
+        curve = self.by(self.methods[-1], values)
+        lost = self.amplitude[np.isnan(curve[0])]
+        if lost.size:
+            raise PatchfemError(
+                "the mode of the model does not oscillate at the amplitudes "
+                f"{_list_amplitudes(lost)}; leave out these rows, or narrow the ranges of --free"
+            )
+        return curve
+
+    def balanced(self, values) -> np.ndarray:
+        """Return the curve by the best method.
+
+        Rows that only this method lacks have the quick value times the ratio of both methods in the
+        row nearest in amplitude.
+        """
+        curve = self.reference(values)
+        quick = self.by(self.methods[-1], values)
+        known = np.flatnonzero(~np.isnan(curve[0]))
+        nearest = known[_nearest_rows(self.amplitude[known], self.amplitude)]
+        return np.where(np.isnan(curve), quick * (curve / quick)[:, nearest], curve)
+
+
+def fit_curve(
+    scene: Scene, to: Path, free: Sequence, say=None, starts: int = DEFAULT_STARTS
+) -> FittedCurve:
+    """Fit keys of a rig to a curve of frequency and damping against amplitude.
+
+    Each row counts by its error. Values at which the mode does not oscillate are failed evaluations.
+    For a reduced structure the intervals contain the error of the modes that it lacks.
+
+    Parameters
+    ----------
+    scene : Scene
+    to : Path
+        File of the curve, as `read_curve` takes it.
+    free : sequence of str
+        Free keys with their ranges, "table.key=low..high".
+    say : Callable, optional
+        Takes a line of progress.
+    starts : int
+        Starts of the search by the quick method.
+
+    Returns
+    -------
+    FittedCurve
+
+    Raises
+    ------
+    SceneError, PatchfemError
+        For input that cannot be used.
+    NotConverged
+        If no search settles.
+    """
+    begin = perf_counter()
+    wanted = parse_ranges(free)
+    measured = read_curve(to)
+    count = measured.amplitude.size
+    if 2 * count <= len(wanted):
+        raise PatchfemError(
+            f"{to}: {count} amplitudes are too few to determine {len(wanted)} values; at least "
+            f"{len(wanted) // 2 + 1} are needed"
+        )
+    curves = CurveModel(scene, wanted, measured.amplitude, say)
+
+    def misfit(curve) -> np.ndarray:
+        return ((curve - measured.value) / measured.error).ravel()
+
+    problem = Problem(scene, wanted, lambda values: misfit(curves.quick(values)))
+    start, box = problem.own_values(), problem.box
+    trials = [start, *map(box.values, spread_points(MAX_TRIALS, len(start)))]
+    curves.choose_methods(trials)
+    if say:
+        say(f"{count} amplitudes computed by {' and '.join(curves.methods)}")
+    model = curves.quick
+    if len(curves.methods) > 1:
+        models = TwoModels(curves.quick, curves.balanced, misfit, box)
+        model, start = _search_two_models(models, start, starts, measured.amplitude)
+        model = model or curves.balanced
+        starts = 1
+    problem = replace(problem, residual=lambda values: misfit(model(values)))
+    found = problem.solve(start, starts)
+    notes = _compare_methods(to, curves.methods[0], measured)
+
+    def refit(change) -> np.ndarray:
+        """Return how much the values move if the model's curve changes."""
+        changed = replace(problem, residual=lambda values: misfit(model(values) + change))
+        return np.abs(changed.solve(found.values, starts=1, bars="").values - found.values)
+
+    widened = _include_missing_modes(problem, found, curves, refit)
+    best = model(found.values)
+    lost = measured.amplitude[np.isnan(curves.reference(found.values)[0])]
+    if lost.size:
+        problem = replace(problem, notes=[_describe_substitutes(lost)])
+    keys = problem.conclude(widened.fit, begin)
+    notes += widened.notes
+    return FittedCurve(keys, Path(to), measured, best, curves.methods[0], notes)
+
+
+def _search_two_models(models: TwoModels, start, starts: int, amplitude) -> tuple:
+    """Return the corrected quick model, or None, and its best values."""
+    try:
+        return models.searched(start, starts)
+    except NotConverged:
+        raise
+    except PatchfemError as reason:
+        raise PatchfemError(
+            "with the fitted values harmonic balance finds no oscillation at the amplitudes "
+            f"{_list_amplitudes(amplitude)}: {reason}; leave out the rows with the largest "
+            "damping, or narrow the ranges of --free"
+        ) from None
+
+
+def _describe_substitutes(lost) -> str:
+    """Return the warning on amplitudes (k,) [m] at which the balance has no result."""
+    return (
+        f"harmonic balance found no oscillation at the amplitudes {_list_amplitudes(lost)}; there, "
+        "the values of the static curve are used, multiplied by the ratio of the two methods at "
+        "the nearest amplitude at which both have a value"
+    )
+
+
+def _compare_methods(path, method: str, measured: MeasuredCurve) -> tuple:
+    """Return a note on what is compared if the file has a curve of another kind than the model."""
+    label = (*_read_table(path).labels.get("method", ()), "decay")[0]
+    if label == method:
+        return ()
+    k = int(np.argmax(measured.value[1]))
+    lost = -np.expm1(-2 * np.pi * measured.value[1, k])
+    amplitude = format_length(measured.amplitude[k], 3)
+    return (
+        f"the measured curve is compared with the curve by {method} at the same amplitudes, not "
+        "with a computed decay; a decay gives mean values over a cycle, so the two differ most "
+        f"where the damping is largest: at {amplitude} one cycle reduces the amplitude by "
+        f"{100 * lost:.2g} %. The intervals do not contain this difference; `patchfem backbone "
+        "scene.fitted.toml` computes both curves",
+    )
+
+
+class WidenedFit(NamedTuple):
+    """A fit whose intervals contain the error of missing modes, and notes on it."""
+
+    fit: Fit
+    notes: tuple
+
+
+def _include_missing_modes(
+    problem: Problem, found: Fit, curves: CurveModel, refit: Callable
+) -> WidenedFit:
+    """Widen the intervals by the effect of modes that a reduced structure lacks."""
+    method = curves.methods[0]
+    model = curves.model(found.values)
+    if model.rig.richer is None:
+        return WidenedFit(found, ())
+    try:
+        richer = curves.curve_of(replace(model, rig=model.rig.richer), method)
+    except PatchfemError as reason:
+        return WidenedFit(
+            found,
+            (
+                "the intervals do not contain the error of the modes left out of the structure: "
+                f"{reason}",
+            ),
+        )
+    own = curves.reference(found.values)
+    change = np.nan_to_num(richer - own)
+    moved = refit(error_of_change(change, ratio=0.5, order=2.0))
+    box = problem.box
+    ends = found.intervals + moved[:, None] * [-1, 1]
+    ends = frozen_array(np.clip(ends, box.low[:, None], box.high[:, None]))
+    parts = [
+        f"{bound.key} by {_format_fraction(part, value)}"
+        for bound, part, value in zip(problem.ranges, moved, found.values)
+    ]
+    frequency, damping = 100 * np.nanmax(np.abs(change / own), axis=1)
+    note = (
+        "the intervals contain the error of the modes left out of the structure; a computation "
+        f"with more modes changes frequencies by up to {frequency:.2g} % and damping ratios by up "
+        f"to {damping:.2g} %, and moves {', '.join(parts)}"
+    )
+    return WidenedFit(replace(found, intervals=ends), (note,))
+
+
+def _format_fraction(part: float, value: float) -> str:
+    """Format a change as a percentage of a value."""
+    return f"{100 * part / abs(value):.2g} %" if value else f"{part:.2g}"
+
+
+def _nearest_rows(amplitudes, wanted) -> np.ndarray:
+    """Find the amplitudes (k,) [m] that are nearest to others (m,) [m] by their ratio."""
+    return np.abs(np.log(np.asarray(wanted)[:, None] / amplitudes)).argmin(axis=1)
+
+
+def _list_amplitudes(amplitudes) -> str:
+    listed = ", ".join(format_length(amplitude, 3) for amplitude in amplitudes[:MAX_LISTED])
+    return listed + (", ..." if len(amplitudes) > MAX_LISTED else "")
+
+
+def _compute_curve(model, amplitudes, method: str) -> np.ndarray:
+    """Compute frequency [Hz] and damping ratio (2, k) at rising amplitudes (k,) [m].
+
+    NaN where the mode does not oscillate; PatchfemError if it oscillates at no amplitude.
+    """
+    with placed(model.source):
+        found = backbone(model, "", amplitudes, (method,), errors=False)
+    if method not in found.curves:
+        raise PatchfemError(found.missing[method])
+    curve = found.curves[method]
+    out = np.full((2, amplitudes.size), np.nan)
+    out[:, _nearest_rows(amplitudes, curve.amplitude)] = curve.frequency, curve.damping
+    return out

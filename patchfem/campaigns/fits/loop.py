@@ -1,0 +1,233 @@
+"""Fit of a scene with a prescribed slide to a measured friction loop.
+
+The model starts without stress in the first row of the record and follows the measured displacement,
+which is linear between two rows. Where the force depends on the time steps, they are halved until they
+no longer change the fit.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import NotConverged, PatchfemError
+from ...effects import has
+from ...identify.least_squares import Fit
+from ...inputs.loops import Loop, read_loop
+from ...scene.keys.quantities import KINDS
+from ...scene.scene import Scene, SceneError
+from .loop_model import BenchModel
+from .loop_path import DEFAULT_OPTIONS, LoopOptions, read_offsets
+from .problem import FittedKeys, Problem, parse_ranges
+
+MAX_PIECES = 64  # Time steps between two rows; the steps are not halved beyond this number.
+STEP_FRACTION = (
+    0.1  # A change of the force below this fraction of the tolerance is invisible in a fit.
+)
+MIN_INDEPENDENT = 0.6  # Independent rows / rows, below which a warning states the correlation.
+MIN_RMS = (
+    1e-6  # Residual / peak force, below which rounding and not correlation shapes the residual.
+)
+MAX_FIRST_FORCE = 0.2  # Force in the first row / peak, above which the record cannot begin at rest.
+LOAD_UNITS = {
+    "time": KINDS["time"],
+    "displacement": KINDS["length"],
+    "force": KINDS["force"],
+    "friction_ratio": {"": 1.0, "1": 1.0},
+}
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FittedLoop:
+    """A fit to a friction loop.
+
+    Attributes
+    ----------
+    keys : FittedKeys
+        Its values are those of the free keys, then those of `offsets`.
+    loop : Loop
+        The measured loop.
+    offsets : list of Offset
+    held : (k,) bool
+        Rows that were only predicted.
+    model : (k,) array
+        Fitted force or friction ratio at the rows of `loop`.
+    step_error : float
+        Largest change of the model when its time steps are halved.
+    pieces : int
+        Time steps between two rows.
+    """
+
+    keys: FittedKeys
+    loop: Loop
+    offsets: list
+    held: np.ndarray
+    model: np.ndarray
+    step_error: float
+    pieces: int
+
+    @property
+    def rms(self) -> float:
+        """Root mean square of the residual in the fitted rows, in the unit of the reading."""
+        return self._rms(~self.held)
+
+    @property
+    def held_rms(self) -> float | None:
+        """Root mean square of the residual in the rows held out; None without such rows."""
+        return self._rms(self.held) if self.held.any() else None
+
+    def _rms(self, rows) -> float:
+        residual = self.model - self.loop.reading
+        return float(np.sqrt(np.mean(residual[rows] ** 2)))
+
+
+def fit_loop(
+    scene: Scene,
+    to: Path,
+    free: Sequence,
+    hold: Sequence = (),
+    say: Callable | None = None,
+    options: LoopOptions = DEFAULT_OPTIONS,
+) -> FittedLoop:
+    """Fit keys of a scene with a prescribed slide to the friction loop in a file.
+
+    Parameters
+    ----------
+    scene : Scene
+    to : Path
+        File of the loop.
+    free : sequence of str
+        Free keys with their ranges, "table.key=low..high".
+    hold : sequence of str
+        Rows that are predicted without being fitted, "column=value,value".
+    say : Callable, optional
+        Takes a line of progress.
+    options : LoopOptions
+        Offsets that are fitted as well, and whether the record is driven once beforehand.
+
+    Returns
+    -------
+    FittedLoop
+
+    Raises
+    ------
+    SceneError, PatchfemError
+        For input that cannot be used.
+    NotConverged
+        If the model fails at all starting points.
+    """
+    begin = perf_counter()
+    if scene.kind != "bench":
+        raise SceneError(
+            [
+                f"{scene.path}: fit: to fit a measured loop the scene must prescribe the motion "
+                f"with [slide], but this is a {scene.kind} scene; add [slide]"
+            ]
+        )
+    wanted = parse_ranges(free)
+    loop = read_loop(to, LOAD_UNITS)
+    held = np.zeros(loop.reading.size, bool)
+    for text in hold:
+        held |= loop.rows_of(text)
+    offsets = read_offsets(options.offsets, loop)
+    count = len(wanted) + len(offsets)
+    used = np.count_nonzero(~held)
+    if used <= count:
+        raise PatchfemError(
+            f"{to}: only {used} rows are used for the fit (rows that are held out do not count), "
+            f"too few to determine {count} values and their intervals"
+        )
+    bench = BenchModel(scene, loop, wanted, offsets, warm=options.warm, say=say)
+    scale = float(np.abs(loop.reading[~held]).max())
+
+    def residual(values) -> np.ndarray:
+        return (bench(values) - loop.reading)[~held] / scale
+
+    offset_ranges = [offset.range for offset in offsets]
+    problem = Problem(scene, wanted, residual, offset_ranges, bench.sets, bench.notes)
+    try:
+        refined = _solve_with_refined_steps(problem, bench, say)
+    except NotConverged as error:
+        if bench.made == 0:
+            raise bench.refused or error from None
+        raise
+    model = bench(refined.fit.values)
+    keys = problem.conclude(refined.fit, begin)
+    fitted = FittedLoop(keys, loop, offsets, held, model, refined.step_error, bench.pieces)
+    has_lead_in = bool(offsets) or options.warm
+    warnings = [*keys.warnings, *_doubts(fitted, scene, has_lead_in)]
+    return replace(fitted, keys=replace(keys, warnings=warnings))
+
+
+class RefinedFit(NamedTuple):
+    """A fit, and the largest change of its model when the time steps are halved."""
+
+    fit: Fit
+    step_error: float
+
+
+def _solve_with_refined_steps(problem: Problem, bench: BenchModel, say) -> RefinedFit:
+    """Solve with time steps that are halved until they change the force too little to matter."""
+    if bench.exact:
+        return RefinedFit(problem.solve(problem.own_values()), 0.0)
+    found = problem.solve(problem.own_values(), bars="")
+    agreed = found.agreed
+    while True:
+        coarse = bench(found.values)
+        bench.pieces *= 2
+        fine = bench(found.values)
+        change = float(np.abs(fine - coarse).max())
+        peak = float(np.abs(fine).max())
+        tolerance = STEP_FRACTION * bench.scene.accuracy.tolerance * peak
+        if bench.pinned or change <= tolerance or bench.pieces >= MAX_PIECES:
+            bench.pieces //= 2
+            last = _add_counts(problem.solve(found.values, starts=1), found)
+            return RefinedFit(replace(last, agreed=agreed), change)
+        if say:
+            say(f"{bench.pieces} time steps between neighbouring rows of the record")
+        found = _add_counts(problem.solve(found.values, starts=1, bars=""), found)
+
+
+def _add_counts(found: Fit, before: Fit) -> Fit:
+    """Add the evaluations and failures of an earlier fit."""
+    return replace(
+        found,
+        evaluations=found.evaluations + before.evaluations,
+        failures=found.failures + before.failures,
+        reason=before.reason or found.reason,
+    )
+
+
+def _doubts(fitted: FittedLoop, scene: Scene, has_lead_in: bool) -> list:
+    """Return warnings if the rows are no sample of the model with independent noise.
+
+    `has_lead_in`: the model does not start without stress in the first row.
+    """
+    loop = fitted.loop
+    peak = float(np.abs(loop.reading).max())
+    used = np.count_nonzero(~fitted.held)
+    rows = fitted.keys.fit.rows
+    out = []
+    if fitted.rms > MIN_RMS * peak and rows < MIN_INDEPENDENT * used:
+        out.append(
+            "the deviations of neighbouring rows are correlated, so the intervals are computed as "
+            f"if the {used} rows were {max(rows, 1):.3g} independent rows; a part of the deviation "
+            "is systematic"
+        )
+    first = abs(loop.reading[0])
+    starts_at_rest = fitted.held[0] or has_lead_in or has(scene.friction.law, "memoryless")
+    if first > MAX_FIRST_FORCE * peak and not starts_at_rest:
+        out.append(
+            f"the force in the first row is {first / peak:.0%} of the largest force, but the model "
+            "starts without force: use --warm-up, hold out the first cycle, or give a record that "
+            "begins at rest"
+        )
+    if fitted.step_error > scene.accuracy.tolerance * peak:
+        out.append(
+            "if the time steps are halved, the force of the model changes by "
+            f"{fitted.step_error / peak:.1g} of its peak, more than the tolerance"
+        )
+    return out

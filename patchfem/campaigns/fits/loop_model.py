@@ -1,0 +1,220 @@
+"""Force of a prescribed slide along a measured motion, as a function of free keys of the scene."""
+
+from itertools import product
+
+import numpy as np
+
+from ...core import PatchfemError
+from ...effects import has
+from ...inputs.loops import Loop
+from ...model.gap import shape_side
+from ...model.model import Model, build
+from ...model.source import placed
+from ...runs.bench import bench as law_bench
+from ...runs.bench.engine import smooth_sum_of
+from ...runs.bench.ledger import Watch
+from ...runs.many import meshes
+from ...scene.changed import Base
+from ...scene.scene import Scene, SceneError
+from .loop_path import count_whole_cycles, prepend_lead_in
+from .problem import press_patch
+
+MAX_MESH_KEYS = (
+    3  # Free keys of [contact] from whose ends the shared meshes are chosen: 3**3 models.
+)
+REST_SPEED_FRACTION = 1e-3  # Speed / largest measured speed, below which bonds are at rest.
+AMPLITUDE_TOL = 0.02  # Relative difference of two amplitudes, above which a note names them.
+
+
+class BenchModel:
+    """Force or friction ratio (k,) at the rows of a measured loop, as a function of free values.
+
+    Parameters
+    ----------
+    scene : Scene
+        With its [slide].
+    loop : Loop
+        The measured loop.
+    wanted : list of Range
+        The free keys.
+    offsets : sequence of Offset
+        Their values follow those of the keys.
+    warm : bool
+        Whether the whole cycles of the record are driven once beforehand.
+    say : Callable, optional
+        Takes a line of progress.
+    """
+
+    def __init__(
+        self, scene: Scene, loop: Loop, wanted: list, offsets=(), *, warm: bool = False, say=None
+    ):
+        self.scene = scene
+        self.loop = loop
+        self.wanted = wanted
+        self.say = say
+        self.base = Base(scene)  # The text is parsed once, not at every evaluation.
+        self.offsets = [offset.name for offset in offsets]
+        self.warm = count_whole_cycles(loop) if warm else 0
+        self.notes: list = []
+        self.time = self._row_times()
+        self._note_amplitude()
+        law = scene.friction
+        self.sets = self._rest_speed_sets()
+        rigid = has(law.law, "set-valued") and not has(law.law, "averaged")
+        self.force_jumps = has(law.law, "creeps") or rigid
+        self.exact = self._is_exact()
+        steps = scene.accuracy.steps_per_cycle
+        self.pinned = steps is not None
+        self.pieces = 1
+        if self.pinned and not self.exact:
+            self.pieces = max(1, -(-steps // (loop.reading.size - 1)))
+        self.refused = None
+        self.made = 0
+        self.patch = None
+        self.moves_contact = any(bound.key.startswith("contact.") for bound in wanted)
+        self.meshes = None  # Shared by all values; chosen when a patch is first pressed.
+
+    def _rest_speed_sets(self) -> list:
+        """Return the rest speed of growing bonds by the measured motion, unless the scene has it."""
+        law = self.scene.friction
+        grows = has(law.law, "bonds") and law.rest_growth is not None
+        is_free = "friction.rest_speed" in {bound.key for bound in self.wanted}
+        if not grows or law.rest_speed is not None or is_free:
+            return []
+        speeds = np.abs(np.diff(self.loop.displacement) / np.diff(self.time))
+        speed = REST_SPEED_FRACTION * float(speeds.max())
+        return [f"friction.rest_speed={speed!r} m/s"]
+
+    def _is_exact(self) -> bool:
+        """Whether the force at the rows does not depend on the time steps."""
+        law, contact = self.scene.friction, self.scene.contact
+        bonds = has(law.law, "bonds")
+        is_closed_form = law.rest_growth is None and (law.reading == "report" or law.order == 1)
+        if bonds and not is_closed_form:
+            return False
+        if contact is None:
+            return True
+        return not (bonds and contact.gives_way) and shape_side(contact) != "lower"
+
+    def __call__(self, values) -> np.ndarray:
+        """Return the reading (k,) at the rows; PatchfemError for values that make no scene."""
+        count = len(self.wanted)
+        offsets = dict(zip(self.offsets, values[count:]))
+        model = self._model(self.scene_at(values[:count]))
+        self.made += 1
+        with placed(model.source):
+            reading = self._reading(model, offsets.get("displacement", 0.0))
+        return reading + offsets.get("force", 0.0)
+
+    def _model(self, scene: Scene) -> Model:
+        try:
+            with placed(scene):
+                return build(scene)
+        except PatchfemError as error:
+            # A file of the scene is read here, and no other value of the free keys mends it.
+            self.refused = self.refused or error
+            raise
+
+    def _reading(self, model: Model, offset: float) -> np.ndarray:
+        patch = self._patch(model)
+        driven = prepend_lead_in(self.time, self.loop.displacement, self.warm, offset)
+        corner = np.arange(driven.time.size) * self.pieces
+        number = np.arange(corner[-1] + 1)
+        time = np.interp(number, corner, driven.time)
+        displacement = np.interp(number, corner, driven.displacement)
+        watch = Watch(smooth_sum_of(model, displacement), self.say)
+        run = law_bench.run(model, patch, 4, 0, (time, displacement, 0, 0.0), watch)
+        if not run.load[0] > 0:
+            raise PatchfemError(
+                "the normal load is 0 or less; give a load that presses the pieces together", ""
+            )
+        out = run.force[corner]
+        if self.force_jumps:
+            # The force jumps at a row between two straight legs: it is the mean of both sides.
+            after = run.force[np.minimum(corner + 1, number[-1])]
+            out = np.where(corner == 0, after, (out + after) / 2)
+        out = out[driven.n_before :]
+        return out / run.load[0] if self.loop.quantity == "friction_ratio" else out
+
+    def scene_at(self, values) -> Scene:
+        """Return the scene with values of the free keys."""
+        assigned = [bound.assigned(value) for bound, value in zip(self.wanted, values)]
+        try:
+            return self.base.changed([*self.sets, *assigned])
+        except SceneError as error:
+            self.refused = self.refused or error
+            raise PatchfemError(error.mistakes[0]) from None
+
+    def _patch(self, model: Model):
+        if model.patch is None:
+            return None
+        if self.moves_contact:
+            self.patch = press_patch(self._shared_meshes().given(model))
+        elif self.patch is None:
+            self.patch = press_patch(model)
+        return self.patch
+
+    def _shared_meshes(self):
+        """Return the meshes for the ends and the middle of each range of a key of [contact]."""
+        if self.meshes is not None:
+            return self.meshes
+        middle = [(bound.low + bound.high) / 2 for bound in self.wanted]
+        moved = [k for k, bound in enumerate(self.wanted) if bound.key.startswith("contact.")]
+        moved = moved[:MAX_MESH_KEYS]
+        levels = [(self.wanted[k].low, middle[k], self.wanted[k].high) for k in moved]
+        models = []
+        refused = self.refused
+        for values in product(*levels):
+            point = list(middle)
+            for k, value in zip(moved, values):
+                point[k] = value
+            try:
+                models.append(build(self.scene_at(point)))
+            except PatchfemError:
+                continue  # The search meets the same error and counts it.
+        self.refused = refused
+        self.meshes = meshes.Shared(models, False)
+        return self.meshes
+
+    def _row_times(self) -> np.ndarray:
+        """Return the times of the rows [s].
+
+        They are measured, or follow from the speed of the slide, or are even if time has no effect.
+        """
+        loop, scene = self.loop, self.scene
+        if loop.time is not None:
+            return loop.time
+        law = scene.friction
+        plain_bonds = has(law.law, "bonds") and law.rest_growth is None
+        needs_time = not has(law.law, "timeless") and not plain_bonds
+        load_varies = scene.normal is not None and scene.normal.amplitude
+        if not needs_time and not load_varies:
+            self.notes.append(
+                f"{loop.path} has no column of time: its rows are taken as evenly spaced in time, "
+                f"which does not affect the force of law '{law.law}'"
+            )
+            return np.arange(float(loop.reading.size))
+        move = np.abs(np.diff(loop.displacement))
+        if scene.slide.kind in ("constant", "triangle") and move.all():
+            self.notes.append(
+                f"{loop.path} has no column of time: the times of its rows are computed from "
+                "slide.speed"
+            )
+            return np.concatenate([[0.0], np.cumsum(move / scene.slide.speed)])
+        raise PatchfemError(
+            f"{loop.path}:1: law '{law.law}' needs the times of the rows of this record; add a "
+            "column time [s] (the times can be computed from slide.speed only for a constant or "
+            "triangle slide without rests)"
+        )
+
+    def _note_amplitude(self) -> None:
+        """Note an amplitude of the scene that is not that of the record."""
+        slide = self.scene.slide
+        half = float(np.ptp(self.loop.displacement)) / 2
+        if slide.kind not in ("sine", "triangle"):
+            return
+        if abs(slide.amplitude - half) > AMPLITUDE_TOL * half:
+            self.notes.append(
+                f"slide.amplitude is {slide.amplitude:.4g} m, but the amplitude of the measured "
+                f"displacement is {half:.4g} m; the model follows the measured displacement"
+            )

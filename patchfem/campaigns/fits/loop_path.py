@@ -1,0 +1,124 @@
+"""Displacement along which a fit to a loop drives its model: the record, and what precedes it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import PatchfemError
+from ...inputs.loops import Loop
+from ...scene.ranges import Range
+
+OFFSETS = ("force", "displacement")
+POSITION_TOL = 1e-6  # Fraction of the range of the record; positions closer than this are equal.
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Offset:
+    """A constant that is fitted besides the keys of the scene.
+
+    Attributes
+    ----------
+    name : {"force", "displacement"}
+        A force [N] or friction ratio [1] that the record adds to the reading, or the displacement
+        [m] of the first row from the position without stress.
+    range : Range
+        Its bounds: the size of the record to either side.
+    """
+
+    name: str
+    range: Range
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class LoopOptions:
+    """Names of OFFSETS that are fitted, and whether the record is driven once beforehand."""
+
+    offsets: tuple = ()
+    warm: bool = False
+
+
+DEFAULT_OPTIONS = LoopOptions()
+
+
+def read_offsets(names: Sequence, loop: Loop) -> list:
+    """Return the Offset of each name; PatchfemError for a name that is not in OFFSETS."""
+    parts = [part.strip() for text in names for part in text.split(",")]
+    out = []
+    for name in dict.fromkeys(parts):
+        if name not in OFFSETS:
+            raise PatchfemError(
+                f"--offset {name}: not a possible offset; use {' or '.join(OFFSETS)}"
+            )
+        size = float(np.ptp(loop.displacement))
+        kind = "length"
+        if name == "force":
+            size = float(np.abs(loop.reading).max())
+            kind = "force" if loop.quantity == "force" else None
+        out.append(Offset(name, Range(f"offset.{name}", -size, size, kind)))
+    return out
+
+
+def count_whole_cycles(loop: Loop) -> int:
+    """Count the rows until the record last passes its first displacement in the first direction.
+
+    The first row counts. PatchfemError for a record that does not return there.
+    """
+    place = loop.displacement
+    moved = np.flatnonzero(place != 0)
+    direction = np.sign(place[moved[0]])
+    behind = place * direction < -POSITION_TOL * np.ptp(place)
+    returns = np.flatnonzero(behind[:-1] & ~behind[1:])
+    if not returns.size:
+        raise PatchfemError(
+            f"{loop.path}: --warm-up needs a record of at least one whole cycle, in which the "
+            "displacement returns to its first value and passes it in the same direction as at "
+            "the start; give such a record, or leave --warm-up out"
+        )
+    return int(returns[-1]) + 1
+
+
+class DrivenPath(NamedTuple):
+    """Times (n,) [s] and displacements (n,) [m]; the record follows after `n_before` points."""
+
+    time: np.ndarray
+    displacement: np.ndarray
+    n_before: int
+
+
+def prepend_lead_in(time, place, warm: int, offset: float) -> DrivenPath:
+    """Return the path that begins at displacement 0 and continues as recorded.
+
+    Parameters
+    ----------
+    time, place : (r,) array
+        Times [s] and displacements [m] of the record; the first displacement is 0.
+    warm : int
+        Leading rows that form whole cycles and are driven once beforehand; 0 for none.
+    offset : float
+        Displacement of the first row [m]; it is reached at the mean speed of the record.
+
+    Returns
+    -------
+    DrivenPath
+    """
+    speed = np.abs(np.diff(place)).sum() / (time[-1] - time[0])
+    displacement = place + offset
+    before = []
+    begin = []
+    if offset:
+        before.append(0.0)
+        begin.append(-abs(offset) / speed)
+    start = 0.0
+    if warm:
+        # The last of these rows lies behind the first displacement; the record gives the time from
+        # there to the first displacement.
+        left, right = place[warm - 1 : warm + 1]
+        leg = time[warm] - time[warm - 1]
+        turn = time[warm - 1] + leg * (0.0 - left) / (right - left)
+        before = [*before, *displacement[:warm]]
+        begin = [*begin, *(time[:warm] - time[0])]
+        start = turn - time[0]
+    whole = np.concatenate([begin, time - time[0] + start])
+    return DrivenPath(whole - whole[0], np.concatenate([before, displacement]), len(before))

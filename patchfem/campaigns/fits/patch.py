@@ -1,0 +1,365 @@
+"""Laws of a single point in place of a patch, fitted to the patch's own friction loops.
+
+Points under a constant load that stick or slip are elastic-plastic elements in parallel
+(`slip.shear_modes`): their curve of first loading is exact, and Masing's rule gives the loops. Each law
+has the slip force of the patch. Its other values minimise the squares of the relative differences in
+force at the reversals and, with a fifth of the weight, in loss per cycle, over amplitudes of the slide
+that are evenly spaced in their logarithm.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import PatchfemError
+from ...effects import LAWS, has
+from ...friction.laws.elastic_plastic import masing
+from ...friction.record import law_from, loop_from
+from ...identify.least_squares import Fit, fit
+from ...model.model import Model, build
+from ...model.source import placed
+from ...runs.joint import held_patch
+from ...runs.patch import ladder
+from ...runs.patch.derived import elements, strip_elements
+from ...scene.scene import Scene
+
+AMPLITUDES_PER_DECADE = 8  # Enough that no regime of a law lies between two amplitudes.
+MIN_AMPLITUDES = 12  # Number of amplitudes of a short range.
+MIN_AMPLITUDE_FACTOR = 1e-2  # Smallest amplitude / (slip force / stiffness); below, nothing slips.
+MAX_AMPLITUDE_FACTOR = 2.0  # Largest amplitude / the amplitude at which every element slips.
+MAX_FIRST_FACTOR = 0.2  # A range begins at this multiple of slip force / stiffness at the latest.
+MIN_LOSS = 1e-3  # Loss / (4 x force x slide), above which a patch counts as one that slips.
+MESH_ELEMENTS = 16  # While fewer than 1 of these elements slips, the loss is that of the mesh.
+LOSS_WEIGHT = 0.2  # Weight of the loss beside the force: it is known about so much less well.
+MAX_LOSS_CHANGE = (
+    0.1  # Change of the loss by a coarser mesh (rms), above which the mesh is refined.
+)
+REFINE_FACTOR = 10.0  # Tolerance of the mesh / tolerance of its refinement.
+MIN_TOLERANCE = 9e-5  # Tolerance below which a mesh is not refined, as it takes too long.
+STIFFNESS_RANGE = 20.0  # A law's stiffness is searched from 1/20 to 20 times that of the patch.
+
+
+class LawKeys(NamedTuple):
+    """Values of a law that are searched beside its stiffness relative to the patch's.
+
+    low, high: bounds (n,); keys: (stiffness [N/m], slip force [N], values) -> keys of [friction]; units:
+    of the keys that have a unit.
+    """
+
+    low: tuple
+    high: tuple
+    keys: Callable
+    units: dict
+
+
+def _iwan_keys(stiffness: float, slip_force: float, chi: float, fraction: float) -> dict:
+    return {"stiffness": stiffness, "chi": chi, "beta": fraction / (1 - fraction)}
+
+
+def _bouc_wen_keys(stiffness: float, slip_force: float, exponent: float, shape: float) -> dict:
+    return {"stiffness": stiffness, "exponent": exponent, "shape": shape}
+
+
+def _elastic_plastic_keys(stiffness: float, slip_force: float) -> dict:
+    return {"bond_length": slip_force / stiffness}
+
+
+FITTED_LAWS = {
+    "iwan": LawKeys((-0.999, 0.0), (0.0, 0.999), _iwan_keys, {"stiffness": "N/m"}),
+    "bouc-wen": LawKeys((0.02, 0.5), (50.0, 1.0), _bouc_wen_keys, {"stiffness": "N/m"}),
+    "elastic-plastic": LawKeys((), (), _elastic_plastic_keys, {"bond_length": "m"}),
+}
+
+
+class Curves(NamedTuple):
+    """Force at the reversals [N] and loss per cycle [J], (k,) each."""
+
+    force: np.ndarray
+    loss: np.ndarray
+
+    def deviate_from(self, own: "Curves", slides) -> np.ndarray:
+        """Return the relative differences (2, k) to the patch's own curves at slides (k,) [m]."""
+        scale = np.maximum(own.loss, MIN_LOSS * 4 * slides * own.force)
+        return np.array([self.force / own.force - 1, (self.loss - own.loss) / scale])
+
+
+class FittedLaw(NamedTuple):
+    """A law in place of the patch.
+
+    values: by the keys of [friction]; deviations: relative differences (2, k) of its curves to the
+    patch's; fit: the Fit.
+    """
+
+    values: dict
+    curves: Curves
+    deviations: np.ndarray
+    fit: Fit
+
+
+class Elements(NamedTuple):
+    """Stiffness (t,) [N/m] and yield displacement (t,) [m] of elastic-plastic elements."""
+
+    stiffness: np.ndarray
+    yield_displacement: np.ndarray
+
+    @property
+    def slip_force(self) -> float:
+        """Force at which all elements slip [N]."""
+        return float(self.stiffness @ self.yield_displacement)
+
+    @property
+    def total_stiffness(self) -> float:
+        """Stiffness while no element slips [N/m]."""
+        return float(self.stiffness.sum())
+
+    def curves_at(self, slides) -> Curves:
+        """Return the curves at amplitudes (k,) [m] of the slide."""
+        return Curves(*masing(self.stiffness, self.yield_displacement, slides))
+
+
+class PatchLoops(NamedTuple):
+    """Loops of a patch.
+
+    load, slip_force [N]; stiffness [N/m] while nothing slips, extrapolated over the meshes where the
+    pieces alone give way; stiffness_error [N/m]: None if it is not known; slides (k,) [m]; curves;
+    mesh_change: relative change (2, k) of the curves by a coarser mesh, None without one; nodes: number
+    of nodes of the interface.
+    """
+
+    load: float
+    slip_force: float
+    stiffness: float
+    stiffness_error: float | None
+    slides: np.ndarray
+    curves: Curves
+    mesh_change: np.ndarray | None
+    nodes: int
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FittedPatch:
+    """Laws by name in place of the patch of a scene; `best` has the least sum of squares."""
+
+    scene: Scene
+    patch: PatchLoops
+    laws: dict
+    best: str
+    warnings: tuple
+    seconds: float
+
+
+def fit_patch(scene: Scene, slides=None) -> FittedPatch:
+    """Fit FITTED_LAWS to the friction loops of a scene's patch.
+
+    Parameters
+    ----------
+    scene : Scene
+    slides : (k,) array, optional
+        Rising amplitudes of the slide [m]; by default from the onset of slip to twice the amplitude at
+        which the whole patch slips.
+
+    Returns
+    -------
+    FittedPatch
+
+    Raises
+    ------
+    PatchfemError
+        For a patch that is no set of elastic-plastic elements; it says what to change.
+    """
+    begin = perf_counter()
+    model = build(scene)
+    tolerance = model.accuracy.tolerance
+    with placed(scene):
+        _refuse(model)
+        while True:
+            patch, *others = ladder.solve_all(model.patch, tolerance)
+            if not patch.pressure.load > 0:
+                raise PatchfemError("the normal load is 0 or less; raise the load", "contact.load")
+            parts = _elements(model, patch)
+            at = _default_slides(parts) if slides is None else np.asarray(slides, float)
+            own = parts.curves_at(at)
+            coarse = next((other for other in others if other is not None), None)
+            mesh_change = None
+            loss_change = 0.0
+            if coarse is not None:
+                mesh_change = _elements(model, coarse).curves_at(at).deviate_from(own, at)
+                loss_change = float(np.sqrt(np.mean(mesh_change[1] ** 2)))
+            can_refine = model.patch.chosen and tolerance >= MIN_TOLERANCE
+            if loss_change <= MAX_LOSS_CHANGE or not can_refine:
+                break
+            tolerance /= REFINE_FACTOR
+        held = held_patch(model, patch, tuple(others) or (None,))
+    loops = PatchLoops(
+        load=patch.pressure.load,
+        slip_force=parts.slip_force,
+        stiffness=held.value if held else parts.total_stiffness,
+        stiffness_error=held.error if held else None,
+        slides=at,
+        curves=own,
+        mesh_change=mesh_change,
+        nodes=patch.x.size,
+    )
+    static = model.friction.static
+    laws = {
+        law: fit_law(law, static, loops.load, at, own, parts.total_stiffness) for law in FITTED_LAWS
+    }
+    best = min(laws, key=lambda law: laws[law].fit.rms)
+    warnings = _warn_of_mesh(model, patch, loss_change)
+    return FittedPatch(scene, loops, laws, best, warnings, perf_counter() - begin)
+
+
+def _default_slides(parts: Elements) -> np.ndarray:
+    """Return amplitudes (k,) [m] from those at which slip begins to those at which all slips."""
+    stuck = parts.slip_force / parts.total_stiffness
+    low = MIN_AMPLITUDE_FACTOR * stuck
+    high = MAX_AMPLITUDE_FACTOR * float(parts.yield_displacement.max())
+    near = np.geomspace(low, high, 1024)
+    curves = parts.curves_at(near)
+    slips = near[np.argmax(curves.loss > MIN_LOSS * 4 * near * curves.force)]
+    yields = np.sort(parts.yield_displacement)
+    first = yields[yields.size // MESH_ELEMENTS]
+    low = max(slips, min(first, MAX_FIRST_FACTOR * stuck))
+    count = 1 + int(np.ceil(AMPLITUDES_PER_DECADE * np.log10(high / low)))
+    return np.geomspace(low, high, max(MIN_AMPLITUDES, count))
+
+
+def _warn_of_mesh(model: Model, patch, loss_change: float) -> tuple:
+    """Return a warning on a mesh that a coarser one changes too much."""
+    if loss_change <= MAX_LOSS_CHANGE:
+        return ()
+    if model.patch.chosen:
+        cure = "begin with larger amplitudes, at which more elements of the patch slip"
+    elif model.patch.mesh is None:
+        cure = (
+            "leave contact.element_size out: the mesh is then refined until the energy loss is "
+            "accurate enough"
+        )
+    else:
+        cure = "refine the mesh in the file"
+    return (
+        f"with this mesh ({patch.x.size} interface nodes) the energy loss has an error of "
+        f"{100 * loss_change:.2g} % (rms); this error also makes `chi` of law 'iwan' uncertain, and "
+        f"`chi` sets the exponent of micro-slip; {cure}",
+    )
+
+
+def fit_law(
+    law: str, static: float, load: float, slides, own: Curves, stiffness: float
+) -> FittedLaw:
+    """Fit one law to the loops of a joint.
+
+    Parameters
+    ----------
+    law : str
+        One of FITTED_LAWS.
+    static : float
+        Coefficient of friction.
+    load : float
+        Normal load [N]; the slip force is static x load.
+    slides : (k,) array
+        Amplitudes of the slide [m].
+    own : Curves
+        Curves of the joint at these amplitudes.
+    stiffness : float
+        Stiffness of the joint [N/m], near which that of the law is searched.
+
+    Returns
+    -------
+    FittedLaw
+    """
+    asked = FITTED_LAWS[law]
+    weights = np.array([[1.0], [LOSS_WEIGHT]])
+
+    def keys_at(values) -> dict:
+        return asked.keys(values[0] * stiffness, static * load, *values[1:])
+
+    def curves_at(values) -> Curves:
+        return Curves(*loop_from(_FrictionKeys(law, static, keys_at(values)), load, slides))
+
+    def residual(values) -> np.ndarray:
+        return (weights * curves_at(values).deviate_from(own, slides)).ravel()
+
+    low = (1 / STIFFNESS_RANGE, *asked.low)
+    high = (STIFFNESS_RANGE, *asked.high)
+    middle = [(a + b) / 2 for a, b in zip(asked.low, asked.high)]
+    found = fit(residual, low, high, start=(1.0, *middle), starts=2, bars="bounds")
+    curves = curves_at(found.values)
+    keys = keys_at(found.values.tolist())
+    return FittedLaw(keys, curves, curves.deviate_from(own, slides), found)
+
+
+class _FrictionKeys:
+    """A table [friction] whose numbers need no check, as they lie within the bounds of the search."""
+
+    def __init__(self, law: str, static: float, values: dict):
+        self.__dict__.update(values, law=law, static=static)
+
+
+def _elements(model: Model, patch) -> Elements:
+    """Return the elements of a pressed patch."""
+    friction = model.friction
+    load = patch.pressure.load
+    element = law_from(friction, load).element(load)
+    if not model.soft:
+        return Elements(np.array([element.limit / element.length]), np.array([element.length]))
+    if patch.strips is not None:
+        strips = strip_elements(patch, friction.static, element.length)
+        return Elements(*map(np.concatenate, zip(*strips)))
+    found = elements(patch, friction.static, element.length)
+    return Elements(found.stiffness, found.yield_slide)
+
+
+def _refuse(model: Model) -> None:
+    """Raise PatchfemError for a patch that is no set of elastic-plastic elements."""
+    friction, rig = model.friction, model.rig
+    if model.patch is None or friction is None:
+        raise PatchfemError(
+            "fit --from-patch needs a patch that slides: the scene must have [contact], [friction] "
+            "and either [slide] or [structure] with [drive]",
+            "contact" if model.patch is None else "friction",
+        )
+    possible = [
+        law for law in LAWS if has(law, "timeless") and "shear" in LAWS[law].carries.split()
+    ]
+    if friction.law not in possible:
+        raise PatchfemError(
+            f"a patch with law '{friction.law}' cannot be represented by elements that stick or "
+            f"slip; use law {' or '.join(possible)}",
+            "friction.law",
+        )
+    if has(friction.law, "set-valued") and not model.soft:
+        raise PatchfemError(
+            f"law '{friction.law}' is rigid, so the patch has no stiffness to fit; add "
+            "[contact.shear] or contact.asperities.tangential_ratio",
+            "friction.law",
+        )
+    if model.grooves is not None:
+        raise PatchfemError(
+            "none of the laws to be fitted describes grooves; leave the grooves out for the fit, "
+            "and add [normal.grooves] to the scene with the fitted law",
+            "contact.grooves",
+        )
+    if model.kind != "patch" and model.wear is not None:
+        raise PatchfemError("the fit uses the loops of unworn pieces; leave [wear] out", "wear")
+    if rig is not None and (rig.load_varies or rig.strips_slide_apart):
+        raise PatchfemError(
+            "a mode moves the pieces normal to the contact or rotates them, so the normal load "
+            "changes with the motion, or the strips slide by different amounts; set the keys "
+            "`normal`, `pitch` and `yaw` to 0",
+            "structure.mode",
+        )
+
+
+def read_slides(lengths) -> np.ndarray | None:
+    """Return the requested amplitudes (k,) [m]; None for none, PatchfemError for fewer than three."""
+    if lengths is None:
+        return None
+    if len(lengths) < 3:
+        raise PatchfemError(
+            "--amplitudes: give at least three amplitudes, for example 0.1 um..10 um:25"
+        )
+    return np.asarray(lengths, float)

@@ -1,0 +1,247 @@
+"""Fit of the wear coefficient to a measured worn depth, with the interval of the measurement.
+
+Worn depth depends on the coefficient and the cycles by their product alone, so one run with the largest
+coefficient gives the depth for all smaller ones. The coefficient that is read off this curve is then run
+itself and corrected.
+"""
+
+import json
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from ...core import Missing, NotConverged, PatchfemError
+from ...model.model import Model
+from ...runs.patch import ladder
+from ...runs.patch.press import areas
+from ...runs.wear import evolve
+from ...scene.keys.quantities import parse
+from ...scene.ranges import Range
+from .problem import parse_ranges
+
+QUANTITIES = (
+    "worn_depth_mean",
+    "worn_depth_max",
+)  # As in compare.json, the more accurate one first.
+MAX_RUNS = 6  # Runs of wear; the correction converges within two or three of them.
+MAX_FILE_BYTES = 1 << 20  # A file that compare writes is far smaller.
+DEPTH_TOL = 0.1  # The depth is met to this fraction of the scene's tolerance.
+KEY = "wear.coefficient"
+
+
+@dataclass(frozen=True, slots=True)
+class MeasuredDepth:
+    """A measured depth [m], by name, with its interval and its source ("--to" or a file)."""
+
+    name: str
+    value: float
+    low: float
+    high: float
+    source: str
+
+
+@dataclass(frozen=True, slots=True)
+class FittedCoefficient:
+    """A wear coefficient [m2/N] with its interval.
+
+    model: the measured quantity as the scene gives it with this coefficient [m]; bounds: of the search;
+    runs: number of wear runs.
+    """
+
+    value: float
+    low: float
+    high: float
+    measured: MeasuredDepth
+    model: float
+    bounds: Range
+    runs: int
+
+
+class WearCurve(NamedTuple):
+    """A depth (j,) [m] over the fraction of the cycles (j,)."""
+
+    fraction: np.ndarray
+    depth: np.ndarray
+
+    def inverse(self) -> Callable:
+        """Return the fraction of the cycles as a function of the depth."""
+        keep = np.concatenate([[True], np.diff(self.depth) > 0])
+        depth, fraction = self.depth[keep], self.fraction[keep]
+        if depth.size > 2:
+            return PchipInterpolator(depth, fraction, extrapolate=False)
+        return lambda value: np.interp(value, depth, fraction)
+
+
+def read_depth(text: str) -> MeasuredDepth:
+    """Read a measured depth from a text or from a JSON file that compare writes.
+
+    The text is "worn_depth_max=2.5 um..3.5 um", or a single value. PatchfemError and Missing name what
+    is wrong.
+    """
+    name, equals, value = (part.strip() for part in text.partition("="))
+    if not equals:
+        return _read_file(Path(text))
+    if name not in QUANTITIES:
+        raise PatchfemError(
+            f"--to {text}: {name} is not a possible quantity; use one of {', '.join(QUANTITIES)}, "
+            'such as "worn_depth_max=2.5 um..3.5 um", or the JSON file that compare writes'
+        )
+    try:
+        ends = [parse(part.strip(), "length") for part in value.split("..")]
+    except ValueError as error:
+        raise PatchfemError(f"--to {name}: {error}") from None
+    if len(ends) > 2 or not 0 < ends[0] <= ends[-1]:
+        raise PatchfemError(
+            f"--to {text}: give one value above zero, or a range low..high above zero"
+        )
+    return MeasuredDepth(name, (ends[0] + ends[-1]) / 2, ends[0], ends[-1], "--to")
+
+
+def _read_file(path: Path) -> MeasuredDepth:
+    try:
+        if path.stat().st_size > MAX_FILE_BYTES:
+            raise PatchfemError(
+                f"{path}: the file is larger than {MAX_FILE_BYTES} bytes; give the JSON file that "
+                "compare writes"
+            )
+        content = json.loads(path.read_text("utf-8"))
+    except FileNotFoundError:
+        raise Missing(
+            f"{path}: no such file; give --to the JSON file that compare writes, or "
+            "worn_depth_max=VALUE"
+        ) from None
+    except (OSError, ValueError, RecursionError) as error:
+        raise PatchfemError(
+            f"{path}: this is not the JSON file that compare writes ({error})"
+        ) from None
+    measures = content.get("measures", content) if isinstance(content, dict) else {}
+    for name in QUANTITIES:
+        measure = measures.get(name) if isinstance(measures, dict) else None
+        numbers = _numbers_of(measure)
+        if numbers is not None and numbers[0] > 0:
+            value, low, high = numbers
+            return MeasuredDepth(name, value, max(low, 0.0), high, str(path))
+    raise PatchfemError(
+        f"{path}: the file contains no worn depth above zero; compare writes a depth only if the "
+        "traces have a common reference"
+    )
+
+
+def _numbers_of(measure) -> list | None:
+    """Return value, low and high of a measure of compare; None if one of them is no number."""
+    if not isinstance(measure, dict):
+        return None
+    parts = [measure.get(key) for key in ("value", "low", "high")]
+    if not all(isinstance(part, int | float) and math.isfinite(part) for part in parts):
+        return None
+    return [float(part) for part in parts]
+
+
+def fit_wear(model: Model, to: str, free, progress=None) -> FittedCoefficient:
+    """Find the wear coefficient with which a scene gives a measured depth.
+
+    Parameters
+    ----------
+    model : Model
+        With [wear].
+    to : str
+        The measured depth, as `read_depth` takes it.
+    free : sequence of str
+        ("wear.coefficient=low..high",)
+    progress : Callable, optional
+        Takes the completed fraction of a run.
+
+    Returns
+    -------
+    FittedCoefficient
+
+    Raises
+    ------
+    SceneError, PatchfemError
+        For input that cannot be used, or if no coefficient within the range gives the depth.
+    NotConverged
+        If the runs do not settle on a coefficient.
+    """
+    bounds = _read_bounds(free)
+    target = read_depth(to)
+    if model.patch is None:
+        raise PatchfemError(
+            f"--to {target.name}: a [normal] contact has no worn depth; use [contact]", "normal"
+        )
+    if model.wear.start is not None:
+        raise PatchfemError(
+            f"fit {KEY}: the fit must start from unworn pieces; leave out wear.start", "wear.start"
+        )
+    # The patch of unworn pieces is the same for all coefficients.
+    patch = ladder.solve_all(model.patch, model.accuracy.tolerance, False)[0]
+
+    def compute(coefficient: float) -> WearCurve:
+        return _compute_curve(model, patch, coefficient, target.name, progress)
+
+    curve = compute(bounds.high)
+    max_depth = float(curve.depth[-1])
+    if not max_depth >= target.value:
+        is_worn_through = curve.fraction[-1] < 1
+        cure = "raise the high bound"
+        if is_worn_through:
+            cure = (
+                "with this bound as the coefficient the coating is worn through before the last "
+                "cycle"
+            )
+        raise PatchfemError(
+            f"--free {KEY}: with the high bound {bounds.high:.4g} m^2/N the scene reaches only "
+            f"{target.name} = {max_depth:.4g}, but {target.value:.4g} was measured; {cure}"
+        )
+    inverse = curve.inverse()
+    value = float(bounds.high * inverse(target.value))
+    runs = 1
+    reached = math.nan
+    while runs < MAX_RUNS:
+        runs += 1
+        reached = float(compute(value).depth[-1])
+        if abs(reached - target.value) <= DEPTH_TOL * model.accuracy.tolerance * target.value:
+            break
+        value *= float(inverse(target.value) / inverse(reached))
+    else:
+        raise NotConverged(
+            f"fit {KEY}: after {MAX_RUNS} runs the fit has reached only {target.name} = "
+            f"{reached:.6g} in place of {target.value:.6g}"
+        )
+    if value < bounds.low:
+        raise PatchfemError(
+            f"--free {KEY}: {target.name} = {target.value:.4g} needs a coefficient of {value:.4g} "
+            f"m^2/N, which is below the low bound {bounds.low:.4g}; lower this bound"
+        )
+    low, high = (
+        float(value * inverse(min(end, max_depth)) / inverse(target.value))
+        for end in (target.low, target.high)
+    )
+    return FittedCoefficient(float(value), low, high, target, reached, bounds, runs)
+
+
+def _read_bounds(free) -> Range:
+    found = parse_ranges(free)
+    if [bound.key for bound in found] != [KEY]:
+        raise PatchfemError(
+            f"--free: in a scene with [wear] only {KEY} can be fitted, for example {KEY}=1e-16 "
+            "m^2/N..1e-12 m^2/N"
+        )
+    return found[0]
+
+
+def _compute_curve(model: Model, patch, coefficient: float, name: str, progress) -> WearCurve:
+    """Run the wear of a model with a coefficient [m2/N]; patch: that of the unworn pieces."""
+    model = replace(model, wear=replace(model.wear, coefficient=coefficient))
+    found = evolve.evolve(model, patch, (None, None), progress)
+    if found.stopped:
+        raise PatchfemError(f"fit {KEY}: {found.stopped}")
+    area = areas(model.patch, patch.pieces.interface).ravel()
+    rows = np.array([moment.depth.ravel() for moment in found.moments])
+    depth = rows.max(axis=1) if name == "worn_depth_max" else rows @ area / area.sum()
+    fraction = np.array([moment.cycle for moment in found.moments]) / model.wear.cycles
+    return WearCurve(fraction, depth)

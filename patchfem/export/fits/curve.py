@@ -1,0 +1,107 @@
+"""Files of a fit to frequency and damping against amplitude."""
+
+from pathlib import Path
+
+import numpy as np
+
+from ...campaigns.fits.curve import FittedCurve
+from ...scales import axis_unit
+from ..drawing import charts
+from .files import (
+    FITTED_SCENE,
+    FitFiles,
+    describe_measurement,
+    describe_values,
+    fitted_scene_text,
+)
+from .text import format_values
+
+HEAD = (
+    "amplitude [m]",
+    "frequency [Hz]",
+    "frequency_error [Hz]",
+    "damping",
+    "damping_error",
+    "frequency_fitted [Hz]",
+    "damping_fitted",
+)
+
+
+def describe_curve_fit(fitted: FittedCurve, folder: Path) -> FitFiles:
+    """Return the files of a fit to a curve; folder: to which the paths of the scene are relative."""
+    answer = _answer(fitted)
+    rms = answer["rms"]
+    head = (
+        f"{answer['outcome']}: {answer['rows']} amplitudes of {answer['measured']} by "
+        f"{answer['method']}, {answer['evaluations']} evaluations"
+    )
+    rest = [
+        f"  rms of the residual   {100 * rms['frequency']:.2g} % of the frequency, "
+        f"{100 * rms['damping']:.2g} % of the damping ratio",
+        *(f"  note: {text}" for text in answer["notes"]),
+    ]
+    scene = fitted_scene_text(fitted.keys, fitted.path.name, folder)
+    return FitFiles(
+        answer=answer,
+        lines=[head, *format_values(answer), *rest],
+        summary=[head, *rest],
+        scenes={FITTED_SCENE: scene},
+        rows=_rows(fitted),
+        charts=_charts(fitted),
+        caption="Frequency and damping ratio against amplitude: measured values with errors, and "
+        "the fit",
+    )
+
+
+def _answer(fitted: FittedCurve) -> dict:
+    """Return the object of fit.json."""
+    keys, measured = fitted.keys, fitted.measured
+    deviation = (fitted.model - measured.value) / np.abs(measured.value)
+    frequency_rms, damping_rms = np.sqrt(np.mean(deviation**2, axis=1)).tolist()
+    name = fitted.path.name
+    return describe_measurement(keys.scene.title, name, "decay", keys.outcome) | {
+        "method": fitted.method,
+        "rows": int(measured.amplitude.size),
+        "values": describe_values(keys),
+        "rms": {"frequency": frequency_rms, "damping": damping_rms},
+        "evaluations": keys.fit.evaluations,
+        "failures": keys.fit.failures,
+        "descents_agreed": keys.fit.agreed,
+        "warnings": keys.warnings,
+        "notes": list(fitted.notes),
+        "seconds": round(keys.seconds, 6),
+    }
+
+
+def _rows(fitted: FittedCurve) -> list:
+    """Return the rows of fit.csv; errors are half the width of a 95 % interval."""
+    measured = fitted.measured
+    errors = 2 * measured.error
+    columns = np.column_stack(
+        [
+            measured.amplitude,
+            measured.value[0],
+            errors[0],
+            measured.value[1],
+            errors[1],
+            *fitted.model,
+        ]
+    )
+    return [HEAD, *([*map(repr, row)] for row in columns.tolist())]
+
+
+def _charts(fitted: FittedCurve) -> list:
+    """Return frequency and damping ratio against amplitude, measured with errors and fitted."""
+    measured = fitted.measured
+    unit, scale = axis_unit(measured.amplitude, "m")
+    along = charts.axis("amplitude", unit, True)
+    x = measured.amplitude * scale
+    out = []
+    for k, (title, name, of) in enumerate(
+        (("Frequency", "frequency", "Hz"), ("Damping ratio", "damping ratio", ""))
+    ):
+        errors = 2 * measured.error[k]
+        dots = charts.dots(x, measured.value[k], "soft", "measured", errors=errors)
+        fit = charts.line(x, fitted.model[k], "accent", "fitted")
+        out.append(charts.chart(title, along, charts.axis(name, of), [dots, fit]))
+    return out

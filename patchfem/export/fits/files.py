@@ -1,0 +1,132 @@
+"""Record of the files of a fit, and the function that writes them."""
+
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ... import __version__
+from ...campaigns.fits.problem import FittedKeys
+from ...disk.whole import write_rows, write_text
+from ...identify.least_squares import Fit
+from ...model.model import build, resolved
+from ...scene.ranges import Range
+from ...scene.scene import moved
+from ..drawing import pictures
+from ..results import PAGE, Folder
+from ..summary import write_json
+from .page import page
+
+FITTED_SCENE = "scene.fitted.toml"
+
+
+class FitFiles(NamedTuple):
+    """Files of a fit.
+
+    answer: the object of fit.json, in SI units; lines: the answer as text; summary: those of the lines that
+    the page begins with; scenes: text of each scene by the name of its file; rows: fit.csv, header
+    first; charts: those of fit.svg; caption: of this picture.
+    """
+
+    answer: dict
+    lines: list
+    summary: list
+    scenes: dict
+    rows: list | tuple = ()
+    charts: list | tuple = ()
+    caption: str = ""
+
+
+def write_fit(files: FitFiles, folder: Folder) -> None:
+    """Write fit.json, fit.csv, fit.svg, the scenes and the page into an open results folder."""
+    write_json(files.answer, folder.path / "fit.json")
+    for name, text in files.scenes.items():
+        write_text(folder.path / name, text)
+    if files.rows:
+        write_rows(folder.path / "fit.csv", files.rows)
+    picture = ""
+    if files.charts:
+        picture = pictures.draw(files.charts)
+        write_text(folder.path / "fit.svg", picture)
+    text = page(
+        files.answer,
+        lines=files.lines,
+        summary=files.summary,
+        picture=picture,
+        caption=files.caption,
+        scene_text=files.scenes[FITTED_SCENE],
+    )
+    write_text(folder.path / PAGE, text)
+
+
+def describe_measurement(title: str, measured: str, quantity: str, outcome) -> dict:
+    """Return the entries that every fit.json begins with."""
+    return {
+        "patchfem": __version__,
+        "title": title,
+        "measured": measured,
+        "quantity": quantity,
+        "outcome": str(outcome),
+    }
+
+
+def describe_values(keys: FittedKeys) -> dict:
+    """Return the fitted keys as they stand in fit.json."""
+    return {bound.key: describe_value(bound, keys.fit, k) for k, bound in enumerate(keys.ranges)}
+
+
+def describe_value(bound: Range, fit: Fit, k: int) -> dict:
+    """Return value number k of a fit as it stands in fit.json."""
+    ends = fit.intervals[k].tolist()
+    low, high = ends if np.isfinite(ends).all() else (None, None)
+    return {
+        "value": float(fit.values[k]),
+        "unit": bound.unit,
+        "low": low,
+        "high": high,
+        "interval": None if low is None else ends,
+        "method": fit.methods[k],
+        "bounds": [bound.low, bound.high],
+        "at_bound": fit.at_bound[k] or None,
+        "sensitivity": float(fit.sensitivity[k]),
+    }
+
+
+def describe_unknown(bounds: list, fit: Fit) -> list:
+    """Return the directions that leave the residual as it is, as they stand in fit.json."""
+    return [
+        {bound.key: part for bound, part in zip(bounds, row) if part}
+        for row in fit.unknown.tolist()
+    ]
+
+
+def describe_correlation(fit: Fit) -> list:
+    """Return the correlation of the values as it stands in fit.json."""
+    return [
+        [part if np.isfinite(part) else None for part in row] for row in fit.correlation.tolist()
+    ]
+
+
+def fitted_scene_text(keys: FittedKeys, measured: str, folder: Path) -> str:
+    """Return the fitted scene in SI units with every default.
+
+    Parameters
+    ----------
+    keys : FittedKeys
+    measured : str
+        Name of the measured file, for the comments that say what was fitted.
+    folder : Path
+        Folder to which the paths of the scene are relative.
+    """
+    scene = keys.fitted_scene()
+    comments = []
+    for bound, value, ends in zip(
+        keys.ranges, keys.fit.values.tolist(), keys.fit.intervals.tolist()
+    ):
+        interval = ", not determined"
+        if np.isfinite(ends).all():
+            interval = f", 95 % in [{ends[0]!r}, {ends[1]!r}]"
+        comments.append(f"# {bound.key} fitted to {measured}: {value!r} {bound.unit}{interval}")
+    model = build(scene)  # The files of the scene are found from its old place.
+    text = resolved(moved(scene, folder / FITTED_SCENE), model)
+    return "\n".join(comments) + "\n\n" + text

@@ -1,0 +1,111 @@
+"""Page of a fit: the values with their intervals first, then the picture, the correlation, the files."""
+
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+
+from ..pages.document import Section, document, figure, prose, table, warned
+from .text import format_fitted, named_values
+
+FILES = {
+    "fit.json": "the result of the fit in SI units, with all digits",
+    "fit.csv": "measured and fitted values, row by row",
+    "scene.fitted.toml": "the scene with the fitted values, ready to run",
+}
+
+
+def page(
+    answer: dict, lines: Sequence, summary: Sequence, *, picture: str, caption: str, scene_text: str
+) -> str:
+    """Return the HTML page of a fit.
+
+    Parameters
+    ----------
+    answer : dict
+        The object of fit.json.
+    lines : sequence of str
+        The answer as text.
+    summary : sequence of str
+        The lines that stand at the top of the page.
+    picture : str
+        SVG text of fit.svg; "" without one.
+    caption : str
+        Caption of the picture.
+    scene_text : str
+        Text of the fitted scene.
+    """
+    values = named_values(answer)
+    sections = [Section("values", "Fitted values", _values_table(values))]
+    if picture:
+        shown = figure(0, picture, f"{caption}.", caption)
+        sections.append(Section("picture", "Measured and fitted", shown))
+    if len(answer.get("correlation", ())) > 1:
+        rows = _correlation_table(answer["correlation"], list(values))
+        sections.append(Section("correlation", "Correlation of the values", rows))
+    whole = escape("\n".join(lines))
+    text = f"<pre style='white-space:pre-wrap'>{whole}</pre>"
+    sections.append(Section("text", "The answer in full", text))
+    names = [name for name in FILES if picture or name != "fit.csv"]
+    items = "".join(f"<li><a href={name}>{name}</a>: {FILES[name]}</li>" for name in names)
+    origin = (
+        f"<ul>{items}</ul><details><summary>Fitted scene</summary><pre>{escape(scene_text)}</pre>"
+        f"</details><p class=soft>patchfem {answer['patchfem']}</p>"
+    )
+    sections.append(Section("origin", "Scene and files", origin))
+    title = f"{answer['title'] or 'Fit'}: fitted to {Path(answer['measured']).name}"
+    return document(title, _verdict(answer, values, summary), sections)
+
+
+def _verdict(answer: dict, values: dict, summary: Sequence) -> str:
+    """Return the values with their intervals, the summary and the warnings."""
+    short = "; ".join(f"{escape(key)} = {_value_with_ends(one)}" for key, one in values.items())
+    law = f"{answer['law']}: " if "law" in answer else ""
+    sentence = "; ".join(" ".join(line.split()) for line in summary)
+    has_intervals = any(value.get("interval") for value in values.values())
+    brackets = " Brackets enclose 95 % intervals." if has_intervals else ""
+    return (
+        f"<div class=verdict><b>{law}{short}</b><p>{prose(sentence)}.{brackets}</p></div>"
+        f"{warned(answer['warnings'])}"
+    )
+
+
+def _value_with_ends(described: dict) -> str:
+    value, unit, ends = format_fitted(described)
+    interval = f" ({ends[0]} to {ends[1]})" if ends else ""
+    return f"{value} {unit}".strip() + interval
+
+
+def _values_table(values: dict) -> str:
+    """Return value, interval and range of each key."""
+    rows = []
+    for key, described in values.items():
+        value, unit, ends = format_fitted(described)
+        interval = "&ndash;"
+        if ends:
+            interval = " .. ".join(ends)
+        elif "interval" in described:
+            interval = "not determined"
+        searched = "&ndash;"
+        if "bounds" in described:
+            searched = " .. ".join(_format_bound(described, end) for end in described["bounds"])
+        if described.get("at_bound"):
+            searched += f", at its {described['at_bound']} bound"
+        rows.append([escape(key), value, interval, escape(unit), searched])
+    return table(("key", ">value", ">95 %", "unit", "searched"), rows)
+
+
+def _format_bound(described: dict, end: float) -> str:
+    value, unit, _ = format_fitted(described | {"value": end, "interval": None})
+    return f"{value} {unit}"
+
+
+def _correlation_table(correlation: list, names: list) -> str:
+    """Return the correlation of the errors of the values."""
+    rows = []
+    for name, row in zip(names, correlation):
+        cells = ["&ndash;" if part is None else f"{part:.2f}" for part in row]
+        rows.append([escape(name), *cells])
+    return table(("key", *(f">{escape(name)}" for name in names)), rows) + (
+        "<p class=soft>If a correlation is near 1 or -1, the measurement determines only a "
+        "combination of these two values.</p>"
+    )

@@ -1,0 +1,250 @@
+"""Files of laws of a single point that are fitted to a patch, with a scene of each law."""
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+
+from ...campaigns.fits.patch import FITTED_LAWS, FittedLaw, FittedPatch
+from ...model.model import build, resolved
+from ...scales import SPOKEN, axis_unit, plain, short
+from ...scales import told as format_with_error
+from ...scene.scene import loads, moved
+from ...scene.sets import text_of
+from ..drawing import charts
+from .files import FITTED_SCENE, FitFiles, describe_measurement
+
+PARTS = ("stiffness", "dissipation")
+COLOURS = dict(zip(FITTED_LAWS, ("accent", "warm", "soft"), strict=True))
+PATCH_COLOUR = "#000000"
+Y_MARGIN = 1.05  # Height of the axis of stiffness / largest stiffness.
+
+
+def describe_patch_fit(fitted: FittedPatch, folder: Path) -> FitFiles:
+    """Return the files of the fitted laws; folder: to which the paths of the scenes are relative."""
+    answer = _answer(fitted)
+    lines = _lines(answer)
+    names = {FITTED_SCENE: fitted.best} | {f"scene.{law}.toml": law for law in FITTED_LAWS}
+    scenes = {name: _scene_text(fitted, law, answer, folder / name) for name, law in names.items()}
+    return FitFiles(
+        answer=answer,
+        lines=lines,
+        summary=lines[:1],
+        scenes=scenes,
+        rows=_rows(fitted),
+        charts=_charts(fitted),
+        caption="Stiffness and loss per cycle of the patch and of each fitted law, against slide "
+        "amplitude",
+    )
+
+
+def _answer(fitted: FittedPatch) -> dict:
+    """Return the object of fit.json."""
+    patch = fitted.patch
+    laws = {law: _describe_law(law, one, fitted) for law, one in fitted.laws.items()}
+    best = laws[fitted.best]
+    mesh = None
+    if patch.mesh_change is not None:
+        mesh = _sizes(patch.mesh_change, patch.slides) | {"nodes": patch.nodes}
+    scene = fitted.scene
+    return describe_measurement(scene.title, scene.path.name, "patch", best["outcome"]) | {
+        "law": fitted.best,
+        "values": best["values"],
+        "laws": laws,
+        "load": patch.load,
+        "slip_force": patch.slip_force,
+        "stiffness": patch.stiffness,
+        "stiffness_error": patch.stiffness_error,
+        "rows": int(patch.slides.size),
+        "amplitudes": [float(patch.slides[0]), float(patch.slides[-1])],
+        "mesh": mesh,
+        "warnings": [*scene.remarks, *fitted.warnings],
+        "seconds": round(fitted.seconds, 6),
+    }
+
+
+def _describe_law(law: str, one: FittedLaw, fitted: FittedPatch) -> dict:
+    """Return a law as it stands in fit.json."""
+    units = FITTED_LAWS[law].units
+    sizes = _sizes(one.deviations, fitted.patch.slides)
+    return {
+        "values": {
+            f"friction.{key}": {"value": value, "unit": units.get(key, "1")}
+            for key, value in one.values.items()
+        },
+        "outcome": str(one.fit.outcome),
+        **sizes,
+        "dissipation": sizes["dissipation"] | _relative_loss(one, fitted),
+    }
+
+
+def _sizes(deviations, slides) -> dict:
+    """Return the largest and the rms relative difference (2, k) of stiffness and loss."""
+    out = {}
+    for name, row in zip(PARTS, deviations):
+        k = np.abs(row).argmax()
+        out[name] = {
+            "largest": float(row[k]),
+            "at": float(slides[k]),
+            "rms": float(np.sqrt(np.mean(row**2))),
+        }
+    return out
+
+
+def _relative_loss(one: FittedLaw, fitted: FittedPatch) -> dict:
+    """Return the largest difference of the loss relative to that of the patch, however small it is.
+
+    Where the patch loses nothing, the difference is that of `one.deviations`.
+    """
+    own, loss = fitted.patch.curves.loss, one.curves.loss
+    share = np.where(own > 0, loss / np.where(own > 0, own, 1.0) - 1, one.deviations[1])
+    k = np.abs(share).argmax()
+    return {"relative": float(share[k]), "relative_at": float(fitted.patch.slides[k])}
+
+
+def _scene_text(fitted: FittedPatch, law: str, answer: dict, path: Path) -> str:
+    """Return the scene with a law in place of its patch, in SI units with every default."""
+    scene = fitted.scene
+    tables = tomllib.loads(scene.resolved())
+    tables.pop("contact")
+    tables["normal"] = {"load": fitted.patch.load}
+    values = fitted.laws[law].values
+    tables["friction"] = {"law": law, "static": scene.friction.static, **values}
+    tables["accuracy"] = {"tolerance": scene.accuracy.tolerance}
+    whole = loads(text_of(tables), scene.path)
+    comments = [f"law '{law}' in place of the patch of {scene.path.name}", *_costs(law, answer)]
+    head = "\n".join(f"# {line}" for line in comments)
+    return f"{head}\n\n{resolved(moved(whole, path), build(whole))}"
+
+
+def _rows(fitted: FittedPatch) -> list:
+    """Return the rows of fit.csv."""
+    curves = {"patch": fitted.patch.curves} | {law: one.curves for law, one in fitted.laws.items()}
+    parts = ("force [N]", "loss [J]")
+    head = ["slide [m]", *(f"{name} {part}" for name in curves for part in parts)]
+    columns = [fitted.patch.slides]
+    for one in curves.values():
+        columns += [one.force, one.loss]
+    return [head, *([*map(repr, row)] for row in np.column_stack(columns).tolist())]
+
+
+def _charts(fitted: FittedPatch) -> list:
+    """Return stiffness and loss per cycle against the amplitude of the slide."""
+    slides = fitted.patch.slides
+    unit, scale = axis_unit(slides, "m")
+    along = charts.axis("amplitude of the slide", unit, True)
+    x = slides * scale
+    own = fitted.patch.curves
+    stiffness = [charts.dots(x, own.force / slides, PATCH_COLOUR, "patch", size=4)]
+    loss = [charts.dots(x, _above_zero(own.loss), PATCH_COLOUR, "patch", size=4)]
+    peak = float((own.force / slides).max())
+    for law, one in fitted.laws.items():
+        values = one.curves.force / slides
+        peak = max(peak, float(values.max()))
+        stiffness.append(charts.line(x, values, COLOURS[law], law))
+        loss.append(charts.line(x, _above_zero(one.curves.loss), COLOURS[law], law))
+    from_zero = charts.axis("stiffness", "N/m") | {"range": [0.0, Y_MARGIN * peak]}
+    return [
+        charts.chart("Stiffness", along, from_zero, stiffness),
+        charts.chart("Loss per cycle", along, charts.axis("loss per cycle", "J", True), loss),
+    ]
+
+
+def _above_zero(values) -> np.ndarray:
+    """Return values with NaN in place of those that a logarithmic axis cannot show."""
+    return np.where(values > 0, values, np.nan)
+
+
+def _lines(answer: dict) -> list:
+    """Return the answer as lines of text."""
+    low, high = (short(end, "m", 3) for end in answer["amplitudes"])
+    out = [
+        f"{answer['outcome']}: laws of a single point fitted to a patch under a load of "
+        f"{short(answer['load'], 'N', 4)}; the patch slips as a whole at "
+        f"{short(answer['slip_force'], 'N', 4)} and has {_format_stiffness(answer)} while the "
+        f"whole patch sticks; {answer['rows']} amplitudes of the slide from {low} to {high}. "
+        f"{_headline(answer)}",
+        f"  {'law':<16}{'error of stiffness':>22}{'error of loss':>22}   values",
+    ]
+    for law, one in answer["laws"].items():
+        cells = [
+            f"{_percent(one[part]['largest'])} (rms {_percent(one[part]['rms'])})" for part in PARTS
+        ]
+        values = ", ".join(
+            f"{key.partition('.')[2]} {_format(value['value'], value['unit'])}"
+            for key, value in one["values"].items()
+        )
+        out.append(f"  {law:<16}{cells[0]:>22}{cells[1]:>22}   {values}")
+    out += [f"  {line}" for line in _costs(answer["law"], answer)]
+    if answer["mesh"] is not None:
+        stiffness, loss = (answer["mesh"][part] for part in PARTS)
+        out.append(
+            f"  A mesh coarser than the present one ({answer['mesh']['nodes']} interface nodes) "
+            "changes the stiffness of the patch by at most "
+            f"{_percent(abs(stiffness['largest']))}, and the energy dissipated per cycle by at "
+            f"most {_percent(abs(loss['largest']))} (at {short(loss['at'], 'm', 3)}) and by "
+            f"{_percent(loss['rms'])} rms."
+        )
+    return out
+
+
+def _format_stiffness(answer: dict) -> str:
+    """Format the stiffness while nothing slips, with its error where it is known."""
+    value, error = answer["stiffness"], answer["stiffness_error"]
+    if error is None:
+        return _format(value, "N/m")
+    return format_with_error(value, error, unit=SPOKEN["N/m"])
+
+
+def _headline(answer: dict) -> str:
+    """Name the best law, with the signs and sizes of its largest errors."""
+    stiffness, loss = (answer["laws"][answer["law"]][part] for part in PARTS)
+    return (
+        f"Law '{answer['law']}' fits best; its largest errors over this range are "
+        f"{_signed_percent(stiffness['largest'])} of the stiffness "
+        f"(at {short(stiffness['at'], 'm', 3)}) and {_signed_percent(loss['relative'])} of the "
+        f"energy loss per cycle (at {short(loss['relative_at'], 'm', 3)})"
+    )
+
+
+def _costs(law: str, answer: dict) -> list:
+    """Return sentences on the error of a law in place of the patch."""
+    low, high = (short(end, "m", 3) for end in answer["amplitudes"])
+    stiffness, loss = (answer["laws"][law][part] for part in PARTS)
+    side = "larger" if loss["largest"] > 0 else "smaller"
+    return [
+        f"For slide amplitudes from {low} to {high} the stiffness of '{law}' differs from that of "
+        f"the patch by at most {_percent(abs(stiffness['largest']))} "
+        f"(at {short(stiffness['at'], 'm', 3)}) and by {_percent(stiffness['rms'])} rms.",
+        "The energy that this law dissipates per cycle is up to "
+        f"{_percent(abs(loss['largest']))} {side} than that of the patch "
+        f"(at {short(loss['at'], 'm', 3)}) and differs by {_percent(loss['rms'])} rms; where this "
+        "energy is below a thousandth of 4 x force x slide, the difference is given relative to "
+        f"that thousandth.{_relative_sentence(loss)}",
+        "If this law replaces the patch, the relative error of a mode's frequency is at most about "
+        "half the error of the stiffness. The relative error of the friction damping of this mode "
+        "is at most the sum of the errors of the stiffness and of the dissipated energy.",
+    ]
+
+
+def _relative_sentence(loss: dict) -> str:
+    """Return a sentence on the largest difference relative to the patch if it is another one."""
+    if loss["relative"] == loss["largest"]:
+        return ""
+    return (
+        " Relative to the energy that the patch itself dissipates, the largest difference is "
+        f"{_signed_percent(loss['relative'])} (at {short(loss['relative_at'], 'm', 3)})."
+    )
+
+
+def _percent(fraction: float) -> str:
+    return f"{plain(100 * fraction, 2)} %"
+
+
+def _signed_percent(fraction: float) -> str:
+    sign = "+" if fraction > 0 else ""
+    return f"{sign}{_percent(fraction)}"
+
+
+def _format(value: float, unit: str) -> str:
+    return short(value, SPOKEN.get(unit, unit), 5)

@@ -1,0 +1,209 @@
+"""A fit as the command line and Python ask for it: options, kind of fit, results folder."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from ...campaigns.fits.curve import DEFAULT_STARTS, fit_curve, is_curve
+from ...campaigns.fits.loop import fit_loop
+from ...campaigns.fits.loop_path import LoopOptions
+from ...campaigns.fits.patch import fit_patch, read_slides
+from ...campaigns.fits.problem import parse_ranges
+from ...campaigns.fits.wear import fit_wear
+from ...campaigns.rows.asked import Question
+from ...campaigns.rows.fit import RowsOptions, fit_rows
+from ...campaigns.rows.search import UNSTABLE, Search
+from ...core import PatchfemError
+from ...model.model import build
+from ...scene import axes
+from ...scene.scene import Scene
+from ..results import STARTS, Folder
+from .curve import describe_curve_fit
+from .files import FitFiles, write_fit
+from .loop import describe_loop_fit
+from .patch import describe_patch_fit
+from .rows import Starts, describe_rows_fit
+from .wear import describe_wear_fit
+
+DEFAULT_ROW_STARTS = 8  # Random starts of a fit to rows.
+LOOP_OPTIONS = ("offset", "warm_up")
+ROW_OPTIONS = ("leave_out", "seed", "unstable", "placebo", "resume")
+OPTIONS_BY_KIND = {
+    "loop": ("hold", *LOOP_OPTIONS),
+    "rows": ("hold", "starts", *ROW_OPTIONS),
+    "curve": ("starts",),
+    "patch": ("from_patch", "amplitudes"),
+    "wear": (),
+}
+KINDS = {
+    "loop": "a bench",
+    "rows": "a rig",
+    "wear": "one with [wear]",
+    "curve": "a rig, fitted to a curve of frequency and damping against amplitude",
+    "patch": "fitted to its own patch",
+}
+_LOOPS = "fits to a loop under a prescribed slide"
+_ROWS = "fits to rows of a rig"
+FITS_BY_OPTION = {
+    "hold": f"{_LOOPS} or to rows of a rig",
+    "starts": f"{_ROWS} or to its curve of frequency and damping against amplitude",
+    "amplitudes": "fits with --from-patch",
+    **dict.fromkeys(LOOP_OPTIONS, _LOOPS),
+    **dict.fromkeys(ROW_OPTIONS, _ROWS),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """Options of a fit besides the free keys; OPTIONS_BY_KIND says which kind of fit takes which."""
+
+    hold: tuple = ()
+    offset: tuple = ()
+    warm_up: bool = False
+    leave_out: str = ""
+    starts: int | None = None
+    seed: int = 0
+    unstable: str = UNSTABLE[0]
+    placebo: tuple = ()
+    resume: bool = False
+    from_patch: bool = False
+    amplitudes: str = ""
+
+    def names_given(self) -> list:
+        """Return the names of the options that differ from their default."""
+        return [one.name for one in fields(self) if getattr(self, one.name) != one.default]
+
+
+@dataclass(frozen=True, slots=True)
+class Listener:
+    """Functions that are told how the work proceeds.
+
+    say: takes a line; progress: takes the completed fraction; format_option: option -> its name for
+    this caller.
+    """
+
+    say: Callable | None = None
+    progress: Callable | None = None
+    format_option: Callable = str
+
+
+def fit_into(
+    scene: Scene,
+    to: str,
+    free: Sequence[str],
+    options: Options,
+    target: Path,
+    listener: Listener = Listener(),
+) -> FitFiles:
+    """Fit a scene and write the results folder.
+
+    Parameters
+    ----------
+    scene : Scene
+    to : str
+        File of the measurement, or a measured depth; "" with `options.from_patch`.
+    free : sequence of str
+        Free keys with their ranges, "table.key=low..high".
+    options : Options
+    target : Path
+        Results folder, which is claimed before the work.
+    listener : Listener
+
+    Returns
+    -------
+    FitFiles
+
+    Raises
+    ------
+    SceneError, PatchfemError
+        For input that cannot be used and for options that this kind of fit does not have, before
+        anything is computed.
+    """
+    format_option = listener.format_option
+    kind = "patch" if options.from_patch else choose_kind(scene, to)
+    _refuse(kind, options, format_option)
+    if options.from_patch == bool(to) or (options.from_patch and free):
+        raise PatchfemError(
+            f"{format_option('to')} MEASURED and {format_option('free')} KEYS are needed, or "
+            f"{format_option('from_patch')} alone, which fits lumped laws to the scene's own patch"
+        )
+    lengths = None
+    if options.amplitudes:
+        lengths = axes.lengths(options.amplitudes, format_option("amplitudes"))
+    slides = read_slides(lengths)
+    with Folder(target, options.resume) as folder:
+        if folder.dropped and listener.say is not None:
+            listener.say(folder.dropped)
+        if kind == "patch":
+            files = describe_patch_fit(fit_patch(scene, slides), folder.target)
+        elif kind == "rows":
+            files = _fit_rows(scene, Path(to), free, options, folder, listener)
+        elif kind == "curve":
+            starts = options.starts or DEFAULT_STARTS
+            fitted = fit_curve(scene, Path(to), free, listener.say, starts)
+            files = describe_curve_fit(fitted, folder.target)
+        elif kind == "loop":
+            how = LoopOptions(options.offset, options.warm_up)
+            fitted = fit_loop(scene, Path(to), free, options.hold, listener.say, how)
+            files = describe_loop_fit(fitted, folder.target)
+        else:
+            coefficient = fit_wear(build(scene), to, free, listener.progress)
+            files = describe_wear_fit(coefficient, scene)
+        write_fit(files, folder)
+    return files
+
+
+def choose_kind(scene: Scene, to: str) -> str:
+    """Return the kind of fit by the tables of the scene and the measured file."""
+    if scene.wear is not None:
+        return "wear"
+    if scene.kind not in ("rig", "linear"):
+        return "loop"
+    return "curve" if is_curve(to) else "rows"
+
+
+def _refuse(kind: str, options: Options, format_option: Callable) -> None:
+    """Raise PatchfemError for an option that this kind of fit does not have, or a wrong value."""
+    others = [name for name in options.names_given() if name not in OPTIONS_BY_KIND[kind]]
+    if others:
+        belong = "; ".join(
+            f"{format_option(name)} applies only to {FITS_BY_OPTION[name]}" for name in others
+        )
+        these = "this option" if len(others) == 1 else "these options"
+        raise PatchfemError(f"{belong}; this scene is {KINDS[kind]}; leave {these} out")
+    starts, seed = options.starts, options.seed
+    if starts is not None and (not isinstance(starts, int) or starts < 1):
+        raise PatchfemError(f"{format_option('starts')} {starts}: at least one is needed")
+    if not isinstance(seed, int) or seed < 0:
+        raise PatchfemError(f"{format_option('seed')} {seed}: a whole number >= 0 is needed")
+    if options.unstable not in UNSTABLE:
+        raise PatchfemError(
+            f"{format_option('unstable')} {options.unstable}: one of {', '.join(UNSTABLE)} is needed"
+        )
+
+
+def _fit_rows(
+    scene: Scene,
+    path: Path,
+    free: Sequence[str],
+    options: Options,
+    folder: Folder,
+    listener: Listener,
+) -> FitFiles:
+    wanted = parse_ranges(free)
+    question = (
+        scene.resolved(),
+        free,
+        options.hold,
+        options.leave_out,
+        options.placebo,
+        options.seed,
+        options.unstable,
+        path.read_bytes() if path.is_file() else "",
+    )
+    kept = Starts(folder.path / STARTS, question, options.resume)
+    starts = options.starts or DEFAULT_ROW_STARTS
+    how = Search(starts, options.seed, options.unstable, kept)
+    asked = RowsOptions(options.hold, options.leave_out, options.placebo, how)
+    fitted = fit_rows(Question(scene, wanted, path), asked, listener.say, listener.progress)
+    return describe_rows_fit(fitted, folder.target)

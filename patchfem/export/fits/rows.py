@@ -1,0 +1,293 @@
+"""Files of a fit to rows of measured responses, and the file from which an interrupted fit continues."""
+
+import hashlib
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+
+from ... import __version__
+from ...campaigns.rows.asked import READINGS
+from ...campaigns.rows.cells import scores
+from ...campaigns.rows.fit import SAME_SCORE, FittedRows
+from ...campaigns.rows.nulls import NULLS
+from ...core import G_N
+from ...disk.whole import write_text
+from ..drawing import charts
+from .files import (
+    FITTED_SCENE,
+    FitFiles,
+    describe_correlation,
+    describe_measurement,
+    describe_unknown,
+    describe_values,
+    fitted_scene_text,
+)
+from .text import format_values
+
+MIL = 25.4e-6  # [m]
+PARTS = ("fitted", "held_out", "left_out")
+KEY_WIDTH = 28  # Letters of the longest key of a rig in the printed answer.
+AXIS_MARGIN = 1.1  # Ratio of the end of the line of equal values to the last point.
+
+
+class Starts:
+    """Results of searches by name, which are kept in a file while a fit runs.
+
+    path: of the file; question: texts on which the results depend; resume: whether those in the file
+    count. Results of another question do not.
+    """
+
+    def __init__(self, path: Path, question, resume: bool):
+        self.path = path
+        text = "\n".join([__version__, *map(str, question)])
+        self.key = hashlib.sha256(text.encode()).hexdigest()
+        self.known = {}
+        if resume and path.is_file():
+            try:
+                content = json.loads(path.read_text("utf-8"))
+            except (ValueError, RecursionError):
+                content = {}
+            if isinstance(content, dict) and content.get("question") == self.key:
+                self.known = content["ends"]
+
+    def __call__(self, name: str, ends: list | None = None):
+        """Return the result under a name, None if there is none; keep `ends` under it if given."""
+        if ends is not None:
+            self.known[name] = ends
+            write_text(self.path, json.dumps({"question": self.key, "ends": self.known}))
+        return self.known.get(name)
+
+
+def describe_rows_fit(fitted: FittedRows, folder: Path) -> FitFiles:
+    """Return the files of a fit to rows; folder: to which the paths of the scene are relative."""
+    answer = describe_answer(fitted)
+    lines = _lines(answer)
+    scene = fitted_scene_text(fitted.keys, fitted.cells.path.name, folder)
+    return FitFiles(
+        answer=answer,
+        lines=lines,
+        summary=lines[:1],
+        scenes={FITTED_SCENE: scene},
+        rows=_table(answer),
+        charts=_charts(answer),
+        caption="Computed against measured readings; the line is where both are equal",
+    )
+
+
+def describe_answer(fitted: FittedRows) -> dict:
+    """Return the object of fit.json; scores are root mean squares of ln(computed/measured)."""
+    keys, cells = fitted.keys, fitted.cells
+    found = keys.fit
+    nulls = {}
+    nulls_stable = {}
+    for name in NULLS:
+        null = fitted.nulls[name]
+        nulls[name] = fitted.score(null.logs, null.left) | {"numbers": null.numbers}
+        nulls_stable[name] = fitted.score(null.logs, null.left, stable=True)
+    return describe_measurement(keys.scene.title, cells.path.name, "rows", keys.outcome) | {
+        "values": describe_values(keys),
+        "scores": fitted.score(fitted.logs, fitted.left),
+        "scores_stable": fitted.score(fitted.logs, fitted.left, stable=True),
+        "nulls": nulls,
+        "nulls_stable": nulls_stable,
+        "unstable": fitted.how.unstable,
+        "reading": _reading(fitted),
+        "unknown": describe_unknown(keys.ranges, found),
+        "correlation": describe_correlation(found),
+        "readings": int((~fitted.held).sum()),
+        "held": int(fitted.held.sum()),
+        "rms": found.rms,
+        "seed": fitted.how.seed,
+        "starts": _starts(fitted),
+        "folds": _folds(fitted),
+        "placebos": _placebos(fitted),
+        "rows": _rows(fitted),
+        "evaluations": found.evaluations,
+        "failures": found.failures,
+        "motions": fitted.runs,
+        "warnings": keys.warnings,
+        "seconds": round(keys.seconds, 6),
+    }
+
+
+def _reading(fitted: FittedRows) -> dict:
+    """Return how the instruments read, with fitted or given gains."""
+    read = fitted.asked.read
+    out = {
+        "reading": "peak" if read is None else read.reading,
+        "reading_cutoff": None if read is None else read.reading_cutoff,
+    }
+    keys = fitted.keys
+    values = {bound.key: float(value) for bound, value in zip(keys.ranges, keys.fit.values)}
+    for key in READINGS:
+        name = key.partition(".")[2]
+        out[name] = values.get(key, 1.0 if read is None else getattr(read, name))
+    return out
+
+
+def _starts(fitted: FittedRows) -> list:
+    """Return where each search began and ended, with its training score."""
+    names = [bound.key for bound in fitted.keys.ranges]
+    found = fitted.found
+    out = []
+    for begin, end, rms in zip(found.starts.tolist(), found.ends.tolist(), found.rms.tolist()):
+        settled = math.isfinite(rms)
+        out.append(
+            {
+                "from": dict(zip(names, begin)),
+                "to": dict(zip(names, end)) if settled else None,
+                "training": rms if settled else None,
+            }
+        )
+    return out
+
+
+def _folds(fitted: FittedRows) -> list:
+    """Return the fit without each value that was left out, and its score on the readings left out."""
+    names = [bound.key for bound in fitted.keys.ranges]
+    return [
+        {
+            "left_out": fold.name,
+            "training": fold.found.fit.rms,
+            "scores": scores(fitted.cells, fitted.left, fold.readings),
+            "values": dict(zip(names, fold.found.fit.values.tolist())),
+            "starts": [rms if math.isfinite(rms) else None for rms in fold.found.rms.tolist()],
+        }
+        for fold in fitted.folds
+    ]
+
+
+def _placebos(fitted: FittedRows) -> list:
+    """Return the scores of each repeated fit; no reading is left out of it."""
+    out = []
+    for placebo in fitted.placebos:
+        score = fitted.score(placebo.logs, np.full(placebo.logs.size, np.nan))
+        score.pop("left_out")
+        out.append({"set": placebo.text, "scores": score})
+    return out
+
+
+def _rows(fitted: FittedRows) -> list:
+    """Return every row as measured and computed, in SI units."""
+    cells = fitted.cells
+    keys = zip(cells.row.tolist(), map(bool, cells.felt))
+    number = {key: n for n, key in enumerate(keys)}
+    out = []
+    for k, row in enumerate(cells.rows):
+        entry = {"frequency": row.frequency, "input": row.input, "flag": row.flag}
+        for part, (name, is_felt) in enumerate((("acceleration", True), ("displacement", False))):
+            n = number.get((k, is_felt))
+            value = None
+            if n is not None:
+                value = float(fitted.computed[part, cells.condition[n]])
+            entry[name] = {
+                "measured": getattr(row, name),
+                "computed": value if value is None or math.isfinite(value) else None,
+                "held": None if n is None else bool(fitted.held[n]),
+            }
+        out.append(entry)
+    return out
+
+
+def _table(answer: dict) -> list:
+    """Return the rows of fit.csv in g and mil, with the computed readings."""
+    rows: list = [
+        [
+            "frequency [Hz]",
+            "input [g]",
+            "acceleration [g]",
+            "displacement [mil]",
+            "flag",
+            "computed acceleration [g]",
+            "computed displacement [mil]",
+            "held",
+        ]
+    ]
+    for row in answer["rows"]:
+        pairs = ((row["acceleration"], G_N), (row["displacement"], MIL))
+        measured = [_format_cell(reading["measured"], unit) for reading, unit in pairs]
+        computed = [_format_cell(reading["computed"], unit) for reading, unit in pairs]
+        held = int(any(reading["held"] for reading, _ in pairs))
+        drive = [f"{row['frequency']:.9g}", f"{row['input'] / G_N:.9g}"]
+        rows.append([*drive, *measured, row["flag"], *computed, held])
+    return rows
+
+
+def _format_cell(value: float | None, unit: float) -> str:
+    return "" if value is None else f"{value / unit:.6g}"
+
+
+def _charts(answer: dict) -> list:
+    """Return computed against measured accelerations and displacements."""
+    return [
+        _chart(answer, "acceleration", "g", G_N),
+        _chart(answer, "displacement", "mil", MIL),
+    ]
+
+
+def _chart(answer: dict, name: str, unit: str, scale: float) -> dict:
+    """Return computed against measured readings of one kind, by whether they were held out."""
+    groups: dict = {}
+    for row in answer["rows"]:
+        reading = row[name]
+        if reading["measured"] and reading["computed"]:
+            group = groups.setdefault((bool(reading["held"]), "U" in row["flag"]), [])
+            group.append((reading["measured"] / scale, reading["computed"] / scale))
+    marks = []
+    for held, unstable in sorted(groups):
+        x, y = zip(*groups[held, unstable])
+        text = "held out" if held else "fitted"
+        if unstable:
+            text += ", unstable in the test"
+        shape = "triangle" if unstable else "circle"
+        marks.append(charts.dots(x, y, "warm" if held else "accent", text, size=4, shape=shape))
+    if groups:
+        numbers = np.concatenate([np.ravel(points) for points in groups.values()])
+        ends = [numbers.min() / AXIS_MARGIN, numbers.max() * AXIS_MARGIN]
+        marks.append(charts.line(ends, ends, "soft", width=0.8))
+    return charts.chart(
+        name.capitalize(),
+        charts.axis("measured", unit),
+        charts.axis("computed", unit),
+        marks,
+    )
+
+
+def _lines(answer: dict) -> list:
+    """Return the values, and the scores of the rig and of the models without mechanics."""
+    good = [one["training"] for one in answer["starts"] if one["training"] is not None]
+    alike = sum(rms <= min(good) * SAME_SCORE for rms in good)
+    out = [
+        f"{answer['outcome']}: {answer['readings']} readings of {answer['measured']} fitted, "
+        f"{answer['held']} held out; {alike} of {len(answer['starts'])} starts led to within 1 % of "
+        "the best training score"
+    ]
+    out += format_values(answer, KEY_WIDTH)
+    heading = "rms of ln(computed/measured)"
+    out.append(f"  {heading:<36} {'acceleration':>12} {'displacement':>12} {'all':>8}")
+    for part in PARTS:
+        score = answer["scores"][part]
+        if score is not None:
+            out.append(_score_line(part.replace("_", " "), score))
+            out += [_score_line(f"  null {name}", answer["nulls"][name][part]) for name in NULLS]
+            stable = answer["scores_stable"][part]
+            if stable != score:
+                out.append(_score_line("  without rows flagged U", stable))
+    for fold in answer["folds"]:
+        name = f"without {fold['left_out']}: training {fold['training']:.3f}"
+        out.append(_score_line(name, fold["scores"]))
+    for placebo in answer["placebos"]:
+        for part, score in placebo["scores"].items():
+            if score is not None:
+                out.append(_score_line(f"{placebo['set']}, {part.replace('_', ' ')}", score))
+    return out
+
+
+def _score_line(name: str, score: dict | None) -> str:
+    cells = []
+    for kind in ("acceleration", "displacement", "all"):
+        value = None if score is None else score[kind]
+        cells.append("-" if value is None else f"{value:.3f}")
+    return f"  {name:<36} {cells[0]:>12} {cells[1]:>12} {cells[2]:>8}"

@@ -1,0 +1,45 @@
+"""Fitted values as text, in the units that people read."""
+
+from typing import NamedTuple
+
+from ...scales import SPOKEN, fitting, rounded
+
+
+class FormattedValue(NamedTuple):
+    """A value and the ends of its interval, if any, in the unit that people read."""
+
+    value: str
+    unit: str
+    ends: list
+
+
+def format_fitted(described: dict) -> FormattedValue:
+    """Format a value of fit.json."""
+    unit, scale = fitting(described["value"], SPOKEN.get(described["unit"], described["unit"]))
+    ends = described.get("interval") or []
+    half_width = scale * (ends[1] - ends[0]) / 2 if ends else None
+    numbers = [described["value"], *ends]
+    value, *ends = [rounded(number * scale, half_width)[0] for number in numbers]
+    return FormattedValue(value, unit, ends)
+
+
+def format_values(answer: dict, width: int = 26) -> list:
+    """Return a line of text for each value of fit.json."""
+    return [format_line(f"{key:<{width}}", value) for key, value in named_values(answer).items()]
+
+
+def named_values(answer: dict) -> dict:
+    """Return the fitted keys and offsets of fit.json by the name that people read."""
+    offsets = answer.get("offsets", {})
+    return answer["values"] | {f"offset of the {name}": one for name, one in offsets.items()}
+
+
+def format_line(name: str, described: dict) -> str:
+    """Return a line with a value of fit.json, its interval and its bound."""
+    value, unit, ends = format_fitted(described)
+    interval = "not determined"
+    if ends:
+        by = "profile" if described["method"] == "profile" else "linearised problem"
+        interval = f"95 % in [{', '.join(ends)}] by the {by}"
+    bound = f", at its {described['at_bound']} bound" if described["at_bound"] else ""
+    return f"  {name} {f'{value} {unit}'.strip()}   {interval}{bound}"

@@ -1,0 +1,39 @@
+"""Files of a fitted wear coefficient."""
+
+from pathlib import Path
+
+from ...campaigns.fits.wear import KEY, FittedCoefficient
+from ...scales import plain
+from ...scene.scene import Scene, loads
+from .files import FITTED_SCENE, FitFiles, describe_measurement
+
+
+def describe_wear_fit(fitted: FittedCoefficient, scene: Scene) -> FitFiles:
+    """Return the files of a fitted wear coefficient; scene: before the fit."""
+    measured, bounds = fitted.measured, fitted.bounds
+    whole = loads(scene.text, scene.path, [*scene.sets, bounds.assigned(fitted.value)])
+    value = {
+        "value": fitted.value,
+        "unit": "m2 N-1",
+        "low": fitted.low,
+        "high": fitted.high,
+        "interval": [fitted.low, fitted.high],
+        "bounds": [bounds.low, bounds.high],
+    }
+    answer = describe_measurement(scene.title, measured.source, measured.name, "done") | {
+        "runs": fitted.runs,
+        "model": fitted.model,
+        "data": {"value": measured.value, "low": measured.low, "high": measured.high},
+        "values": {KEY: value},
+        "warnings": [],
+    }
+    source = "" if measured.source == "--to" else f" of {Path(measured.source).name}"
+    numbers = (fitted.value, fitted.low, fitted.high)
+    number, low, high = (plain(one, 4) for one in numbers)
+    line = f"{KEY} {number} {value['unit']}, {low} to {high} from the interval of {measured.name}"
+    return FitFiles(
+        answer=answer,
+        lines=[line],
+        summary=[line],
+        scenes={FITTED_SCENE: f"# {KEY} fitted to {measured.name}{source}\n\n{whole.resolved()}"},
+    )
