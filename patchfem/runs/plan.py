@@ -15,7 +15,6 @@ from ..response import rows
 from ..structure import drive_sizes
 from . import memory
 from .bench import engine as of_bench
-from .patch import grids as patch_grids
 from .patch import plan as patch_plan
 from .patch import store
 from .rig import engines
@@ -124,7 +123,7 @@ def _planned(model: Model, per_point: bool) -> Plan:
         said[2] = of_rig.sum_words(model) if model.kind == "rig" else []
     if model.patch is not None:
         tolerance = model.patch.mesh_tolerance or model.accuracy.tolerance
-        grids = patch_grids.expected_grids(model.patch, tolerance)
+        grids = patch_plan.expected_grids(model.patch, tolerance)
         unknowns, chain = patch_plan.sizes(grids) | unknowns, chain | patch_plan.chain(model.patch)
         seconds, pressed = patch_plan.effort(model.patch, grids, tolerance)
         groups |= patch_plan.groups(model)
@@ -132,7 +131,7 @@ def _planned(model: Model, per_point: bool) -> Plan:
     alike: set = set()
     for number, one in enumerate(model.rig.interfaces if model.rig is not None else ()):
         if one.patch is not None:
-            grids = patch_grids.expected_grids(one.patch, model.accuracy.tolerance)
+            grids = patch_plan.expected_grids(one.patch, model.accuracy.tolerance)
             alone = store.content_key(one.patch) not in alike  # equal patches are pressed once
             alike.add(store.content_key(one.patch))
             for name, size in patch_plan.sizes(grids).items():

@@ -117,7 +117,7 @@ def _even_mesh_cause(model: Model, tolerance: float) -> Cause | None:
         return None
     if not patch.nominal_load > 0:
         return None
-    share = patch.size / patch_grids.contact_on(patch, patch_grids.base_grids(patch)).wide
+    share = patch.size / patch_grids.base_grids(patch).contact.wide
     if tolerance > OF_ELEMENT * share:
         return None
     words = f"with contact.element_size = {say(patch.size, 3)} ({plain(share, 2)} of the length in contact)"

@@ -9,8 +9,9 @@ from scene_texts import SMALL_PATCH
 from patchfem.contact import gaps
 from patchfem.model.gap import Gap
 from patchfem.model.model import build
-from patchfem.runs.patch.grids import base_grids, expected_grids
+from patchfem.runs.patch.grids import base_grids
 from patchfem.runs.patch.ladder import solve_all
+from patchfem.runs.patch.plan import expected_grids
 from patchfem.scene.scene import loads
 
 PIECES = """[contact]
@@ -80,7 +81,7 @@ def test_exact_a_new_shape_that_states_its_wave_has_cells_that_show_it(monkeypat
     keys = (("length", wave), ("height", high))
     waved = replace(patch, gap=Gap((("ripple", keys),), None, None, None, False, "upper"))
     assert waved.gap.wave == wave
-    (plain,), (shown,) = base_grids(patch), base_grids(waved)
+    (plain,), (shown,) = base_grids(patch).bodies, base_grids(waved).bodies
     assert np.diff(plain.x).max() > wave / 8 and np.diff(shown.x).max() <= wave / 4 * 1.2
     pressed = solve_all(waved, 1e-3)[0]
     x, sigma = (part[np.abs(pressed.x) < 3e-3] for part in (pressed.x, pressed.pressure.sigma_n))

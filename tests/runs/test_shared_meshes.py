@@ -74,11 +74,11 @@ def test_exact_the_pieces_of_a_first_search_serve_all_patches_of_a_geometry(monk
     """The coarsest grids that they lead to are those of a search of its own; a gap with waves has other columns."""
     low, high = (one.patch for one in family(1e-5, 1e-3))
     store.clear()
-    alone = grids.base_grids(high)
+    alone = grids.base_grids(high).bodies
     store.clear()
     pair = grids.search_pair(low)
     assert grids.search_pair(high) is pair
-    assert [list(body.x) for body in grids.base_grids(high)] == [list(body.x) for body in alone]
+    assert [list(body.x) for body in grids.base_grids(high).bodies] == [list(body.x) for body in alone]
     monkeypatch.setattr(grids, "_longest", lambda _: 5e-5)
     assert grids.search_pair(high).grid.x.size > pair.grid.x.size
 

@@ -3,7 +3,7 @@
 The coarsest grid follows from the patch alone: its contact is searched on columns that are graded to what the search
 before found; a plan searches in the same way. Every next grid splits all cells in two, so the grids of a tighter
 tolerance are those of a wider one and more. How far the ladder is climbed a run decides in `ladder`, a plan expects in
-`expected_grids`. Read `base_grids` first, then `layout_of`.
+`plan`. Read `base_grids` first, then `layout_of`.
 """
 
 from dataclasses import dataclass, replace
@@ -12,11 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import frozen_array
-from ...elasticity.grid_fronts import predicted_bytes, predicted_seconds
+from ...elasticity.grid_fronts import predicted_seconds
 from ...mesh.grading import Layout, columns, rows
-from ...mesh.nested import coarser, finer, plan_of
+from ...mesh.nested import plan_of
 from ...mesh.tensor import TensorGrid
-from ...model.pieces import grid_of, outlined, rounded_edges
+from ...model.pieces import outlined, rounded_edges
 from . import slip_zones, store
 from .condensed import Pair, condensed, without_factors
 from .press import Patch, pressed
@@ -41,7 +41,6 @@ SEARCHES = 8  # of the contact, each on columns graded to what the one before fo
 LEAST_LEVELS = 3  # nested meshes that show an order
 SPENT = {True: 3.0, False: 0.4}  # predicted seconds of the finest mesh: of a static patch, of one that moves
 OTHER = 4.0  # time of condensing a grid that is not a tensor grid over that of one that is
-ONE_MORE = 2e-3  # tolerance below which a contact that ends inside, or over a jump, is expected to take a level more
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -75,25 +74,35 @@ def search_pair(asked) -> Pair:
     return store.reuse(key, lambda: without_factors(condensed(asked, *grids_of(asked, layout))))
 
 
-def base_grids(asked) -> list:
-    """Return the coarsest grids of a `PatchModel`, one where its pieces are alike, graded to the contact on them.
+class BaseGrids(NamedTuple):
+    """The coarsest grids of a patch, one where its pieces are alike, and the contact that they are graded to.
+
+    contact: None without a load.
+    """
+
+    bodies: list
+    contact: ContactExtent | None
+
+
+def base_grids(asked) -> BaseGrids:
+    """Return the coarsest grids of a `PatchModel`, graded to the contact that is found on them.
 
     Where a load that varies moves the edges of the contact, the columns are fine over the bands that they sweep between
     SWING of the load; where wear does, no column is longer than WORN of the interface.
     """
     sweep = [replace(asked, load=share * asked.load) for share in SWING
              if asked.sweeps == "load" and asked.load is not None]
-    layout = search_layout(asked)
+    layout, contact = search_layout(asked), None
     for search in range(SEARCHES if asked.nominal_load > 0 else 0):  # without a load nothing bears
         pair = condensed(asked, *grids_of(asked, layout)) if search else search_pair(asked)
         x = pair.grid.x
         seen = [contact_extent(pressed(each, pair), asked.slip) for each in (asked, *sweep)]
-        layout = layout_of(asked, seen)
+        layout, contact = layout_of(asked, seen), seen[0]
         cells = max(one.cell / one.wide for one in seen)
-        shows = _shows_crests(asked, x, layout) and _shows_slip(seen[0].slip_zones, x, layout)
+        shows = _shows_crests(asked, x, layout) and _shows_slip(contact.slip_zones, x, layout)
         if cells <= 1 / (EDGE[asked.still] - 1) and shows:
             break
-    return grids_of(asked, layout)
+    return BaseGrids(grids_of(asked, layout), contact)
 
 
 def _shows_slip(zones: tuple, x, layout: Layout) -> bool:
@@ -240,76 +249,20 @@ def grid_on(asked, x, piece) -> TensorGrid:
     return TensorGrid(frozen_array(x), depth, coated)
 
 
-class Sizes(NamedTuple):
-    """Grids of a patch as a plan counts them.
-
-    points: nodes of the interface; finest: (columns, rows) of nodes of the finest grid of each piece, one where they
-    are alike; levels: nested grids that are solved; seconds, bytes: of condensing all of them, predicted; outlined:
-    they reach beyond the interface; ends: how often the contact ends inside the interface.
-    """
-
-    points: int
-    finest: tuple
-    levels: int
-    seconds: float
-    bytes: float
-    outlined: bool
-    ends: int = 0
-
-    @property
-    def nodes(self) -> float:
-        """Nodes of the finest grids."""
-        return float(sum(columns * rows for columns, rows in self.finest))
-
-
-def expected_grids(asked, tolerance: float) -> Sizes:
-    """The grids that a `PatchModel` is solved on at a tolerance, as the rules that make them lay them out for the
-    contact that is expected, which is not solved. A mesh file counts as one as fine as the automatic grid: it is not
-    read."""
-    ends, plain = 0, asked.mesh is None
-    if asked.meshes is not None:
-        ladder = [[body for body in level if body is not None] for level in asked.meshes.levels]
-    elif asked.chosen:
-        bodies = base_grids(asked)
-        ends = len(contact_on(asked, bodies).places)
-        more = tolerance < ONE_MORE and bool(ends or asked.gap.jumps)
-        ladder = [bodies]
-        while len(ladder) < LEAST_LEVELS + more:
-            bodies = [finer(body) for body in bodies]
-            if len(ladder) >= LEAST_LEVELS and seconds_of(bodies) > SPENT[asked.still]:
-                break
-            ladder.insert(0, bodies)
-    else:
-        pieces = (asked.lower,) if asked.alike else (asked.lower, asked.upper)
-        ladder = [[grid_of(asked, piece) for piece in pieces]]
-        while len(ladder) < LEAST_LEVELS and ladder[-1][0].x.size > 8:
-            ladder.append([coarser(body) for body in ladder[-1]])
-    finest = tuple(map(_nodes, ladder[0]))
-    return Sizes((plan_of(ladder[0][0]) or ladder[0][0]).x.size, finest, len(ladder),
-                 sum(map(seconds_of, ladder)) * (1.0 if plain else OTHER),
-                 sum(predicted_bytes(*nodes, _mirrored(body)) for nodes, body in zip(finest, ladder[0])),
-                 asked.outlined or not plain, ends)
-
-
-def contact_on(asked, bodies: list) -> ContactExtent:
-    """Return the contact of a `PatchModel` whose pieces have the grids `bodies`, one where they are alike."""
-    return contact_extent(pressed(asked, condensed(asked, *bodies)))
-
-
-def _nodes(body) -> tuple:
-    """(columns, rows) of nodes of a whole body."""
+def node_counts(body) -> tuple:
+    """Return the (columns, rows) of nodes of a whole body."""
     plan = plan_of(body)
     if plan is None:
         return body.x.size, max(3, round(len(body.points) / body.x.size))
     return (plan.x.size if plan is body else len(body.points) // plan.depth.size), plan.depth.size
 
 
-def _mirrored(body) -> bool:
+def is_mirrored(body) -> bool:
     """Whether a body is a plain grid that is its own mirror image."""
     return plan_of(body) is body and bool(np.abs(body.x + body.x[::-1]).max() <= 1e-12 * body.length)
 
 
 def seconds_of(bodies) -> float:
-    """Predicted seconds of condensing the grids of a patch."""
-    return sum((1.0 if plan_of(body) is body else OTHER) * predicted_seconds(*_nodes(body), _mirrored(body))
-               for body in bodies)
+    """Return the predicted seconds of condensing the bodies of a patch, (lower, upper or None) or one alike piece."""
+    return sum((1.0 if plan_of(body) is body else OTHER) * predicted_seconds(*node_counts(body), is_mirrored(body))
+               for body in bodies if body is not None)

@@ -108,7 +108,7 @@ def climb(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -
     The climb ends where the next mesh would take more than the work that is spent on a patch. With a prescribed slip it
     also has to show the work of that. Without an estimate it is the third mesh, and nothing is solved on the others.
     """
-    grids, out, on_points = base_grids(asked), [], None
+    grids, out, on_points = base_grids(asked).bodies, [], None
     while True:
         try:
             wanted = estimate or len(out) == LEAST_LEVELS - 1

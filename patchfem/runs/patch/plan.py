@@ -1,17 +1,77 @@
 """Sizes, stiffness and groups of a patch, before it is pressed."""
 
+from dataclasses import replace
 from math import sqrt
+from typing import NamedTuple
 
 from ... import rates
 from ...core import say
+from ...elasticity.grid_fronts import predicted_bytes
+from ...mesh.nested import finer, plan_of
 from ...model.model import Model
 from ...model.patch import bars, block_shear
+from ...model.pieces import bodies_of
 from . import skin
-from .grids import Sizes, expected_grids
+from .grids import LEAST_LEVELS, OTHER, SPENT, base_grids, is_mirrored, node_counts, seconds_of
+from .ladder import meshes_beside
 
 # bytes of packages; per predicted byte of condensing; per node: of pieces beyond the interface, of frames
 PACKAGES, CONDENSED, OUTLINED_NODE, FRAMES_NODE = 2e7, 0.8, 4.6e3, 3.5e3
+TIGHT_TOL = 2e-3  # tolerance below which a contact that ends inside, or over a jump, is expected to take a level more
 FULL = 0.7  # of the tilt at which bars open: elastic pieces, seen at height/length 0.08 to 4, open from 0.77 on
+
+
+class Sizes(NamedTuple):
+    """Grids of a patch as a plan counts them.
+
+    points: nodes of the interface; finest: (columns, rows) of nodes of the finest grid of each piece, one where they
+    are alike; levels: nested grids that are solved; seconds, bytes: of condensing all of them, predicted; outlined:
+    they reach beyond the interface.
+    """
+
+    points: int
+    finest: tuple
+    levels: int
+    seconds: float
+    bytes: float
+    outlined: bool
+
+    @property
+    def nodes(self) -> float:
+        """Nodes of the finest grids."""
+        return float(sum(columns * rows for columns, rows in self.finest))
+
+
+def expected_grids(asked, tolerance: float) -> Sizes:
+    """Return the grids that a `PatchModel` is expected to be solved on at a tolerance.
+
+    The coarsest grid is that of the run. A mesh file counts as one as fine as the automatic grid: it is not read.
+    """
+    levels = _expected_levels(asked, tolerance)
+    bodies = [body for body in levels[0] if body is not None]
+    finest = tuple(map(node_counts, bodies))
+    return Sizes((plan_of(bodies[0]) or bodies[0]).x.size, finest, len(levels),
+                 sum(map(seconds_of, levels)) * (OTHER if asked.mesh is not None else 1.0),
+                 sum(predicted_bytes(*nodes, is_mirrored(body)) for nodes, body in zip(finest, bodies)),
+                 asked.outlined or asked.mesh is not None)
+
+
+def _expected_levels(asked, tolerance: float) -> list:
+    """Return the bodies of each level that a run is expected to take, fine to coarse."""
+    if asked.meshes is not None:
+        return list(asked.meshes.levels)
+    if not asked.chosen:
+        low, high = bodies_of(replace(asked, mesh=None))
+        return [(low, high), *meshes_beside(low, high)]
+    bodies, contact = base_grids(asked)
+    has_edges = bool(asked.gap.jumps or (contact is not None and contact.places))
+    levels = [bodies]
+    while len(levels) < LEAST_LEVELS + (has_edges and tolerance < TIGHT_TOL):
+        bodies = [finer(body) for body in bodies]
+        if len(levels) >= LEAST_LEVELS and seconds_of(bodies) > SPENT[asked.still]:
+            break
+        levels.insert(0, bodies)
+    return levels
 
 
 def sizes(found: Sizes) -> dict:
