@@ -11,8 +11,9 @@ from ...runs.many.answers import FAILED
 from ...scales import plain
 from .. import missed
 from ..written import NUMBER, brief, label
-from . import allowed, peaks, ranked
+from . import limits, peaks, ranked
 from .key_lines import varies
+from .limits import Limits
 from .words import both, joined, zero_below
 
 EXACT = 1e-6  # of a value, up to which no error is told: the values are shown to four digits
@@ -30,7 +31,7 @@ class Lead(NamedTuple):
     ----------
     missed : dict
         Cases over the tolerance, from `missed.counted`; `misses` is the sentence.
-    limits : allowed.Limits
+    limits : limits.Limits
         How far a key may go; `limit` is the sentence.
     span : str
         Range of the main measure.
@@ -50,7 +51,7 @@ class Lead(NamedTuple):
 
     missed: dict
     misses: str
-    limits: allowed.Limits
+    limits: Limits
     limit: str
     span: str
     ranks: dict = MappingProxyType({})
@@ -102,9 +103,11 @@ def lead_of(table: dict) -> Lead:
     trusted = {name: ~missed.over(one, tolerance) & (settled | name.endswith("_steady")
                                                      | ~np.isfinite(one["values"])[settled].any())
                for name, one in measures.items()}
-    limits = allowed.Limits() if table.get("drawn") else \
-        allowed.allowed(keys, columns(table), trusted, table["grid"], table.get("patch"))
-    keys = allowed.in_one_unit(keys, limits)
+    found = Limits()
+    if not table.get("drawn"):
+        found = limits.limits_of_sweep(keys, columns(table), trusted, table["grid"], table.get("patch"))
+    if found.key is not None:
+        keys = [found.key if key["name"] == found.key["name"] else key for key in keys]
 
     def where(case: int) -> str:
         return ", ".join(f"{one['name']} {brief(str(one['texts'][case]))}"
@@ -119,7 +122,7 @@ def lead_of(table: dict) -> Lead:
     return Lead(
         missed=missed.counted(measures, tolerance),
         misses=missed.sentence(measures, tolerance, where, table.get("first", "")),
-        limits=limits, limit=allowed.sentence(limits),
+        limits=found, limit=limits.sentence(found),
         span=joined([one for one in (far if table.get("drawn") else "", ran) if one]),
         ranks=ranks[0], rank=ranks[1], spread=ranks[2], scatter=ranks[3],
         peaks=tops, peak=peaks.sentence(tops),

@@ -11,7 +11,7 @@ from ...runs.results.patch_rows import minimum_of
 from ...scales import LADDERS, axis_unit, rounded
 from ..missed import over
 from ..written import NUMBER, brief, label
-from . import allowed, document, peaks, ranked
+from . import document, limits, peaks, ranked
 from .document import Section, breakable, prose
 from .drawn import BAR, SHORT, digits, drawn
 from .lead import FIRST, SETTLED, Lead, columns, lead_of
@@ -120,9 +120,9 @@ def _explorer(said: str, folders: list | None) -> str:
             "sweep.csv.</p></noscript>")
 
 
-def _change(table: dict, limits: allowed.Limits) -> list:
+def _change(table: dict, found: limits.Limits) -> list:
     """The section on what each main measure has changed by since the first case; none where no key grows alone."""
-    text = allowed.table(limits, columns(table))
+    text = limits.table(found, columns(table))
     return [Section("change", "Change relative to the first case", text)] if text else []
 
 

@@ -10,8 +10,8 @@ from types import MappingProxyType
 
 from ...disk.whole import write_text
 from ...runs.many.answers import FAILED
-from ..pages.allowed import as_json
 from ..pages.lead import Lead
+from ..pages.limits import as_json
 
 NONE = MappingProxyType({})
 

@@ -8,7 +8,7 @@ from command_line import cli
 from scene_texts import COULOMB, POINT, SHORT
 
 from patchfem.campaigns.sweeps.ranking import Share
-from patchfem.export.pages import allowed, peaks, ranked
+from patchfem.export.pages import limits, peaks, ranked
 from patchfem.export.pages.lead import lead_of
 from patchfem.export.pages.sweep import page
 from patchfem.export.sweeps.page import read_table
@@ -166,7 +166,7 @@ def test_exact_of_drawn_cases_the_answer_is_the_measure_that_is_asked_for_and_wh
                         first="equivalent_damping")
     lead = lead_of(table)
     low, high = np.quantile(damping, [0.05, 0.95])
-    assert lead.limits == allowed.Limits() and not any("may reach" in said for said in lead.sentences())
+    assert lead.limits == limits.Limits() and not any("may reach" in said for said in lead.sentences())
     assert lead.answer().startswith(
         f"Equivalent damping ratio is largest, 30, at friction.static 0.475; 90 % of the 61 random cases have an "
         f"equivalent damping ratio from {low:.3g} to {high:.3g}, ")

@@ -109,7 +109,7 @@ def test_exact_the_removed_option_measured_says_what_to_use(tmp_path):
     for words in (("--measured", "table.csv"), ("--measured=table.csv",)):
         answer = cli("report", folder, *words, "-o", tmp_path / "p.html")
         assert answer.code == 2 and not (tmp_path / "p.html").exists()
-        assert "report --measured was removed in version 1.0" in answer.err
+        assert "report --measured was removed in patchfem 1.0" in answer.err
         assert "patchfem import" in answer.err
 
 

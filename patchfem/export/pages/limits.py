@@ -1,0 +1,496 @@
+"""How far a swept key may go before the measures of the motion and of the patch change.
+
+The first case is the reference. A measure reaches its limit where it differs from this case by 5 %; the peak pressure,
+where it has doubled. The limit lies between the last case that is surely within it and the first case that is surely
+beyond it, with the numerical errors of the measure added to its change. Between these two cases the limit is
+interpolated linearly; where the values of the key grow by factors, over the logarithm of the key. A case that did not
+settle, or whose measure misses its tolerance, counts neither as within nor as beyond.
+"""
+
+from collections.abc import Sequence
+from html import escape
+from math import ceil, exp, floor, log, log10
+from typing import NamedTuple
+
+import numpy as np
+
+from ...scales import LADDERS, plain, step_of
+from ..written import NUMBER, bare, label
+from . import document
+from .key_lines import lines_of, shown_of
+from .words import linked, short, zero_below
+
+LARGEST_CHANGE = (
+    0.05  # relative change at which a measure reaches its limit; engineers call 5 % unchanged
+)
+DOUBLING = 1.0  # relative change of the peak pressure at its limit
+MOTION_MEASURES = (
+    "relative_displacement_amplitude",
+    "absolute_acceleration_peak",
+    "slip_amplitude",
+    "loop_area",
+    "friction_force_peak",
+    "friction_ratio_peak",
+    "onset_level",
+)
+STIFFNESS_MEASURES = ("normal_stiffness", "tangential_stiffness")
+CHANGE_AT_LIMIT = {
+    **dict.fromkeys((*MOTION_MEASURES, *STIFFNESS_MEASURES, "contact_fraction"), LARGEST_CHANGE),
+    "pressure_peak": DOUBLING,
+}
+KEYS_WITHOUT_LIMIT = (
+    "drive.",
+    "slide.",
+    "accuracy.",
+    "wear.cycles",
+)  # they drive the motion, or change no answer
+GAP_OF_ANGLE = {"contact.tilt.angle": ("Tilt", "length"), "contact.strips.roll": ("Roll", "width")}
+ANGLE_UNITS = [name for name, _ in LADDERS["rad"]]
+MIN_NUMBER = 0.0101  # a smaller number of a key takes a smaller unit: 0.011 mrad, but 10 urad
+MAX_NUMBER = 1e4  # a larger number of a key takes a larger unit
+ROUND_OFF_CHANGE = (
+    1e-8  # relative change of a measure below which it shows the last digits of both values
+)
+
+
+class KeyLimit(NamedTuple):
+    """How far the key may go for one measure, along the line of cases that allows least.
+
+    Attributes
+    ----------
+    name : str
+        The measure.
+    change : float
+        Relative change at the limit, negative where the measure falls.
+    reference : float
+        Value of the measure in the first case [SI].
+    last_change : float
+        Relative change up to the last case that counts.
+    inside : int
+        The last case that is surely within the limit.
+    beyond : int or None
+        The first case that is surely beyond the limit; None if there is none.
+    covers_line : bool
+        Whether the last case of the line is surely within the limit.
+    value : float
+        Value of the key at the limit, or in the case `inside` if no case is beyond [SI].
+    """
+
+    name: str
+    change: float
+    reference: float
+    last_change: float
+    inside: int
+    beyond: int | None
+    covers_line: bool
+    value: float
+
+
+class Limits(NamedTuple):
+    """Limits of the key of a sweep.
+
+    Attributes
+    ----------
+    key : dict or None
+        The key, with the texts of its values in `unit`; None where no key of numbers grows alone.
+    found : sequence of KeyLimit
+        One for each measure of CHANGE_AT_LIMIT that the cases have.
+    lost : sequence of str
+        Measures of the motion without a limit, because their first case did not settle or misses its tolerance.
+    unit : str
+        Unit in which values of the key are shown.
+    scale : float
+        Value in `unit` per value in SI.
+    patch : dict
+        `length` and `width` of the patch [m], where known.
+    """
+
+    key: dict | None = None
+    found: Sequence = ()
+    lost: Sequence = ()
+    unit: str = ""
+    scale: float = 1.0
+    patch: dict | None = None
+
+    def sizes(self) -> np.ndarray:
+        """Values of the key in all cases [SI]."""
+        return np.asarray(self.key["values"], float)
+
+    def is_resolved(self, limit: KeyLimit) -> bool:
+        """Check whether a case other than the first is within a limit."""
+        sizes = self.sizes()
+        return sizes[limit.inside] > sizes.min()
+
+
+def limits_of_sweep(
+    keys: list, measures: dict, trusted: dict, grid: bool = True, patch: dict | None = None
+) -> Limits:
+    """Find how far the key with most values may go.
+
+    Parameters
+    ----------
+    keys : list of dict
+        `name`, `unit`, `values` (n,) [SI], `texts` (n,), `log` and `words` (whether its values are words) of each.
+    measures : dict
+        {name: (values (n,), errors (n,), ...)}, NaN where a case has no value.
+    trusted : dict
+        {name: (n,) whether a case settled and meets its tolerance}.
+    grid : bool
+        Whether the cases are all combinations of the values of the keys.
+    patch : dict
+        `length` and `width` of the patch [m], where known.
+
+    Returns
+    -------
+    Limits
+        Without a key where no key of numbers grows alone.
+    """
+    numbers = [key for key in keys if not key["words"]]
+    if not numbers or (len(keys) > 1 and not grid):
+        return Limits()
+    key = max(numbers, key=lambda key: np.unique(key["values"]).size)
+    if key["name"].startswith(KEYS_WITHOUT_LIMIT):
+        return Limits()
+    lines = lines_of(key, [other for other in keys if other is not key])
+    found, lost = [], []
+    for name in CHANGE_AT_LIMIT:
+        values, errors = (
+            np.asarray(part, float) for part in measures.get(name, ([np.nan], [np.nan]))[:2]
+        )
+        if not np.any(np.abs(values) > zero_below(name)):  # no case has a value above round-off
+            continue
+        values = np.where(trusted[name], values, np.nan)
+        along = [
+            _limit_along_line(name, key, line, values[line], np.nan_to_num(errors[line]))
+            for line in lines
+        ]
+        if None not in along:
+            found.append(min(along, key=_reach))
+        elif name in MOTION_MEASURES:
+            lost.append(name)
+    limits = Limits(key, found, lost, patch=patch)
+    if not any(limits.is_resolved(limit) for limit in found):
+        return limits
+    unit, scale = _unit(limits)
+    return limits._replace(key=_in_unit(key, unit, scale), unit=unit, scale=scale)
+
+
+def _limit_along_line(
+    name: str, key: dict, line: np.ndarray, values: np.ndarray, errors: np.ndarray
+) -> KeyLimit | None:
+    """Find the limit of a measure along one line of cases; None if its first case or all others have no value."""
+    known = np.flatnonzero(np.isfinite(values))
+    if known.size < 2 or known[0] != 0 or values[0] == 0:
+        return None
+    largest = CHANGE_AT_LIMIT[name]
+    change = (values[known] - values[0]) / abs(values[0])
+    error = (errors[known] + errors[0]) / abs(values[0])
+    size = (
+        np.abs(change) if largest < DOUBLING else change
+    )  # a pressure doubles only where it rises
+    open_or_beyond = np.flatnonzero(size[1:] + error[1:] > largest)
+    inside = int(open_or_beyond[0]) if open_or_beyond.size else known.size - 1
+    case = int(line[known[inside]])
+    sizes = np.asarray(key["values"], float)
+    limit = KeyLimit(
+        name=name,
+        change=largest,
+        reference=float(values[0]),
+        last_change=float(change[-1]),
+        inside=case,
+        beyond=None,
+        covers_line=bool(known[inside] == line.size - 1),
+        value=float(sizes[case]),
+    )
+    surely_beyond = np.flatnonzero(size - error > largest)
+    if not surely_beyond.size:
+        return limit
+    beyond = int(surely_beyond[0])
+    wanted = float(np.copysign(largest, change[beyond]))
+    case_beyond = int(line[known[beyond]])
+    grown_by_factors = bool(key["log"] and sizes[case] > 0)
+    values_along = np.array([change[inside], wanted, change[beyond]])
+    if grown_by_factors and largest >= DOUBLING:
+        values_along = np.log1p(values_along)  # a power of the key is straight in both logarithms
+    part = (values_along[1] - values_along[0]) / (values_along[2] - values_along[0])
+    value = _interpolate(
+        float(sizes[case]), float(sizes[case_beyond]), float(part), grown_by_factors
+    )
+    return limit._replace(change=wanted, beyond=case_beyond, value=value)
+
+
+def _interpolate(low: float, high: float, part: float, by_factors: bool) -> float:
+    """Return the value of a key at a fraction of the way between two cases."""
+    if by_factors:
+        return exp(log(low) + part * log(high / low))
+    return low + part * (high - low)
+
+
+def _reach(limit: KeyLimit) -> tuple:
+    """Return the sort key of a limit: the smallest value first, a limit among the cases before an open one."""
+    return limit.beyond is None and limit.covers_line, limit.value, limit.beyond is None
+
+
+def as_json(limits: Limits) -> list:
+    """Return the limits as sweep.json has them, in SI.
+
+    `value` of the key, interpolated between the cases `low` and `high`, at which a measure differs by `change` from
+    its value in the first case.
+    """
+    return [
+        {
+            "measure": limit.name,
+            "key": limits.key["name"],
+            "value": limit.value,
+            "unit": limits.key["unit"],
+            "change": limit.change,
+            "low": float(limits.sizes()[limit.inside]),
+            "high": float(limits.sizes()[limit.beyond]),
+        }
+        for limit in limits.found
+        if limit.beyond is not None
+    ]
+
+
+def sentence(limits: Limits) -> str:
+    """State in one sentence how far the key may go; "" where the cases do not show it."""
+    if limits.key is None:
+        return ""
+    motion = _motion_sentence(limits)
+    reached = [
+        limit for limit in limits.found if limit.beyond is not None and limits.is_resolved(limit)
+    ]
+    parts = [motion] if motion else []
+    parts += [
+        f"the {label(limit.name)} doubles {_place(limits, limit)}"
+        for limit in reached
+        if limit.change >= DOUBLING
+    ]
+    stiffness = [
+        _place(limits, limit, limit.name.partition("_")[0])
+        for limit in reached
+        if limit.name in STIFFNESS_MEASURES
+    ]
+    if stiffness:
+        percent = f"{100 * LARGEST_CHANGE:g} %"
+        parts.append(f"the stiffness of the patch changes by {percent} {' and '.join(stiffness)}")
+    if not parts:
+        return ""
+    start = "" if motion else f"As {limits.key['name']} grows, "
+    return f"{start}{'; '.join(parts)}."
+
+
+def _motion_sentence(limits: Limits) -> str:
+    """State how far the key may go before a measure of the motion changes; "" where the cases do not show it."""
+    moving = [limit for limit in limits.found if limit.name in MOTION_MEASURES]
+    if not moving or not all(limits.is_resolved(limit) for limit in moving):
+        return ""
+    key_name = GAP_OF_ANGLE.get(limits.key["name"], (limits.key["name"],))[0]
+    percent = f"{100 * LARGEST_CHANGE:g} %"
+    *first_names, last_name = (label(limit.name) for limit in moving)
+    ends = sorted(
+        (limit for limit in moving if limit.beyond is not None or not limit.covers_line), key=_reach
+    )
+    if not ends:
+        if limits.lost:
+            return ""
+        far = moving[0]._replace(value=float(limits.sizes().max()))
+        names = (
+            f"{', '.join(first_names)} and {last_name} change"
+            if first_names
+            else f"{last_name} changes"
+        )
+        return f"{key_name} may reach {_value_and_gap(limits, far)}: {names} by less than {percent}"
+    names = f"{', '.join(first_names)} or {last_name}" if first_names else last_name
+    before = f"before {names} changes by {percent}"
+    smallest = ends[0]
+    if smallest.beyond is None:
+        return f"{key_name} may reach at least {_value_and_gap(limits, smallest)} {before}; {_reached(limits, ends)}"
+    between = f"interpolated between the cases at {_cases(limits, smallest)}"
+    return (
+        f"{key_name} may reach {_value_and_gap(limits, smallest, between)} {before} "
+        f"({_first_to_change(limits, ends)})"
+    )
+
+
+def _reached(limits: Limits, ends: list) -> str:
+    """State which measure surely leaves its limit, and in which case."""
+    beyond = [limit for limit in ends if limit.beyond is not None]
+    if not beyond:
+        return "the cases with larger values do not show where this limit lies"
+    soonest = min(beyond, key=lambda limit: limits.sizes()[limit.beyond])
+    return (
+        f"{label(soonest.name)} has changed by more than {100 * LARGEST_CHANGE:g} % at "
+        f"{shown_of(limits.key)(soonest.beyond)}"
+    )
+
+
+def _first_to_change(limits: Limits, ends: list) -> str:
+    """Name the measures that may be the first to change, and the one that changes last if it is none of them."""
+    sizes = limits.sizes()
+    reached = [limit for limit in ends if limit.beyond is not None]
+    soonest = min(sizes[limit.beyond] for limit in reached)
+    early = [label(limit.name) for limit in reached if sizes[limit.inside] < soonest]
+    last = ends[-1]
+    later = ""
+    if last.beyond is not None and label(last.name) not in early:
+        later = f"; {label(last.name)} {_place(limits, last)}"
+    return f"first to change: {' or '.join(early)}{later}"
+
+
+def _value_and_gap(limits: Limits, limit: KeyLimit, *notes: str) -> str:
+    """Write a limit, and in brackets the gap that an angle opens over the patch and what else qualifies it."""
+    notes = [note for note in (_gap(limits, limit), *notes) if note]
+    return f"{_value(limits, limit)} ({'; '.join(notes)})" if notes else _value(limits, limit)
+
+
+def _value(limits: Limits, limit: KeyLimit) -> str:
+    """Write a limit in the unit of the limits, rounded down."""
+    return f"{plain(_rounded_down(limits, limit), _digits(limits, limit))} {limits.unit}".strip()
+
+
+def _rounded_down(limits: Limits, limit: KeyLimit) -> float:
+    """Round a limit down to the digits that are shown, but for round-off."""
+    value = limit.value * limits.scale
+    if not value:
+        return value
+    step = 10.0 ** (floor(log10(abs(value)) + 1e-9) - _digits(limits, limit) + 1)
+    return floor(value / step + 1e-6) * step
+
+
+def _digits(limits: Limits, limit: KeyLimit) -> int:
+    """Count the digits of a limit: two, or as many as distinguish the cases around it."""
+    if limit.beyond is None or not limit.value:
+        return 2
+    apart = limits.sizes()[limit.beyond] - limits.sizes()[limit.inside]
+    if not apart:  # the same value of the key, with another value of a second key
+        return 2
+    return max(2, 1 + ceil(log10(abs(limit.value) / apart)))
+
+
+def _gap(limits: Limits, limit: KeyLimit) -> str:
+    """Write the gap that an angle opens over the patch; "" for another key or a patch of unknown size."""
+    side = (limits.patch or {}).get(GAP_OF_ANGLE.get(limits.key["name"], ("", ""))[1])
+    if not side or not limit.value:
+        return ""
+    gap = _rounded_down(limits, limit) / limits.scale * side
+    unit, scale = step_of(LADDERS["m"], gap)
+    return f"{plain(gap * scale, 2)} {unit} over the patch"
+
+
+def _place(limits: Limits, limit: KeyLimit, *notes: str) -> str:
+    """Write where a limit lies, and between which cases."""
+    return f"at about {_value(limits, limit)} ({'; '.join([*notes, f'between {_cases(limits, limit)}'])})"
+
+
+def _cases(limits: Limits, limit: KeyLimit) -> str:
+    """Write the values of the key in the two cases around a limit: `0.1 and 0.32 mrad`."""
+    shown = shown_of(limits.key)
+    inside, beyond = shown(limit.inside), shown(limit.beyond)
+    return f"{bare(inside, beyond)} and {beyond}"
+
+
+def _unit(limits: Limits) -> tuple:
+    """Choose the (unit, scale from SI) in which all values of the key are shown.
+
+    The unit in which the cases are written, unless the smallest limit would be a number below MIN_NUMBER or above
+    MAX_NUMBER; for an angle, the largest unit in which the smallest limit is above MIN_NUMBER.
+    """
+    key = limits.key
+    resolved = [limit for limit in limits.found if limits.is_resolved(limit)]
+    first = min(
+        [limit for limit in resolved if limit.name in MOTION_MEASURES] or resolved,
+        key=_reach,
+        default=None,
+    )
+    value, case = (float(limits.sizes().max()), 0) if first is None else (first.value, first.inside)
+    written, size = NUMBER.match(str(key["texts"][case])), float(limits.sizes()[case])
+    unit, scale = (
+        (written[2] or "", float(written[1]) / size) if written and size else (key["unit"], 1.0)
+    )
+    as_written = unit.removesuffix("1"), scale
+    fits = MIN_NUMBER < abs(value * scale) < MAX_NUMBER
+    if key["unit"] == "rad" and (unit in ANGLE_UNITS or not fits):
+        larger_units = reversed(LADDERS["rad"])
+        return next(
+            (step for step in larger_units if MIN_NUMBER < abs(value * step[1])), as_written
+        )
+    if fits or key["unit"] not in LADDERS:
+        return as_written
+    return step_of(LADDERS[key["unit"]], abs(value))
+
+
+def _in_unit(key: dict, unit: str, scale: float) -> dict:
+    """Return a key with the texts of its values in a unit."""
+    if all(str(text).partition(" ")[2] in ("", unit) for text in key["texts"]):
+        return key
+    return key | {
+        "texts": [
+            f"{value * scale:.12g} {unit}" for value in np.asarray(key["values"], float).tolist()
+        ]
+    }
+
+
+def table(limits: Limits, measures: dict) -> str:
+    """Return the limits of all measures as an HTML table; "" where there is none.
+
+    Parameters
+    ----------
+    limits : Limits
+    measures : dict
+        {name: (values, errors, SI unit)}.
+    """
+    if not limits.found:
+        return ""
+    shown, sizes = shown_of(limits.key), limits.sizes()
+    rows = []
+    for limit in limits.found:
+        if limit.beyond is not None:
+            where = f"about {_value(limits, limit)} (between the cases at {_cases(limits, limit)})"
+        elif limit.covers_line:
+            where = "in no case"
+        else:
+            where = (
+                f"not up to {shown(limit.inside)}; the cases with larger values do not show where this change is "
+                "reached"
+            )
+        reference = short(limit.name, limit.reference, measures[limit.name][2], 4)
+        rows.append(
+            [
+                linked(label(limit.name), limit.name),
+                escape(reference),
+                _percent(limit.last_change),
+                "double" if abs(limit.change) >= DOUBLING else f"{100 * LARGEST_CHANGE:g} %",
+                f"<td class=soft>{escape(where)}</td>",
+            ]
+        )
+    several_lines = np.sum(sizes == sizes.min()) > 1
+    smallest = (
+        " Other keys are swept, too; each limit is the smallest limit that is found for any values of these "
+        "other keys."
+        if several_lines
+        else ""
+    )
+    heads = (
+        "measure",
+        ">first case",
+        ">change between the first and the last case",
+        "changed by",
+        "where",
+    )
+    start = shown(int(np.argmin(sizes)))
+    return (
+        f"<p class=soft>{escape(limits.key['name'])} grows from {escape(start)}. A measure counts as "
+        "changed if the difference from its value in the first case exceeds the amount under &ldquo;changed "
+        "by&rdquo; by more than the sum of both numerical errors. Limits are interpolated between two cases; for "
+        "more accurate limits, add cases between them. Cases that miss their tolerance do not count, "
+        f"nor do unsettled cases if settled cases have the measure.{smallest}</p>"
+        + document.table(heads, rows, "wide")
+    )
+
+
+def _percent(change: float) -> str:
+    """Write a relative change in percent, from ten times on as a factor; 0 for round-off."""
+    if abs(change) < ROUND_OFF_CHANGE:
+        return "0 %"
+    return f"{100 * change:+.3g} %" if change < 9 else f"&times; {plain(1 + change, 3)}"
