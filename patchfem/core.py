@@ -16,8 +16,9 @@ import numpy as np
 from .faults import Missing, NotConverged, PatchfemError
 from .scales import told
 
-__all__ = ["G_N", "STICK", "BaseSine", "Compliance", "Interface", "Measure", "Missing", "ModalBasis", "NotConverged",
-           "Outcome", "PatchfemError", "Pressure", "Response", "Row", "Segment", "Start", "frozen_array", "say"]
+__all__ = ["G_N", "STICK", "BaseSine", "Compliance", "Integrated", "Interface", "InterfaceLoop", "Measure",
+           "Missing", "ModalBasis", "NotConverged", "Outcome", "PatchfemError", "Pressure", "Response", "Row",
+           "Segment", "Start", "frozen_array", "say"]
 
 STICK = 1e-2  # share of the cycle's peak slip speed below which a memory law counts as sticking
 G_N = 9.80665  # standard gravity [m s-2]
@@ -328,6 +329,70 @@ class Response:
         extra = {name: part[:, pick] if name == "ledger" else part[pick] for name, part in self.extra.items()
                  if (part.shape[-1] if name == "ledger" else len(part)) == count}
         return Response(**columns, extra=extra)
+
+
+class InterfaceLoop(NamedTuple):
+    """Friction loop of one interface over the last cycles, as an engine integrated it.
+
+    Attributes
+    ----------
+    first, pull : complex
+        First harmonics of the relative displacement [m] and of the friction force [N].
+    work : float
+        Friction work [J].
+    slip : float
+        Range of the slip [m].
+    stuck : float or None
+        Time without slip [s]; None where it is read from samples.
+    force : float
+        Largest friction force [N].
+    """
+
+    first: complex
+    pull: complex
+    work: float
+    slip: float
+    stuck: float | None
+    force: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Integrated:
+    """Quantities that an engine integrated over the last cycles itself.
+
+    An engine that has its motion in closed form, or as polynomials, knows peaks, times without slip and work better
+    than samples of the motion show them. A quantity that is None, or an empty tuple, is read from samples instead
+    (`response.rows`).
+
+    Attributes
+    ----------
+    swing : float or None
+        Half the range of the output [m].
+    acceleration : float or None
+        Largest acceleration at the output [m s-2].
+    drift : float or None
+        Time mean of the relative displacement in the last cycle less that in the first, per cycle between them [m].
+    waves : tuple or None
+        Sizes of the first and third harmonic of the absolute acceleration [m s-2].
+    loops : tuple of InterfaceLoop
+        One for each interface.
+    starts : (s,) array or None
+        Phases of the drive [rad], modulo pi, at which the first interface begins to slip.
+    books : tuple or None
+        Friction work [J] from samples, from the energy balance, and the sum of its absolute values.
+    turns : tuple
+        (relative displacement [m], friction force [N]) of the first interface at the smallest and at the largest
+        relative displacement, a pair for every cycle.
+    """
+
+    swing: float | None = None
+    acceleration: float | None = None
+    drift: float | None = None
+    waves: tuple | None = None
+    loops: tuple = ()
+    starts: np.ndarray | None = None
+    books: tuple | None = None
+    turns: tuple = ()
 
 
 def say(length: float, digits: int = 4) -> str:

@@ -9,8 +9,8 @@ from resource import RUSAGE_CHILDREN, getrusage
 from tempfile import TemporaryDirectory
 
 import pytest
-from command_line import FROM_PYTHON, FROM_SHELL, MODULES, absent, loaded, loaded_again
-from scene_texts import BENCH, COATED, COULOMB, PLASTIC, POINT, STRUCTURE
+from command_line import FROM_PYTHON, FROM_SHELL, MODULES, absent, has_code_of, loaded, loaded_again
+from scene_texts import BENCH, COATED, COULOMB, PLASTIC, POINT, SHEAR, STRUCTURE, TRIANGLE
 
 RIG = Path(__file__).parents[1] / "studies" / "rig" / "rig.toml"
 PATCH = COATED + '[contact.tilt]\nangle = "0.1 mrad"\n'
@@ -34,13 +34,38 @@ def run_of(text: str) -> set:
         return loaded(FROM_PYTHON, path)
 
 
-def test_exact_a_patch_needs_no_motion():
+PHYSICS = {"closed_forms", "contact", "dynamics", "elasticity", "friction", "identify", "inputs", "mesh", "response",
+           "slip", "structure", "surface", "wear", "runs.bench", "runs.many", "runs.patch", "runs.rig", "runs.wear"}
+PIECES = "closed_forms contact elasticity mesh runs.patch "  # folders that press a patch
+MOTION = "dynamics response runs.rig structure "  # folders that move a rig
+PAGE = "response structure "  # folders that a page takes words from
+WEAR = '[wear]\ncoefficient = "1e-15 1/Pa"\ncycles = 100\n'
+FOLDERS = {  # kind of scene -> its text, folders that `patchfem run` loads for it with its page
+    "static patch": (PATCH, PIECES + PAGE),
+    "bench of a point": (BENCH, "friction runs.bench " + PAGE),
+    "bench of a patch": (COATED + COULOMB + TRIANGLE, PIECES + "friction runs.bench " + PAGE),
+    "linear rig": (STRUCTURE, MOTION),
+    "rig of a point": (POINT + COULOMB + STRUCTURE, MOTION + "friction"),
+    "rig of elements": (POINT + PLASTIC + STRUCTURE, MOTION + "friction"),
+    "rig of a patch": (COATED + PLASTIC + STRUCTURE, PIECES + MOTION + "friction"),
+    "rig of a patch with slip": (COATED + SHEAR + PLASTIC + STRUCTURE, PIECES + MOTION + "friction slip"),
+    "wear": (COATED + COULOMB + TRIANGLE + WEAR, PIECES + "friction runs.bench runs.wear wear " + PAGE),
+}
+
+
+@pytest.mark.parametrize("kind", FOLDERS)
+def test_exact_a_run_loads_the_folders_of_its_scene(scene, tmp_path, kind):
+    """A run in a fresh process loads code of these folders of the physics and of no other."""
+    text, folders = FOLDERS[kind]
+    modules = loaded(FROM_SHELL, "run", scene(text), "-o", tmp_path / "out", "-q")
+    assert {name for name in PHYSICS if has_code_of(modules, name)} == set(folders.split())
+
+
+def test_exact_a_patch_loads_the_modules_of_its_keys():
     modules = run_of(PATCH)
-    absent(modules, "friction", "structure", "dynamics", "response", "inputs", "wear", "identify", "runs.bench",
-           "runs.rig", "runs.wear", "model.slide", "model.structure", "closed_forms.contact", "compiled", "surface",
-           "contact.skin_laws", "contact.strips", "contact.gradients", "elasticity.mortar",
-           "elasticity.substructure", "elasticity.fronts", "elasticity.recovery", "mesh.anymesh",
-           "export", "skfem", "scipy")
+    absent(modules, "compiled", "contact.skin_laws", "contact.strips", "contact.gradients", "elasticity.mortar",
+           "elasticity.substructure", "elasticity.fronts", "elasticity.recovery", "export", "mesh.anymesh", "response",
+           "scipy", "skfem")
     assert {"patchfem.contact.unilateral", "patchfem.mesh.tensor"} <= modules
 
 
@@ -63,21 +88,16 @@ def test_exact_an_effect_brings_its_own_module(table, module):
     absent(modules, *{"elasticity.mortar", "surface"})
 
 
-def test_exact_a_rubbing_point_needs_no_patch():
-    modules = run_of(POINT + COULOMB + STRUCTURE)
-    absent(modules, "contact", "mesh", "elasticity", "slip", "skfem", "runs.patch", "runs.bench", "dynamics.march")
-    assert {"patchfem.dynamics.events.histories", "patchfem.structure.modes"} <= modules
-
-
 def test_exact_a_rubbing_point_needs_no_other_rig():
     """One mode, one sine, one point: no masses, files, springs, heave, other drives, other engines."""
     modules = run_of(POINT + COULOMB + STRUCTURE)
+    assert {"patchfem.dynamics.events.histories", "patchfem.structure.modes"} <= modules
     absent(modules, "structure.matrices", "structure.masses", "structure.arrays", "structure.universal",
            "structure.bonded", "structure.identify", "structure.drives", "dynamics.harmonic.harmonic",
            "dynamics.events.stick_steady",
            "dynamics.harmonic.continuation", "dynamics.propagator", "dynamics.march.joints",
            "dynamics.march.varying_load",
-           "runs.rig.steady", "dynamics.harmonic.balance", "contact.contact_sets", "inputs.signals")
+           "runs.rig.steady", "dynamics.harmonic.balance", "dynamics.march")
     assert "pyuff" not in modules
 
 
@@ -95,13 +115,6 @@ def test_exact_a_rig_brings_what_it_names(lines, module):
     assert not {f"patchfem.{name}" for name in others} & modules
 
 
-def test_exact_a_linear_structure_needs_no_patch_no_friction_and_no_march():
-    modules = run_of(STRUCTURE)
-    absent(modules, "contact", "mesh", "elasticity", "slip", "skfem", "friction", "inputs", "runs.patch", "runs.bench",
-           "dynamics.march")
-    assert "patchfem.dynamics.events.histories" in modules
-
-
 @pytest.mark.parametrize("text", [STRUCTURE, POINT + COULOMB + STRUCTURE, POINT + PLASTIC + STRUCTURE],
                          ids=["linear", "coulomb", "plastic"])
 def test_exact_a_short_history_compiles_nothing(scene, tmp_path, monkeypatch, text):
@@ -111,14 +124,6 @@ def test_exact_a_short_history_compiles_nothing(scene, tmp_path, monkeypatch, te
     modules = loaded(FROM_PYTHON, scene(text))
     absent(modules, "compiled.inner", "compiled.kept", "dynamics.events.march_kernels")
     assert "llvmlite" not in modules and not [*tmp_path.rglob("*.code"), *tmp_path.rglob("*.nbi")]
-
-
-def test_exact_a_bench_needs_no_structure():
-    """Of the engines the noun for what one integrated and the check of its work alone."""
-    modules = run_of(BENCH)
-    absent(modules - {"patchfem.dynamics.integrated", "patchfem.dynamics.work_check"}, "contact", "mesh", "elasticity",
-           "slip", "skfem", "runs.patch", "runs.rig", "structure", "dynamics", "compiled")
-    assert "patchfem.friction.laws.coulomb" in modules
 
 
 @pytest.mark.share(1)

@@ -10,19 +10,18 @@ and the entries before it:
 5. `propagator`       exact modal steps under any drive
 6. `resume`           a long march goes on from its state on disk
 7. `repeats`          when a motion has become periodic and its rest is known
-8. `integrated`       what an engine integrated over the last cycles itself
-9. `work_check`       friction work off the samples alone, against the ledger
-10. `cycles`          extremes and phasors of a cycle of samples
-11. `curve_points`    places of a curve as close as its bends want
-12. `periodic`        Newton's method on the map of an engine over a period
-13. `contacts`        what one interface is to the loop of a march: solve, given, commit, state
-14. `events`          exact from event to event: rigid and elastic-plastic elements, or no friction
-15. `lanes`             many cases of one mode under a sine side by side; answers of `events` and `smooth` to its bars
-16. `march`           any law in time, under the path-mean forces of each step
-17. `smooth`          smooth laws by a method of high order from reversal to reversal
-18. `harmonic`        steady motions by harmonic balance, branches and stability
-19. `limit_cycles` motions that a negative damping keeps up beside friction
-20. `grooves`         a load that climbs the flanks of matched grooves
+8. `integrated`       histories of a run from its modal coordinates
+9. `cycles`          extremes and phasors of a cycle of samples
+10. `curve_points`    places of a curve as close as its bends want
+11. `periodic`        Newton's method on the map of an engine over a period
+12. `contacts`        what one interface is to the loop of a march: solve, given, commit, state
+13. `events`          exact from event to event: rigid and elastic-plastic elements, or no friction
+14. `lanes`             many cases of one mode under a sine side by side; answers of `events` and `smooth` to its bars
+15. `march`           any law in time, under the path-mean forces of each step
+16. `smooth`          smooth laws by a method of high order from reversal to reversal
+17. `harmonic`        steady motions by harmonic balance, branches and stability
+18. `limit_cycles` motions that a negative damping keeps up beside friction
+19. `grooves`         a load that climbs the flanks of matched grooves
 
 The friction force of a patch over a step comes from `contacts/`, called by the loop of `march/`: for rigid pieces
 `element_kernels.solve` (one point stands for all in the law, `friction.laws.stretch_kernels.mean`), for elastic ones

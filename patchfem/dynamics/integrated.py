@@ -1,11 +1,9 @@
-"""What an engine hands over of a run: its histories, and what it integrated over the last cycles itself.
+"""Run of an engine: its histories and those of its last cycles, made from modal coordinates.
 
-An engine that has its motion in closed form, or as polynomials, knows peaks, times of sticking and work better than
-samples of it show. What it does not know it leaves out, and samples have to tell (`response.rows`).
+What an engine integrated over the last cycles itself is a `core.Integrated`.
 """
 
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
 import numpy as np
 
@@ -20,39 +18,6 @@ def start_phase(count, cosine, sine):
     the mean of several slips in half a cycle is the phase of none of them."""
     told = (count > 0) & (np.hypot(cosine, sine) >= ALIKE * count)
     return np.where(told, np.arctan2(sine, cosine) / 2 % np.pi, np.nan)[()]
-
-
-class Loop(NamedTuple):
-    """An interface in the last cycles: first harmonics of slide [m] and force [N], friction work [J], range of the slip
-    [m], time stuck [s], None where samples have to tell, largest force [N]."""
-
-    first: complex
-    pull: complex
-    work: float
-    slip: float
-    stuck: float | None
-    force: float
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Integrated:
-    """What an engine integrated over the last cycles; None, or no loops, where samples have to tell.
-
-    swing: half the range [m] of the output; acceleration: largest at the output [m s-2]; drift: time mean of the slide
-    in the last cycle less that in the first, per cycle between them [m]; waves: sizes of the first and third harmonic
-    of the absolute acceleration [m s-2]; loops: a Loop of every interface; starts: phases of the drive modulo pi at
-    which slips of the first begin; books: friction work [J] by samples, by the ledger, and to and fro; turns: (slide
-    [m], force [N]) of the first where its slide is smallest and where it is largest, a pair for every cycle.
-    """
-
-    swing: float | None = None
-    acceleration: float | None = None
-    drift: float | None = None
-    waves: tuple | None = None
-    loops: tuple = ()
-    starts: np.ndarray | None = None
-    books: tuple | None = None
-    turns: tuple = ()
 
 
 @dataclass(frozen=True, eq=False, slots=True)

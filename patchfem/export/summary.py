@@ -14,7 +14,7 @@ from ..disk.whole import write_text
 from ..effects import EFFECTS
 from ..runs.patch import values
 from ..runs.results.result import Result, choices, measure_engines
-from ..runs.rig.plan import run_away
+from ..runs.rig import plan as rig_plan
 
 KNOWN = 10.0  # errors of a stiffness, up to which nothing is divided by it
 PACKAGES = ("numpy", "scipy", "scikit-fem", "numba", "xarray", "h5netcdf", "matplotlib")
@@ -111,7 +111,7 @@ def summary_of(result: Result) -> dict:
 def run_away_of(result: Result) -> dict:
     """{"run_away": {"drive": acceleration of the base, "knee": that above which friction alone does not limit the
     amplitude at resonance}} [m s-2] of a motion that did not settle above it; {} of any other."""
-    found = run_away(result.plan.model) if result.outcome in (Outcome.TRANSIENT, Outcome.GROWS) else {}
+    found = rig_plan.run_away(result.plan.model) if result.outcome in (Outcome.TRANSIENT, Outcome.GROWS) else {}
     return {"run_away": found} if found and found["drive"] > found["knee"] else {}
 
 

@@ -7,7 +7,7 @@ from math import ceil, sqrt
 import numpy as np
 
 from ..core import Missing, PatchfemError
-from ..inputs.paths import read_path
+from ..inputs import paths
 from ..scene.keys.quantities import KINDS
 from ..scene.rules.limits import sideways
 
@@ -154,7 +154,7 @@ def rows_of(path) -> tuple:
 
 @lru_cache(maxsize=4)
 def _read(path, stamp):
-    return read_path(path, {"time": KINDS["time"], "displacement": KINDS["length"], "lateral": KINDS["length"]})
+    return paths.read_path(path, {"time": KINDS["time"], "displacement": KINDS["length"], "lateral": KINDS["length"]})
 
 
 def _cut(time, slide, steps: int, across=None) -> tuple:

@@ -6,12 +6,13 @@ Everything works on samples: values of an exact run and of a march differ only i
 import numpy as np
 
 from ..core import Response
-from ..dynamics import work_check as work_checks
-from ..dynamics.integrated import start_phase
+from ..dynamics import integrated
+from ..friction import path_work
 
 SHARE = 0.5  # irreversible part of the slide from which an interface slips
 ROUND = 1e-13  # of the largest coordinate
 NOTHING = 1e-18  # J
+ROUND_OFF_WORK = 1e-10  # of the energy that passes through a run; less friction work than that is round-off
 REST = 1e-15  # m, range of a slide below which nothing moves
 SMOOTH = 4.0  # ratio of the bends at three samples, up to which they are those of one curve
 
@@ -23,7 +24,35 @@ def energy_balance(book: dict):
     holds still. book: energies [J] by name.
     """
     miss = np.abs(book["work_in"] - book["stored"] - book["friction"] - book["viscous"])
-    return work_checks.share(miss * (miss > NOTHING), book["power"] + book["peak_stored"])
+    return ratio_or_zero(miss * (miss > NOTHING), book["power"] + book["peak_stored"])
+
+
+def relative_gap(sampled, balanced, passed, energy=0.0):
+    """Compare the friction work from samples with that of the energy balance.
+
+    Parameters
+    ----------
+    sampled, balanced : float or (n,) array
+        Friction work [J] from samples and from the energy balance.
+    passed : float or (n,) array
+        Sum of the absolute values of the friction work of all steps [J].
+    energy : float or (n,) array, optional
+        Energy that passes through the whole run [J]; `ROUND_OFF_WORK` of it counts besides, so that a stuck interface
+        shows no round-off.
+
+    Returns
+    -------
+    float or (n,) array
+        Difference of the two over the work that passed [1]; 0 where none did.
+    """
+    difference = np.abs(sampled - balanced)
+    return ratio_or_zero(difference * (difference > NOTHING), passed + ROUND_OFF_WORK * energy)
+
+
+def ratio_or_zero(part, whole):
+    """Return part / whole, and 0 where the whole is not positive; numbers or (n,) arrays."""
+    is_positive = np.asarray(whole) > 0
+    return (part / np.where(is_positive, whole, 1.0) * is_positive)[()]
 
 
 def harmonic(time, weight, values, omega) -> complex:
@@ -115,7 +144,7 @@ def slip_noise(window: Response) -> float:
 
 def slip_start(phases) -> dict:
     """slip_start_phase [rad] by name of starts of slip at phases (k,) [rad]; {} where they have no phase in common."""
-    found = start_phase(len(phases), np.cos(2 * phases).sum(), np.sin(2 * phases).sum())
+    found = integrated.start_phase(len(phases), np.cos(2 * phases).sum(), np.sin(2 * phases).sum())
     return {} if np.isnan(found) else {"slip_start_phase": float(found)}
 
 
@@ -138,8 +167,8 @@ def work_check(work, pairs, jumps: bool = False) -> float:
     for slide, force in pairs:
         move = np.diff(slide)
         after = np.divide(parts, move, out=np.zeros_like(move), where=move != 0) if jumps else None
-        total += float(work_checks.sampled_work(slide, force, after).sum())
-    return work_checks.gap(total, float(work[-1]), float(np.abs(parts).sum()))
+        total += float(path_work.sampled_work(slide, force, after).sum())
+    return relative_gap(total, float(work[-1]), float(np.abs(parts).sum()))
 
 
 def acceleration_peak(window: Response) -> float:

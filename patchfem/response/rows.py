@@ -10,9 +10,7 @@ from functools import cached_property
 
 import numpy as np
 
-from ..core import Response, Row
-from ..dynamics import work_check as work_checks
-from ..dynamics.integrated import Integrated
+from ..core import Integrated, Response, Row
 from ..structure import drive_sizes
 from . import stationary
 from .loops import Turn, drift, half_range, interface_loop, secant_stiffness, turns_of
@@ -22,6 +20,7 @@ from .measures import (
     energy_balance,
     lateral,
     ledger_measures,
+    relative_gap,
     slip_measures,
     slip_start,
 )
@@ -155,7 +154,7 @@ class Seen:
         """Gap [1] of the two books of friction work; None where the engine has no second one."""
         if self.load is None or self.own.books is None:
             return None
-        return work_checks.gap(*self.own.books, self.book["power"] + self.book["peak_stored"])
+        return relative_gap(*self.own.books, self.book["power"] + self.book["peak_stored"])
 
     def others(self) -> list:
         """The interfaces after the first as last cycles of their own; of the work of each the samples tell."""

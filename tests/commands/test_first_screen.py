@@ -26,8 +26,8 @@ from patchfem.export.pages.words import (
     zero_below,
 )
 from patchfem.export.summary import loop_of
+from patchfem.response.outcome import OPEN_LOOP
 from patchfem.response.rows import ROWS as MOTION
-from patchfem.runs.bench.result import OPENED
 from patchfem.runs.results.patch_rows import ROWS as STATIC
 from patchfem.runs.rig.rig import Passes
 from patchfem.scene.keys.quantities import KINDS
@@ -319,7 +319,7 @@ def test_exact_a_second_interface_reads_in_the_units_of_the_first():
 @pytest.mark.parametrize("kind, outcome, warnings, text", [
     ("rig", "steady", [], "2.00 ± 0.10 mJ dissipated per cycle."),
     ("rig", "transient", [], "2.00 ± 0.10 mJ dissipated per cycle (mean of the last cycles)."),
-    ("bench", "done", [f"{OPENED}: it misses"], "Friction work of the last cycle 2.00 ± 0.10 mJ.")])
+    ("bench", "done", [f"{OPEN_LOOP}: it misses"], "Friction work of the last cycle 2.00 ± 0.10 mJ.")])
 def test_exact_the_work_of_a_loop_that_changes_is_told_with_its_cycles(kind, outcome, warnings, text):
     measures = {"loop_area": {"value": 2e-3, "unit": "J", "error": 1e-4}}
     summary = {"kind": kind, "outcome": outcome, "measures": measures, "warnings": warnings, "effects": []}

@@ -29,8 +29,8 @@ def nothing_kept():
 
 
 def test_exact_runs_of_one_patch_are_those_that_share_nothing(monkeypatch):
-    made, jenkins_set = [], derived.jenkins_set
-    monkeypatch.setattr(derived, "jenkins_set", lambda *given: made.append(given) or jenkins_set(*given))
+    made, jenkins_set = [], derived.shear_modes.jenkins_set
+    monkeypatch.setattr(derived.shear_modes, "jenkins_set", lambda *given: made.append(given) or jenkins_set(*given))
     cases = models()
     found = one_by_one.solve(cases)
     assert len(made) == 4  # of two patches, each with that of its error
@@ -89,7 +89,7 @@ def test_exact_marches_of_one_patch_share_its_shear_modes(monkeypatch):
         pass
 
     made = []
-    monkeypatch.setattr(interface, "shear_of", lambda *given: made.append(given[1:]) or object())
+    monkeypatch.setattr(interface.fields, "shear_of", lambda *given: made.append(given[1:]) or object())
     def asked(tolerance):
         return SimpleNamespace(accuracy=SimpleNamespace(tolerance=tolerance), patch=SimpleNamespace(gathers=False))
 

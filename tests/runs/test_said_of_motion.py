@@ -7,10 +7,10 @@ import pytest
 
 import patchfem as pf
 from patchfem.core import Measure, Outcome
-from patchfem.dynamics.work_check import gap
 from patchfem.export.pages.words import table_of
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.response.errors import coarser_errors
+from patchfem.response.measures import relative_gap
 from patchfem.response.rows import Seen
 from patchfem.runs.results.notes import creeping
 from patchfem.scene.scene import loads
@@ -104,7 +104,7 @@ def test_exact_an_output_that_stands_still_has_no_stiffness_nor_slip():
                              extra={})
     still = Seen(window, SimpleNamespace(period=72.0), None, {}, 12.9, 2e5, True, loop=(1e-22, 3.9, 0.0))
     assert still.slip == {"slip_amplitude": 0.0, "stick_fraction": 1.0} and still.cycle == {"loop_area": 0.0}
-    assert gap(1e-22, 2e-22, 2e-22) == 0 < gap(1e-12, 2e-12, 2e-12)
+    assert relative_gap(1e-22, 2e-22, 2e-22) == 0 < relative_gap(1e-12, 2e-12, 2e-12)
 
 
 @pytest.mark.parametrize("worn", [False, True])

@@ -70,13 +70,19 @@ def loaded_again(code: str, *words) -> set:
     return loaded(code, *words) if "numba" in modules else modules
 
 
-def absent(modules: set, *stages) -> None:
-    """None of the packages of ALWAYS and none of these stages (and packages) are among the modules; the `__init__` of a
-    folder that holds nothing but words does not count, for a module that is only named brings it."""
-    used = {name for name in modules if not _words(name)}
-    for name in {*ALWAYS, *stages}:
-        here = name if name in ("scipy", "skfem", *ALWAYS) else f"patchfem.{name}"
-        assert not {m for m in used if m == here or m.startswith(here + ".")}, name
+def has_code_of(modules: set, name: str) -> bool:
+    """Return whether modules of a package of others, or of a folder or module of ours, are among those loaded.
+
+    The `__init__` of a folder that holds a docstring alone does not count: Python loads it with any module of
+    the folder that is named and not yet used.
+    """
+    whole = name if name in ("scipy", "skfem", *ALWAYS) else f"patchfem.{name}"
+    return any((one == whole or one.startswith(f"{whole}.")) and not _words(one) for one in modules)
+
+
+def absent(modules: set, *names) -> None:
+    """Assert that none of these folders, modules and packages, and none of the packages in ALWAYS, is loaded."""
+    assert not [name for name in {*ALWAYS, *names} if has_code_of(modules, name)]
 
 
 @cache

@@ -5,7 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..integrated import Loop, start_phase
+from ...core import InterfaceLoop
+from ..integrated import start_phase
 from . import names_kernels as at
 
 # least angle [rad] that what rings turns in a stick: a ring is told of 1.5 periods, and a fit that leaves a tenth of it
@@ -62,16 +63,16 @@ class Reading:
         """Mean size of the first force in the last cycle less that in the first [N]."""
         return (np.abs(self.of(at.F_LAST)) - np.abs(self.of(at.F_FIRST))) / self.period
 
-    def loop(self, face: int = 0) -> Loop:
-        """The Loop of an interface, of numbers or (n,) of n runs."""
+    def loop(self, face: int = 0) -> InterfaceLoop:
+        """The InterfaceLoop of an interface, of numbers or (n,) of n runs."""
         q, f = (2 / self.span * (self.of(c, face) - 1j * self.of(s, face))
                 for c, s in ((at.Q_COS, at.Q_SIN), (at.F_COS, at.F_SIN)))
         slip = self.of(at.SLIP_HIGH, face) - self.of(at.SLIP_LOW, face)
-        return Loop(q, f, self.of(at.WORK, face), slip, self.of(at.STUCK, face), self.of(at.FORCE, face))
+        return InterfaceLoop(q, f, self.of(at.WORK, face), slip, self.of(at.STUCK, face), self.of(at.FORCE, face))
 
     @property
     def loops(self) -> tuple:
-        """A Loop per interface."""
+        """An InterfaceLoop per interface."""
         return tuple(map(self.loop, range(self.faces.shape[-2])))
 
 

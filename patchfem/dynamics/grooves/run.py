@@ -7,11 +7,11 @@ import numpy as np
 
 from ...core import Outcome, Start
 from ...friction.grooves import STEADY, Grooves, Swing
+from ...friction.path_work import sampled_work
 from ...friction.protocol import Element
 from ..march.models import coulomb_model
 from ..smooth import run as smooth
 from ..smooth.arrays import DONE, PACE, POWER, STORED
-from ..work_check import sampled_work
 from .climbing import FlankModel, GroovesRun, refuse_heavy
 
 TOLERANCE = 1e-11  # relative error of a step

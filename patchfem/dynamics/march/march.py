@@ -10,6 +10,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from ...compiled import load
 from ...core import BaseSine, ModalBasis, Outcome, Response, say
+from ...friction.path_work import sampled_work
 from ...structure.drive_sizes import even_samples
 from ..contacts import arrays
 from ..contacts.arrays import ModalArrays
@@ -18,7 +19,6 @@ from ..integrated import histories
 from ..propagator import propagator
 from ..repeats import APART, ahead, looked_at, until_look
 from ..resume import Samples, slot_of
-from ..work_check import sampled_work
 from .capacity import keep, lengthened
 from .faces import GOAL, faces_of
 from .models import ContactModel, free_model, load_kernels

@@ -10,8 +10,8 @@ from functools import cached_property
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from ...core import Integrated, InterfaceLoop
 from ...structure.drive_sizes import sinusoidal
-from ..integrated import Integrated, Loop
 from .arrays import ENDS, NODES
 
 # places of a step between which slip may begin or end once: close to its ends, as a stick may last no longer
@@ -159,7 +159,7 @@ def integrated(response, drive, ends) -> tuple:
     (gain, unsure), (pull, loose) = max(peaks["acceleration"]), max(peaks["force"])
     slip, swing = ((up + down) / 2 for (up, _), (down, _) in (peaks["slip"], peaks["output"]))
     held, starts = parts.holds()
-    loop = Loop(parts.harmonic("slide"), parts.harmonic("force"), after[3] - before[3], 2 * slip,
+    loop = InterfaceLoop(parts.harmonic("slide"), parts.harmonic("force"), after[3] - before[3], 2 * slip,
                 min(held, parts.time[-1, -1] - parts.time[0, 0]), pull)
     phases = 2 * np.pi * starts / period % np.pi
     return Integrated(swing, gain, parts.drift(), _waves(parts, drive, ends), (loop,), phases), \

@@ -8,14 +8,14 @@ from math import ceil
 import numpy as np
 
 from ... import compiled
-from ...core import ModalBasis, Outcome, Response
+from ...core import Integrated, ModalBasis, Outcome, Response
 from ...friction.laws.stretch import bonds_of
+from ...friction.path_work import sampled_work
 from ...structure.drive_sizes import even_samples
 from ..events.plant import segments_of
-from ..integrated import Integrated, histories
+from ..integrated import histories
 from ..march.march import MarchResult
 from ..repeats import APART, ahead
-from ..work_check import sampled_work
 from .arrays import (
     CREST,
     CREST_SPEED,

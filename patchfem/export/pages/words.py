@@ -8,10 +8,9 @@ from types import MappingProxyType
 
 from ... import scales
 from ...core import Measure, Outcome, allowed
-from ...response.outcome import UNSETTLED
+from ...response.outcome import OPEN_LOOP, UNSETTLED
 from ...response.rows import TABLE as MOTION
 from ...response.rows import of_first, of_number
-from ...runs.bench.result import OPENED
 from ...runs.results.patch_rows import TABLE as STATIC
 from ...runs.results.patch_rows import minimum_of, unknown_measures
 from ...runs.results.result import Result
@@ -258,7 +257,7 @@ def headline(summary: dict, cycles: float | None, number: Callable[[str, str], s
         if "relative_displacement_amplitude" not in measures:
             said("friction_ratio_peak", "friction ratio peaks at {}")
         if whole and not released:
-            opened = any(one.startswith(OPENED) for one in summary.get("warnings", ()))
+            opened = any(one.startswith(OPEN_LOOP) for one in summary.get("warnings", ()))
             changes = summary["outcome"] in CHANGES and summary["kind"] in ("rig", "linear")
             said(POWER, "friction dissipates {}")
             each = "friction work of the last cycle {}" if opened else "{} dissipated per cycle" + \

@@ -12,9 +12,8 @@ import numpy as np
 from ... import rates
 from ...core import Missing
 from ...effects import has, listed
-from ...friction.bonds.engines import Choice
-from ...friction.bonds.engines import choose as choose_sum
-from ...friction.bonds.parameters import LONGEST
+from ...friction.bonds import engines as bond_engines
+from ...friction.bonds import parameters
 from ...slip import shear_modes
 
 CLOSED, ELEMENTS, POINTS, RECURSION, LIST, STEPPED, PLANE, LISTS = range(8)
@@ -34,7 +33,7 @@ class BenchEngine:
 
     kind: int
     seconds: float
-    choice: Choice | None = None
+    choice: "bond_engines.Choice | None" = None
 
     @property
     def name(self) -> str:
@@ -43,7 +42,7 @@ class BenchEngine:
         return "bench, " + (f"{self.choice.engine} {several}" if several else NAMES[self.kind])
 
 
-def bench_engine(model, slide, points: int = 1, choice: Choice | None = None) -> BenchEngine:
+def bench_engine(model, slide, points: int = 1, choice: "bond_engines.Choice | None" = None) -> BenchEngine:
     """The engine of a bench along the samples slide (k,) [m]; points: nodes of the interface; choice: how bonds are
     summed where that is known already.
 
@@ -84,7 +83,7 @@ def pressure_changes(model) -> bool:
     return model.load_varies or model.side == "lower"
 
 
-def sum_of(model, slide) -> Choice:
+def sum_of(model, slide) -> "bond_engines.Choice":
     """How the bonds of a rigid slide along the samples slide (k,) [m] are summed: as in a rig, but the error is held
     against the force that is reached, which is small where the stroke is short against the bond length."""
     law, accuracy = model.bonds, model.accuracy
@@ -92,7 +91,7 @@ def sum_of(model, slide) -> Choice:
     stroke = max(stroke / law.length, 1e-9)
     goal = accuracy.tolerance * min(1.0, stroke)
     tail = None if accuracy.tail is None else max(accuracy.tail, 1e-15)
-    return choose_sum(law, goal, stroke, steps, engine_named(model), tail, accuracy.merge)
+    return bond_engines.choose(law, goal, stroke, steps, engine_named(model), tail, accuracy.merge)
 
 
 def engine_named(model) -> str:
@@ -104,7 +103,7 @@ def engine_named(model) -> str:
     return "merged" if apart and named in ("auto", "recursion") else named
 
 
-def smooth_sum_of(model, slide) -> Choice | None:
+def smooth_sum_of(model, slide) -> "bond_engines.Choice | None":
     """`sum_of` without merging, which makes a force jump by the error of the sum as a value of the scene changes: for a
     fit. None of a law that is no sum, or where the scene names the engine."""
     if not has(model.friction.law, "bonds") or model.accuracy.quadrature != "auto" or model.accuracy.merge is not None:
@@ -121,7 +120,7 @@ def strokes(slide) -> tuple:
     return float(np.abs(move).sum()) / count, max(way.size / count, 1.0)
 
 
-def _summed(model, slide, points: int, found: Choice, lists: int = 1) -> BenchEngine:
+def _summed(model, slide, points: int, found: "bond_engines.Choice", lists: int = 1) -> BenchEngine:
     """The engine of a sum over bonds; lists: of them, one a point behind shear modes."""
     law = model.bonds
     if found.engine == "recursion":
@@ -131,9 +130,9 @@ def _summed(model, slide, points: int, found: Choice, lists: int = 1) -> BenchEn
     size = slide.size
     strips = min(found.strips, size * max(1.0, 4 * float(np.abs(np.diff(slide)).max()) / law.length))
     seconds = (PASSES if lists == 1 else lists) * found.seconds * (strips / found.strips if found.strips else 1.0)
-    if size * seconds > LONGEST:
+    if size * seconds > parameters.LONGEST:
         raise Missing(f"the sum over the list of bonds (about {strips:.0f} entries) would need a computing time of "
-                      f"about {size * seconds:.0f} s, more than the limit of {LONGEST:.0f} s; lower "
+                      f"about {size * seconds:.0f} s, more than the limit of {parameters.LONGEST:.0f} s; lower "
                       "accuracy.steps_per_cycle or slide.cycles, or raise accuracy.tail or accuracy.merge", "")
     return BenchEngine(LIST if lists == 1 else LISTS, seconds, found)
 

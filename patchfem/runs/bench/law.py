@@ -3,8 +3,7 @@
 import numpy as np
 
 from ...effects import has
-from ...friction.bonds import quadrature
-from ...friction.bonds.recursion import Recursion
+from ...friction.bonds import quadrature, recursion
 from ...friction.record import law_from
 from . import averaged
 
@@ -20,7 +19,7 @@ def law_for(model, patch=None):
     law = model.bonds
     engine = model.accuracy.quadrature
     if engine == "recursion" or (engine == "auto" and law.reading == "stretch" and law.order == 1):
-        return Recursion(law)
+        return recursion.Recursion(law)
 
     return quadrature.Quadrature(law, tail_of(model))
 

@@ -7,6 +7,7 @@ import numpy as np
 from ...core import Outcome
 from ...effects import has
 from ...response.errors import with_errors
+from ...response.outcome import OPEN_LOOP
 from ...response.rows import judged
 from ...scales import short
 from ..results.notes import climbing_as_one, of_growth, unbounded_bonds, unripe, warming, work_check_warning
@@ -17,7 +18,6 @@ from .engine import steps_of
 from .errors import errors_of
 from .ledger import Watch
 
-OPENED = "the friction loop of the last cycle does not close"
 MORE = 4  # cycles by which a steady loop is sought
 MOST_TRIED = 2e6  # forces of points at samples, up to which they are tried
 
@@ -80,7 +80,7 @@ def _still_open(model, patch, fine, steps: int) -> list:
         return []
     if (miss := _miss(fine)) <= tolerance:
         return []
-    text = f"{OPENED}: it misses by {100 * miss:.2g} % (limit {100 * tolerance:g} %), so loop_area, the friction " \
+    text = f"{OPEN_LOOP}: it misses by {100 * miss:.2g} % (limit {100 * tolerance:g} %), so loop_area, the friction " \
            "work of the last cycle, is not the energy dissipated in a steady loop"
     if fine.time.size * (1 if patch is None else patch.x.size) * (cycles + MORE) / cycles > MOST_TRIED:
         return [f"{text}; raise slide.cycles"]

@@ -10,9 +10,8 @@ import numpy as np
 
 from ...core import Response
 from ...dynamics.integrated import start_phase
-from ...dynamics.work_check import gap
 from ...response.loops import half_range, interface_loops, secant_stiffness, turns_of
-from ...response.measures import REST, ROUND, SHARE, SMOOTH
+from ...response.measures import REST, ROUND, SHARE, SMOOTH, relative_gap
 from ...response.spectrum import PLACES, WEIGHTS, distorted
 
 
@@ -45,7 +44,8 @@ class Samples:
                "friction_force_peak": np.abs(self.found.force).max(axis=0), "normal_load": load,
                "drift_per_cycle": self.drift(), "friction_work": book["booked"], "energy_dissipated": book["gone"],
                "energy_created": book["created"],
-               "work_check": gap(book["sampled"], book["booked"], book["passed"], book["power"] + book["peak_stored"])}
+               "work_check": relative_gap(book["sampled"], book["booked"], book["passed"],
+                                          energy=book["power"] + book["peak_stored"])}
         waves = [np.abs(self.gain(self.modes.output, one, number) - (1j * self.amplitude if number == 1 else 0.0))
                  for number, one in ((1, first), (3, third))]
         out |= {"absolute_acceleration_fundamental": waves[0], "acceleration_distortion": distorted(*waves, 0.0)}

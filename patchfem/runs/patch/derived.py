@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...slip.shear_modes import JenkinsSet, jenkins_set, scaled
+from ...slip import shear_modes
 from . import store
 from .measures import measures, plane_band
 from .press import Patch
@@ -38,7 +38,7 @@ def plane_notes(asked, patch: Patch) -> list:
     return store.reuse(("plane band", patch), lambda: plane_band(asked, patch))
 
 
-def elements(patch: Patch, static: float, length: float) -> JenkinsSet:
+def elements(patch: Patch, static: float, length: float) -> "shear_modes.JenkinsSet":
     """Return the parallel elements of a patch whose points yield at a friction coefficient times their load.
 
     Coulomb elements of different coefficients are the same springs, so they are made once and scaled.
@@ -53,10 +53,11 @@ def elements(patch: Patch, static: float, length: float) -> JenkinsSet:
     """
     load = patch.pressure.sigma_n * patch.pieces.interface.weight
 
-    def make() -> JenkinsSet:
+    def make() -> "shear_modes.JenkinsSet":
         if length or not static > 0:
-            return jenkins_set(patch.giving, static * load, length)
-        return scaled(store.reuse(("unit elements", patch), lambda: jenkins_set(patch.giving, load)), static)
+            return shear_modes.jenkins_set(patch.giving, static * load, length)
+        unit_elements = store.reuse(("unit elements", patch), lambda: shear_modes.jenkins_set(patch.giving, load))
+        return shear_modes.scaled(unit_elements, static)
 
     return store.reuse(("elements", patch, static, length), make)
 
@@ -72,7 +73,7 @@ def strip_elements(patch: Patch, static: float, length: float) -> tuple[StripEle
     def elements_under(force) -> StripElements:
         if not (static > 0 and force.any()):
             return StripElements(np.array([1 / giving.mean()]), np.zeros(1))
-        found = jenkins_set(giving, static * force, length)
+        found = shear_modes.jenkins_set(giving, static * force, length)
         return StripElements(found.stiffness, found.yield_slide)
 
     return store.reuse(("strip elements", patch, static, length),

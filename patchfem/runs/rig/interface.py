@@ -14,12 +14,10 @@ from ...friction.protocol import Element
 from ...friction.record import law_from
 from ...model.law import InterfaceLaw, bonds_of
 from ...model.model import Model
-from ...slip.fields import shear_of
-from ...slip.shear_modes import FEW, gathered, on_gauss
+from ...slip import fields, shear_modes
 from ...structure.drive_sizes import omega_of
 from ..bench import averaged, rigid, shear
-from ..patch import faces
-from ..patch.derived import elements, strip_elements
+from ..patch import derived, faces
 from . import strips, varying_load
 from .lists import quadrature_of
 from .numerics import Numerics
@@ -64,7 +62,7 @@ def _side_by_side(model: Model, numerics: Numerics, patch) -> list:
     f = model.friction
     if model.soft:
         length = law_from(f, patch.pressure.load).element(patch.pressure.load).length
-        return [parallel(*one) for one in strip_elements(patch, f.static, length)]
+        return [parallel(*one) for one in derived.strip_elements(patch, f.static, length)]
     return [element_of(model.rig.interfaces[0], load, model.rig.speed) for load in strips.strip_loads(patch)]
 
 
@@ -117,8 +115,8 @@ def contact_model(model: Model, numerics: Numerics, patch):
         return models.element_model(one)
 
     if patch.strips is not None:  # one slide of them all
-        return models.jenkins_model(*map(np.concatenate, zip(*strip_elements(patch, f.static, one.length))))
-    found = elements(patch, f.static, one.length)
+        return models.jenkins_model(*map(np.concatenate, zip(*derived.strip_elements(patch, f.static, one.length))))
+    found = derived.elements(patch, f.static, one.length)
     return models.jenkins_model(found.stiffness, found.yield_slide, found)
 
 
@@ -148,9 +146,10 @@ def _shear_modes(patch, law, count: int | None, model) -> tuple:
     marches of a pressed patch."""
     made, tolerance, few = _MADE.setdefault(patch, {}), model.accuracy.tolerance, model.patch.gathers
     if (law, count, tolerance, few) not in made:
-        found, force = shear_of(patch, law, count, *((FEWER * tolerance, True) if few else (0.1 * tolerance,))), None
+        limits = (FEWER * tolerance, True) if few else (0.1 * tolerance,)
+        found, force = fields.shear_of(patch, law, count, *limits), None
         if few:
-            found, force = gathered(found, patch.x[found.points], FEWER * tolerance)
+            found, force = shear_modes.gathered(found, patch.x[found.points], FEWER * tolerance)
             force = force / law.static
         made[law, count, tolerance, few] = found, force
     return made[law, count, tolerance, few]
@@ -162,10 +161,10 @@ def few_points(patch, law, tolerance: float, points: int, modes: int) -> tuple |
     more."""
     made, key = _MADE.setdefault(patch, {}), (law.static, law.length, law.ratio, tolerance, points, modes)
     if key not in made:
-        found, made[key] = shear_of(patch, law, None, tolerance, True), None
+        found, made[key] = fields.shear_of(patch, law, None, tolerance, True), None
         if found.stiffness.size <= modes:
-            few, limit, error = on_gauss(found, patch.x[found.points], points)
-            whole = found.of.backbone(max(FEW, 4 * modes))
+            few, limit, error = shear_modes.on_gauss(found, patch.x[found.points], points)
+            whole = found.of.backbone(max(shear_modes.FEW, 4 * modes))
             error += found.of.share(whole, found.of.backbone(found.stiffness.size))
             made[key] = (few, limit, error) if error <= 2 * tolerance else None
     return made[key]

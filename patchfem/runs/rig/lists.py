@@ -16,7 +16,7 @@ from ...friction.bonds.list_numbers import AGED, SHARES, form_of
 from ...friction.bonds.parameters import LONGEST
 from ...model.model import Model
 from ...structure.drive_sizes import fastest, largest, omega_of
-from ..bench.engine import engine_named
+from ..bench import engine as bench_engine
 from .numerics import Numerics
 
 DECAYED = 1e-2  # share of the first stroke of a motion that is released, by which its bonds are summed
@@ -44,7 +44,7 @@ def quadrature_of(model: Model, numerics: Numerics):
     bonds would outgrow any room: it is taken as DECAYED times that of its start. That of a block which the printed law
     holds is HELD times what the drive would give.
     """
-    return numerics.choice or _summed_by(model, numerics, _stretch(model), engine_named(model))
+    return numerics.choice or _summed_by(model, numerics, _stretch(model), bench_engine.engine_named(model))
 
 
 def _summed_by(model: Model, numerics: Numerics, stretch: float, engine: str):

@@ -4,7 +4,7 @@ from time import perf_counter
 
 import numpy as np
 
-from ...dynamics.integrated import Integrated
+from ...core import Integrated
 from ...dynamics.march import march as engine
 from ...effects import has
 from ...friction.record import law_from

@@ -6,17 +6,15 @@ from time import perf_counter
 
 import numpy as np
 
-from ...core import BaseSine, NotConverged
+from ...core import BaseSine, Integrated, InterfaceLoop, NotConverged
 from ...dynamics.events import elements, histories
 from ...dynamics.events import names_kernels as at
 from ...dynamics.events import steady as steady_events
 from ...dynamics.events.reading import Reading
-from ...dynamics.integrated import Integrated, Loop
-from ...dynamics.work_check import gap
 from ...effects import has
 from ...response import run_events
 from ...response.loops import interface_loops
-from ...response.measures import REST, harmonic
+from ...response.measures import REST, harmonic, relative_gap
 from ...response.ringing import held_modes, held_ring, strongest
 from ...response.rows import NEEDS_RUN, stuck_share
 from ...response.spectrum import distorted
@@ -162,9 +160,11 @@ class Pieces(Reader):
         return super().solution(run, seconds, drive, **more)
 
 
-def _of_strips(run, drive) -> Loop:
-    """The Loop of strips averaged to one interface, from the samples of the window, both sides of every event among
-    them; a yaw works besides the mean slide."""
+def _of_strips(run, drive) -> InterfaceLoop:
+    """Return the loop of strips averaged to one interface, from the samples of the window.
+
+    The samples are those on both sides of every event; the yaw does work beside the mean slide.
+    """
     window, omega = run.window, omega_of(drive)
     gaps = np.diff(window.time)
     weight = np.concatenate([[0.0], gaps / 2]) + np.concatenate([gaps / 2, [0.0]])
@@ -172,7 +172,7 @@ def _of_strips(run, drive) -> Loop:
     power = (window.extra["forces"] * window.extra["slide_rates"]).sum(axis=1)
     slide = window.slide - weight @ window.slide / weight.sum()
     first, pull = (complex(harmonic(window.time, weight, one, omega)) for one in (slide, window.force))
-    return Loop(first, pull, float(weight @ power), float(np.ptp(window.slip)), float(weight[held].sum()),
+    return InterfaceLoop(first, pull, float(weight @ power), float(np.ptp(window.slip)), float(weight[held].sum()),
                 float(np.abs(window.force).max()))
 
 
@@ -305,4 +305,4 @@ def _work_check(reading: Reading, book: dict):
     """Gap [1] of the friction work of the cycles that were read: by the trapezoidal rule on the ends of the pieces
     against the ledger's."""
     turned, booked, passed = (reading.faces[..., place].sum(axis=-1) for place in (at.TURNED, at.WORK, at.PASSED))
-    return gap(turned, booked, passed, book["power"] + book["peak_stored"])
+    return relative_gap(turned, booked, passed, book["power"] + book["peak_stored"])

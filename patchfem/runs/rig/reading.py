@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...core import Outcome
-from ...dynamics.integrated import Integrated
-from ...dynamics.work_check import sampled_work
+from ...core import Integrated, Outcome
 from ...effects import has
+from ...friction import path_work
 from ...response import run_events
 from ...response.errors import GAPS, change, error_of_change
 from ...response.levels import KEPT, Level
@@ -156,6 +155,6 @@ def friction_works(response, work: float, passed: float | None = None) -> tuple:
     extra = response.extra
     slides, forces = (extra.get(name, one[:, None]) for name, one in (("slides", response.slide),
                                                                       ("forces", response.force)))
-    parts = [sampled_work(slide, force) for slide, force in zip(slides.T, forces.T)]
+    parts = [path_work.sampled_work(slide, force) for slide, force in zip(slides.T, forces.T)]
     to_and_fro = sum(float(abs(one).sum()) for one in parts)
     return sum(float(one.sum()) for one in parts), work, to_and_fro if passed is None else passed

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from time import perf_counter
 
-from ...dynamics.integrated import Integrated
+from ...core import Integrated
 from ...dynamics.smooth import run as engine
 from ...response.measures import slip_noise
 from ...response.rows import NEEDS_RUN, row_of

@@ -11,7 +11,7 @@ from time import perf_counter
 
 import numpy as np
 
-from ...contact.strips import strip_offsets
+from ...contact import strips
 from ...core import PatchfemError, frozen_array
 from ...disk.whole import whole
 from ...effects import unbuilt
@@ -20,7 +20,7 @@ from ...wear.jumps import Wearing, Worn, after, replayed, start
 from ..patch.measures import other_strips
 from ..patch.press import areas, pressed, presser
 from ..patch.values import values
-from ..rig.numerics import choose
+from ..rig import numerics
 from .slip import Rubbed, apart, even, frames_for, rubbed
 
 STATE = tuple(Worn.__slots__)
@@ -80,7 +80,7 @@ class _Motion:
         self.model, self.pair = model, patch.pair
         self.frames = frames_for(model.accuracy.tolerance)
         self.same = model.grooves is None and model.wear.friction is None and not apart(model) and even(
-            model, model.rig is not None and choose(model).per_point)
+            model, model.rig is not None and numerics.choose(model).per_point)
         self.last: Rubbed | None = None
 
     def __call__(self, worn) -> np.ndarray:
@@ -256,7 +256,7 @@ def _on(asked, model, patch, other, moments) -> tuple:
         if asked.strips is None:
             return np.interp(other.x, patch.x, used)
         rows = np.array([np.interp(other.x, patch.x, row) for row in used])
-        y, own = (strip_offsets(asked.width, len(one)) for one in (area, rows))
+        y, own = (strips.strip_offsets(asked.width, len(one)) for one in (area, rows))
         return np.array([np.interp(y, own, column) for column in rows.T]).T
 
     legs = [(two.cycle - one.cycle, path(two.used)) for one, two in pairwise(moments)]

@@ -12,9 +12,7 @@ from ..bench.closed import over_steps
 from ..bench.engine import steps_of
 from ..patch.press import areas
 from ..results.travel import outcome_on_piece
-from ..rig.engines import ENGINES
-from ..rig.fields import fields_of
-from ..rig.numerics import choose
+from ..rig import engines, fields, numerics
 
 UNBOUNDED = (Outcome.GROWS, Outcome.EXCEEDS_TRAVEL, Outcome.LEAVES_GROOVES, Outcome.NOT_CONVERGED)
 LEAST_FRAMES, MOST_FRAMES = 64, 800
@@ -80,9 +78,9 @@ def _bench(model, patch, frames: int) -> Rubbed:
 
 
 def _rig(model, patch, frames: int) -> Rubbed:
-    numerics = choose(model)
-    shaped = not even(model, numerics.per_point and model.grooves is None)
-    found = ENGINES[numerics.engine].run(model, numerics, patch, frames if shaped else 0, None, None)
+    chosen = numerics.choose(model)
+    shaped = not even(model, chosen.per_point and model.grooves is None)
+    found = engines.ENGINES[chosen.engine].run(model, chosen, patch, frames if shaped else 0, None, None)
     amplitude = Measure(found.values["relative_displacement_amplitude"], "m", 0.0)
     wanted = {"relative_displacement_amplitude": amplitude}
     settled, _ = settle(found, wanted, model.accuracy.tolerance, model.rig.drive)
@@ -90,10 +88,10 @@ def _rig(model, patch, frames: int) -> Rubbed:
     beat = _beat(found.values, last[1])
     outcome = outcome_on_piece(settled if settled in UNBOUNDED else None, model.patch, patch, found.response.slide)
     if shaped:
-        fields = fields_of(model, numerics, patch, found)
-        local, tau = fields["slip"][1:], fields["shear_stress"][1:]
+        slip_frames = fields.fields_of(model, chosen, patch, found)
+        local, tau = slip_frames["slip"][1:], slip_frames["shear_stress"][1:]
         if model.grooves is not None:
-            slide, time, window = fields["holder_slide"][1:], fields["time"][1:], found.response
+            slide, time, window = slip_frames["holder_slide"][1:], slip_frames["time"][1:], found.response
             lifted = np.interp(time, window.time, window.extra.get("normal_load", np.full(
                 window.time.size, patch.pressure.load)))
             local, tau = slip_path_of(model, patch, slide, lifted, local, tau)

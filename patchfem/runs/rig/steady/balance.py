@@ -6,7 +6,7 @@ from time import perf_counter
 import numpy as np
 
 from ....compiled import load
-from ....core import BaseSine, NotConverged, Outcome, say
+from ....core import BaseSine, Integrated, NotConverged, Outcome, say
 from ....dynamics.harmonic import branch as branches
 from ....dynamics.harmonic.balance import cycle_energy, periodic_response
 from ....dynamics.harmonic.balance import regime as balanced_regime
@@ -15,7 +15,7 @@ from ....dynamics.harmonic.laws import Interlock, Spring
 from ....dynamics.harmonic.point import finer
 from ....dynamics.harmonic.point import point as periodic_point
 from ....dynamics.harmonic.stability import with_stability
-from ....dynamics.integrated import Integrated, Run
+from ....dynamics.integrated import Run
 from ....response.errors import finer_errors
 from ....response.measures import acceleration_peak
 from ....response.spectrum import odd_harmonics, wave_measures
