@@ -1,79 +1,122 @@
-"""What work takes: the one table of CPU seconds on one core, which plans, refusals and the choice of an engine read.
+"""CPU seconds on one core that pieces of work take: read by plans, by refusals and by the choice of an engine.
 
-Every row was measured on one machine, for the run of a plain scene with its cache full; `speed` says how a machine
-compares with it. What a piece, a step, a strip or a front is, those say who count them: `runs.rig.costs`,
-`runs.rig.lists`, `runs.bench.engine`, `friction.bonds.engines`, `runs.patch.plan` and `elasticity.grid_fronts`.
+All were measured on one machine, for runs of plain scenes with a full cache; `speed` compares a machine with it. The
+modules that count the work define its units: `runs.rig.costs`, `runs.rig.lists`, `runs.bench.engine`,
+`friction.bonds.engines`, `runs.patch.plan` and `elasticity.grid_fronts`.
 """
 
 from time import process_time
 
 import numpy as np
 
-START = 0.5  # of a run until it begins, and of its files and its page
+START = 0.5  # s of a run until it begins, and of its files and its page
 
-# of a piece of a motion from event to event, of each further mode and interface in it, of each element; of one at most,
-# and of one of the last cycles, which are kept whole; as Python per mode + 1 and interface + 1, and of that a sample
-# that is shown and a piece that is read
-PIECE, PIECE_MODE, PIECE_FACE, PIECE_ELEMENT = 2.5e-7, 1.5e-7, 3e-7, 3e-9
-MOST_PIECE, READ_PIECE = 1e-6, 4e-6
-PYTHON_PIECE, PYTHON_SAMPLE, PYTHON_READ = 7e-5, 0.1, 0.5
+# motion from event to event, in pieces
+PIECE = 2.5e-7  # s per piece of one mode and one interface
+PIECE_MODE = 1.5e-7  # s per piece and further mode
+PIECE_FACE = 3e-7  # s per piece and further interface
+PIECE_ELEMENT = 3e-9  # s per piece and element
+MOST_PIECE = 1e-6  # s per piece at most, by which the engine is chosen
+READ_PIECE = 4e-6  # s per piece of the last cycles, which are kept whole
+PYTHON_PIECE = 7e-5  # s per piece as Python, times (modes + 1) * (interfaces + 1)
+PYTHON_SAMPLE = 0.1  # fraction of PYTHON_PIECE that a sample of the shown motion takes
+PYTHON_READ = 0.5  # fraction of the seconds of a piece as Python that reading it takes
 
-# of a march of elements: a cycle, a step, each element in it; of bonds a step of one mode, of each further one, times
-# where bonds grow and for each of several interfaces; of a sample over grooves
-CYCLE, STEP, STEP_ELEMENT = 3e-4, 4.3e-7, 9e-10
-BOND_STEP, STEP_MODE, GROWS, JOINT, CLIMB = 7e-7, 1e-7, 3.0, 2.5, 3e-6
-PRESSING_STEP, PRESSING_NODE = 4.5e-5, 1.7e-7  # of a step of pieces that heave or pitch, and per node of theirs
-FIELD_NODE, SLIP_NODE = 6e-8, 3e-9  # of a step per node: of bonds at every node, of elements for partial slip
+# march in time
+CYCLE = 3e-4  # s per cycle of a march of elements
+STEP = 4.3e-7  # s per step of a march of elements
+STEP_ELEMENT = 9e-10  # s per step and element
+BOND_STEP = 7e-7  # s per step of one mode with bonds
+STEP_MODE = 1e-7  # s per step and further mode with bonds
+GROWS = 3.0  # factor of a step in which bonds grow
+JOINT = 2.5  # factor of a step per interface, if there are several
+CLIMB = 3e-6  # s per step over grooves
+PRESSING_STEP = 4.5e-5  # s per step of pieces that heave or pitch
+PRESSING_NODE = 1.7e-7  # s per step and node of pieces that heave or pitch
+FIELD_NODE = 6e-8  # s per step and node, if bonds are followed at every node
+SLIP_NODE = 3e-9  # s per step and node of elements in partial slip
 
-SMOOTH_STEP, SMOOTH = 2e-6, 0.02  # of a step of high order, and of such a run besides
-KEPT_SAMPLE = 8e-6, 2.5e-6  # of a sample of the last cycles, kept, read and written: of steps, from event to event
+SMOOTH = 0.02  # s of a run of high order besides its steps
+SMOOTH_STEP = 2e-6  # s per step of high order
+KEPT_SAMPLE = 8e-6  # s per sample of the last cycles that is kept, read and written, of an engine with steps
+KEPT_EVENT_SAMPLE = 2.5e-6  # s per sample of the last cycles, of an engine that goes from event to event
 
-# of a point of steady motions: in closed form, by the map of events or yields; of a piece while all holds, the same per
-# squared number of modes, of an event per mode; by a balance, of a law with a state that flows besides, and per cubed
-# number of its unknowns; of the multipliers, per cubed size of the state, where the slope of a law changes all along,
-# of the speed alone or of such a state: within a factor 3 of fourteen curves of the templates and of ten modes
-CLOSED_POINT, MAPPED_POINT, RINGING_PIECE, RINGING_MODES, EVENT = 3e-4, 3e-3, 4e-5, 4e-7, 1.5e-5
-BALANCED_POINT, FLOWING_POINT, BALANCE = 0.012, 0.1, 8e-10
-MULTIPLIERS = 2.5e-6, 4e-6
+# one point of a curve of steady motions; plans hold within a factor 3 for fourteen curves of the templates and of ten
+# modes
+CLOSED_POINT = 3e-4  # s of a point in closed form
+MAPPED_POINT = 3e-3  # s of a point by the map of events or yields
+RINGING_PIECE = 4e-5  # s per piece while all elements stick
+RINGING_MODES = 4e-7  # s per piece while all elements stick and per squared number of modes
+EVENT = 1.5e-5  # s per event and mode
+BALANCED_POINT = 0.012  # s of a point by harmonic balance
+FLOWING_POINT = 0.1  # s of a point by harmonic balance for a law with a state that flows, besides
+BALANCE = 8e-10  # s per cubed number of unknowns of a balance
+# s of the multipliers per cubed size of the state, if the slope of a law changes all along: of a law of the speed
+# alone, and of a law with a state that flows
+MULTIPLIERS = (2.5e-6, 4e-6)
 
-# of the pieces of a patch: of a call, a shape of its fronts, a front, an entry of the factors, an operation; fitted to
-# 15 grids of 21 x 20 to 301 x 201 nodes, each both ways: 0.85 to 1.07 of what they took
-PER_CALL, PER_SHAPE, PER_FRONT, PER_ENTRY, PER_OPERATION = 1.4e-3, 9.8e-5, 4.5e-6, 1.38e-8, 1.22e-11
+# condensing of the pieces of a patch, fitted to 15 grids of 21 x 20 to 301 x 201 nodes, each both ways, which took 0.85
+# to 1.07 of this
+PER_CALL = 1.4e-3  # s per call
+PER_SHAPE = 9.8e-5  # s per shape of the fronts
+PER_FRONT = 4.5e-6  # s per front
+PER_ENTRY = 1.38e-8  # s per entry of the factors
+PER_OPERATION = 1.22e-11  # s per operation
 
-# of a list of bonds: per strip and pass, of an order that takes a power, of a pass and of a
-# step besides; of a step of the recursion
-STRIP = 3e-10, 3e-9, 2e-9, 3e-9  # by the number of the form, `friction.bonds.list_numbers`
-ANY_ORDER, PASS, LIST_STEP, RECURSION = 2.5e-8, 1.5e-7, 5e-7, 3e-8
+# lists of bonds
+STRIP = (3e-10, 3e-9, 2e-9, 3e-9)  # s per strip and pass, by the form of the list (`friction.bonds.list_numbers`)
+ANY_ORDER = 2.5e-8  # s per strip and pass of an order that takes a power
+PASS = 1.5e-7  # s per pass besides its strips
+LIST_STEP = 5e-7  # s per step besides its passes
+RECURSION = 3e-8  # s per step of the recursion
 
-# of a slide: a sample in closed form or of one element, of a law stepped in NumPy, of a sum over the strips of the
-# path, per strip and per strip and point
-SAMPLE, LAW_STEP, PATH_STEP, PATH_STRIP, PATH_POINT = 1e-7, 6e-5, 1.2e-3, 2e-6, 8e-9
+# slide of a bench
+SAMPLE = 1e-7  # s per sample in closed form or of one element
+LAW_STEP = 6e-5  # s per sample of a law that is stepped in NumPy
+PATH_STEP = 1.2e-3  # s per sample of a sum over the strips of the path
+PATH_STRIP = 2e-6  # s per sample and strip of the path
+PATH_POINT = 8e-9  # s per sample, strip and point of the path
 
-# of a patch with its fields, and of these alone; per predicted second of condensing it, and of pieces beyond the
-# interface, whose predicted seconds are those of any cells already; of the frames of one that moves, and per node of
-# the finest grids
-PRESSED, FIELDS, CONDENSED, OUTLINED = 0.15, 0.1, 3.0, 2.2
-MOVING, MOVING_NODE = 0.35, 3e-5
+# patch
+PRESSED = 0.15  # s of a patch besides condensing, its fields included
+FIELDS = 0.1  # s of the fields of a patch
+CONDENSED = 3.0  # s per predicted second of condensing
+OUTLINED = 2.2  # s per predicted second of condensing pieces with cells beyond the interface
+MOVING = 0.35  # s of the frames of a patch that moves
+MOVING_NODE = 3e-5  # s of the frames per node of the finest grids
 
-OURS = 0.0214  # of the work of `speed` on the machine of the table
+REFERENCE_SPEED_WORK = 0.0214  # CPU s of the work of `speed` on the machine where all this was measured
 
 
 def behind_modes(points: int, modes: int, load_varies: bool = False) -> float:
-    """Seconds of a step of `points` bonds behind so many shear modes; load_varies: their loads change with the motion,
-    also over grooves. Within 0.7 to 1.5 of 65 to 425 points of the rig of the report and of its bench."""
+    """Return the seconds of a step of bonds behind shear modes.
+
+    Parameters
+    ----------
+    points : int
+        Points with bonds. For 65 to 425 points of the rig of the report and of its bench, steps took 0.7 to 1.5 of
+        this.
+    modes : int
+        Shear modes.
+    load_varies : bool
+        Whether the loads of the points change with the motion, as they do over grooves.
+    """
     if load_varies:
         return 7e-6 + points * (2e-8 + 2e-9 * modes)
     return 1e-6 + points * (1e-9 + 5e-10 * modes)
 
 
 def speed() -> float:
-    """CPU seconds of this machine over those of the table [1], by the least of five goes at a small work of the kinds
-    that runs do: a loop, a product and a solve."""
-    matrix, least = np.arange(160.0**2).reshape(160, 160) % 7.0 + 200 * np.eye(160), np.inf
+    """Return the CPU seconds of this machine over those of the machine of the constants.
+
+    The work is of the kinds that runs do, a loop, a product and a solve; the shortest of five timings counts.
+    """
+    matrix = np.arange(160.0**2).reshape(160, 160) % 7.0 + 200 * np.eye(160)
+    shortest = np.inf
     for _ in range(5):
         begin = process_time()
         for _ in range(8):
             np.linalg.solve(matrix, matrix @ matrix)
             sum(k * k for k in range(20000))
-        least = min(least, process_time() - begin)
-    return least / OURS
+        shortest = min(shortest, process_time() - begin)
+    return shortest / REFERENCE_SPEED_WORK

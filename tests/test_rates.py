@@ -12,7 +12,7 @@ from patchfem.scene.scene import loads
 
 def test_exact_a_machine_of_half_the_pace_takes_twice_as_long(monkeypatch):
     ticks = iter(range(0, 1000))
-    monkeypatch.setattr(rates, "process_time", lambda: rates.OURS * 2 * next(ticks))
+    monkeypatch.setattr(rates, "process_time", lambda: rates.REFERENCE_SPEED_WORK * 2 * next(ticks))
     assert rates.speed() == pytest.approx(2.0, rel=1e-12)
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from math import inf
 
-from .. import rates
+from .. import compiled, rates
 from ..core import Missing, PatchfemError, say
 from ..effects import EFFECTS, has
 from ..friction import record
@@ -15,14 +15,14 @@ from ..response import rows
 from ..structure import drive_sizes
 from . import memory
 from .bench import engine as of_bench
+from .cost import Cost, MemoryPart
 from .patch import plan as patch_plan
-from .patch import store
 from .rig import engines
-from .rig import numerics as rig_numerics
 from .rig import plan as of_rig
 from .tolerance_forecast import NOTHING_FORESEEN, Forecast, foresee_tolerance
 from .wear import plan as of_wear
 
+PACKAGES = 80e6  # bytes of the packages that every run imports
 LONGEST = 1e6  # seconds of a run, twelve days, beyond which none is begun
 SKIPS, MANY = ("march", "exact", "piecewise"), 100  # engines that compute no cycle of a motion that repeats, and cycles
 UP_TO = ("the computing time is an upper limit: as soon as the motion repeats itself, the remaining cycles are not "
@@ -44,27 +44,46 @@ GROUPS = {  # group -> (what it is, SI unit of its value)
 class Plan:
     """A model with the engine that will run it, its sizes and its cost.
 
-    effects: names in the scene; steps: of the time loop, all passes; seconds, bytes: estimates; chain: link ->
-    stiffness [N/m] or "rigid"; groups: name -> value; verdict: sentences; parts: of the memory, as `memory.needs`;
-    compile_seconds: besides `seconds`, where no run of this kind has left its compiled code; tolerance: whether it will
-    be missed.
+    effects: names in the scene; cost: of the run, its memory the largest part first; chain: link -> stiffness [N/m] or
+    "rigid"; groups: name -> value; verdict: sentences; compile_seconds: besides `seconds`, where no run of this kind
+    has left its compiled code; tolerance: whether it will be missed.
     """
 
     model: Model
     kind: str
     effects: tuple
     not_in_scene: tuple
-    engine: str
-    unknowns: dict
-    steps: int
-    seconds: float
-    bytes: int
+    cost: Cost
     chain: dict
     groups: dict
     verdict: tuple
-    parts: tuple = ()
     compile_seconds: float = 0.0
     tolerance: Forecast = NOTHING_FORESEEN
+
+    @property
+    def engine(self) -> str:
+        """Name of the engine, "static" for a patch without motion."""
+        return self.cost.engine or "static"
+
+    @property
+    def unknowns(self) -> dict:
+        """Number of unknowns by name."""
+        return self.cost.sizes
+
+    @property
+    def steps(self) -> int:
+        """Steps of the time loop, those of the coarser runs included."""
+        return self.cost.steps
+
+    @property
+    def seconds(self) -> float:
+        """Predicted CPU seconds of the run on one core."""
+        return round(self.cost.seconds, 2)
+
+    @property
+    def bytes(self) -> int:
+        """Predicted memory at the peak of the run."""
+        return self.cost.bytes
 
     def __repr__(self) -> str:
         sizes = ", ".join(f"{count} {name.removesuffix('_about').replace('_', ' ')}"
@@ -84,7 +103,7 @@ class Plan:
                 "not_in_scene": list(self.not_in_scene), "engine": self.engine, "unknowns": self.unknowns,
                 "steps": self.steps, "seconds": self.seconds, "bytes": self.bytes, "stiffness_chain": self.chain,
                 "groups": self.groups, "verdict": list(self.verdict), "modes": self.modes(self.chain),
-                "memory": {part.what: int(part.bytes) for part in self.parts},
+                "memory": {part.what: int(part.bytes) for part in self.cost.parts},
                 "compile_seconds": self.compile_seconds, "tolerance": self.tolerance.as_json()}
 
 
@@ -111,64 +130,72 @@ def _planned(model: Model, per_point: bool) -> Plan:
         except PatchfemError as error:
             error.key = error.key or "measured.file"
             raise
-    unknowns, chain, groups = {}, {"holder": "rigid", "pieces_shear": "rigid", "asperities": "rigid"}, {}
-    engine, steps, seconds, more, said = "static", 0, 0.0, 0.0, [[], [], []]
-    numerics, pressed = None, 0.0
+    chain, groups = {"holder": "rigid", "pieces_shear": "rigid", "asperities": "rigid"}, {}
     if model.rig is not None and model.rig.stuck is not None:
         model = replace(model, rig=of_rig.foreseen(model.rig, patch_plan.chain(model.patch) | _link(model)))
+    on_motion, on_patch, on_law = [], [], []
     if model.rig is not None:
-        unknowns["modes"], chain = len(model.rig.frequencies), of_rig.chain(model.rig) | chain
+        chain = of_rig.chain(model.rig) | chain
         groups |= of_rig.groups(model) if model.kind == "rig" else {}
-        said[0] = engines.knobs_idle(model, engines.engine_of(model, per_point).name)
-        said[2] = of_rig.sum_words(model) if model.kind == "rig" else []
+        on_motion += engines.knobs_idle(model, engines.engine_of(model, per_point).name)
     if model.patch is not None:
-        tolerance = model.patch.mesh_tolerance or model.accuracy.tolerance
-        grids = patch_plan.expected_grids(model.patch, tolerance)
-        unknowns, chain = patch_plan.sizes(grids) | unknowns, chain | patch_plan.chain(model.patch)
-        seconds, pressed = patch_plan.effort(model.patch, grids, tolerance)
+        chain |= patch_plan.chain(model.patch)
         groups |= patch_plan.groups(model)
-        said[1] = patch_plan.verdict(groups, model.patch)
-    alike: set = set()
+        on_patch += patch_plan.verdict(groups, model.patch)
     for number, one in enumerate(model.rig.interfaces if model.rig is not None else ()):
         if one.patch is not None:
-            grids = patch_plan.expected_grids(one.patch, model.accuracy.tolerance)
-            alone = store.content_key(one.patch) not in alike  # equal patches are pressed once
-            alike.add(store.content_key(one.patch))
-            for name, size in patch_plan.sizes(grids).items():
-                unknowns[name] = unknowns.get(name, 0) + size * alone
             chain |= {rows.of_number(name, number): link for name, link in patch_plan.chain(one.patch).items()
                       if link != "rigid"}
-            more, size = patch_plan.effort(one.patch, grids, model.accuracy.tolerance)
-            seconds, pressed = seconds + more * alone, pressed + size * alone
-            said[1] = [*said[1], *patch_plan.face_words(model.rig.names[number], one)]
-    if model.rig is not None:
-        engine, steps, more = of_rig.cost(model, per_point, unknowns)
-        seconds, numerics = seconds + more, rig_numerics.choose(model, per_point)
-    elif model.kind == "bench":
-        engine, steps, more = of_bench.cost(model, unknowns)
-        seconds, groups = seconds + more, of_bench.groups(model) | groups
-    if model.wear is not None and model.patch is not None:
-        seconds += of_wear.cost(model, unknowns["interface_points"], more)
-        said[2] = [*said[2], of_wear.verdict(model)]
-    seconds += rates.START + memory.code(model, engine).seconds
-    parts = memory.needs(model, engine, steps, unknowns, numerics, pressed)
+            on_patch += patch_plan.face_words(model.rig.names[number], one)
+    cost = _cost(model, per_point)
+    on_law += cost.words
+    if model.kind == "bench":
+        groups = of_bench.groups(model) | groups
     if model.friction is not None:
         chain |= _link(model)
         groups |= _law_groups(model)
-        said[2] = [*said[2], *_groove_words(model)]
+        on_law += _groove_words(model)
     if model.rig is not None:
-        said[0] = [*said[0], *of_rig.first_words(model.rig, groups, chain)]
-    if engine in SKIPS and drive_sizes.sinusoidal(model.rig.drive) and model.rig.cycles >= MANY:
-        said[2] = [*said[2], UP_TO]
+        on_motion += of_rig.first_words(model.rig, groups, chain)
+    if cost.engine in SKIPS and drive_sizes.sinusoidal(model.rig.drive) and model.rig.cycles >= MANY:
+        on_law.append(UP_TO)
     foreseen = foresee_tolerance(model)
-    said[0] = [*([foreseen.sentence()] if foreseen.causes else []), *said[0]]
-    return Plan(model, model.kind, model.source.effects, model.absent, engine, unknowns, steps, round(seconds, 2),
-                int(sum(part.bytes for part in parts)), chain, groups, tuple(_verdict(model, groups, parts, said)),
-                parts, memory.compile_seconds(model, engine, unknowns), foreseen)
+    on_motion = [*([foreseen.sentence()] if foreseen.causes else []), *on_motion]
+    is_compiled = cost.compile_seconds == 0 or compiled.has_run(compiled_kind(model, cost.engine, cost.sizes))
+    return Plan(model, model.kind, model.source.effects, model.absent, cost, chain, groups,
+                tuple(_verdict(model, groups, cost.parts, (on_motion, on_patch, on_law))),
+                0.0 if is_compiled else cost.compile_seconds, foreseen)
 
 
-def _verdict(model: Model, groups: dict, parts: tuple, said: list) -> list:
-    """Sentences on what the groups say; said: those of the motion, the patch and the sum over bonds."""
+def _cost(model: Model, per_point: bool) -> Cost:
+    """Return the cost of all steps of a run, its memory from the largest part to the smallest."""
+    pressing = patch_plan.cost(model) if model.patch is not None or model.faced else Cost()
+    points = pressing.sizes.get("interface_points", 1)
+    motion = Cost()
+    if model.rig is not None:
+        motion = of_rig.cost(model, per_point, points)
+    elif model.kind == "bench":
+        motion = of_bench.cost(model, points)
+    total = Cost({"start": rates.START}, (MemoryPart(PACKAGES, "packages"),)) + pressing + motion
+    if model.wear is not None and model.patch is not None:
+        total += of_wear.cost(model, points, motion.times["motion"] + motion.times.get("histories", 0.0))
+    return replace(total, parts=tuple(sorted((part for part in total.parts if part.bytes > 0), reverse=True)))
+
+
+def compiled_kind(model: Model, engine: str, unknowns: dict) -> str:
+    """Return what the compiled code of a run depends on, in words: two runs of one kind run the same code."""
+    rig, f = model.rig, model.friction
+    laws = [one.numbers for one in rig.interfaces] if rig is not None else [f] if f is not None else []
+    words = [engine, *sorted({f"{one.law} {one.reading} {one.order not in (None, 0, 1)}" for one in laws})]
+    if rig is not None:
+        words += [f"{min(2, len(rig.frequencies))} {min(2, len(rig.interfaces))}", "sines" * bool(rig.drive.segments)]
+    flags = {"soft": bool(model.soft), "grooves": model.grooves is not None, "varies": model.load_varies,
+             "list": "bond_list_about" in unknowns}
+    return ", ".join([*words, *(name for name, holds in flags.items() if holds)])
+
+
+def _verdict(model: Model, groups: dict, parts: tuple, said: tuple) -> list:
+    """Sentences on what the groups say; said: those on the motion, the patch and the friction law."""
     out = list(said[0])
     if text := memory.refusal(parts):
         out.append(f"`run` will refuse this scene: {text}")
@@ -188,7 +215,7 @@ def _verdict(model: Model, groups: dict, parts: tuple, said: list) -> list:
 
 def refuse_size(what: Plan) -> None:
     """Raise Missing where a run would need more memory than there is, or longer than LONGEST seconds."""
-    memory.refuse(what.parts)
+    memory.refuse(what.cost.parts)
     if what.seconds > LONGEST:
         pinned = what.model.accuracy.steps_per_cycle is not None
         key = "accuracy.steps_per_cycle or " if pinned else ""

@@ -15,10 +15,10 @@ from ..core import Measure, NotConverged, Outcome
 from ..dynamics import resume
 from ..model.model import Model
 from ..model.source import placed
-from . import joint, memory
+from . import joint
 from .patch import faces, strength
 from .patch import result as patch_result
-from .plan import Plan, plan, refuse_size
+from .plan import Plan, compiled_kind, plan, refuse_size
 from .remedies import Finding, beyond_tolerance
 from .results.patch_rows import unknown_measures
 from .results.result import Result, with_meanings, without_folders
@@ -121,7 +121,7 @@ def _run(what: Plan, say, progress, per_point: bool, estimate: bool, fresh: bool
         if model.wear is not None:
             result = measures.worn(replace(result, plan=what), evolved, estimate)
     if what.compile_seconds and estimate:
-        compiled.ran(memory.compiled_kind(model, what.engine, what.unknowns))
+        compiled.ran(compiled_kind(model, what.engine, what.unknowns))
     return _whole(with_self_checks(result), notes, begin, coarse, climbed, still)
 
 

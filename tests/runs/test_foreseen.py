@@ -14,8 +14,8 @@ from scene_texts import BENCH, COULOMB, DRIVE, MODE, PATCH, PLASTIC, POINT, SECO
 from patchfem import compiled, rates
 from patchfem.core import Missing
 from patchfem.runs import memory, run
-from patchfem.runs.plan import UP_TO, plan, refuse_size
-from patchfem.runs.rig import plan as of_rig
+from patchfem.runs.plan import UP_TO, compiled_kind, plan, refuse_size
+from patchfem.runs.rig import costs
 from patchfem.runs.rig.numerics import choose
 from patchfem.scene.scene import load, loads
 from patchfem.scene.starting import text_of
@@ -42,7 +42,7 @@ def planned(text, *sets):
 def test_refuses_before_anything_is_made_with_the_key_that_drives_it(text, sets, key):
     tracemalloc.start()
     found = planned(text, *sets)
-    said = memory.refusal(found.parts, GIGABYTE)
+    said = memory.refusal(found.cost.parts, GIGABYTE)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert said.startswith("about ") and f"{key}" in said and "1 GB are free" in said
@@ -66,21 +66,22 @@ def test_always_the_histories_of_a_long_run_take_what_the_plan_says(method, cycl
 
 def test_exact_the_parts_are_the_whole_and_the_largest_stands_first():
     found = planned(PATCH, "contact.element_size=10 um")
-    sizes = [part.bytes for part in found.parts]
+    sizes = [part.bytes for part in found.cost.parts]
     assert sizes == sorted(sizes, reverse=True) and found.bytes == int(sum(sizes))
-    assert found.as_json()["memory"][found.parts[0].what] == int(sizes[0])
+    assert found.as_json()["memory"][found.cost.parts[0].what] == int(sizes[0])
 
 
 def test_exact_memory_grows_with_the_square_of_the_nodes_and_with_the_steps_of_the_window():
     few, many = (planned(PATCH, f"contact.element_size={size} um").bytes for size in (2, 1))
     assert 3.6 < many / few < 4.0
     few, many = (planned(RIG, MARCH, f"accuracy.steps_per_cycle={n}00000").bytes for n in (2, 4))
-    assert many - few == pytest.approx(memory.KEPT_BY["march"] * 20 * 3 * 2e5, rel=0.01)  # 30 cycles keep the last 3
+    assert many - few == pytest.approx(costs.MARCH_HISTORY.sample * 20 * 3 * 2e5, rel=0.01)  # 30 cycles keep the last 3
 
 
 def test_exact_a_run_of_centuries_is_refused_with_its_key():
     with pytest.raises(Missing, match=r"computing time of about .* s .*; lower drive\.cycles$"):
-        refuse_size(replace(planned(RIG, MARCH, "drive.cycles=1e15"), parts=()))  # the memory is refused before
+        long = planned(RIG, MARCH, "drive.cycles=1e15")
+        refuse_size(replace(long, cost=replace(long.cost, parts=())))  # the memory is refused before
 
 
 def test_exact_a_group_with_a_limit_leaves_what_it_has_not_used(tmp_path):
@@ -132,10 +133,9 @@ def test_exact_a_plan_tells_what_compiles_until_a_run_of_its_kind_has_come_to_it
     seconds = before.compile_seconds
     assert seconds > 0 and f"(and {seconds:.0f} s once for compiling)" in repr(before)
     assert before.as_json()["compile_seconds"] == seconds and before.seconds == planned(RIG, MARCH).seconds
-    compiled.ran(memory.compiled_kind(before.model, before.engine, before.unknowns))
+    compiled.ran(compiled_kind(before.model, before.engine, before.unknowns))
     assert planned(RIG, MARCH, "drive.cycles=7").compile_seconds == 0 and "compile" not in repr(planned(RIG, MARCH))
-    assert planned(PATCH).compile_seconds == 0 and other.compile_seconds == seconds
-    assert memory.compile_seconds(other.model, other.engine, other.unknowns) == seconds
+    assert planned(PATCH).compile_seconds == 0 and plan(other.model).compile_seconds == other.compile_seconds == seconds
 
 
 def test_exact_a_plan_counts_no_compile_where_a_short_history_runs_as_python(tmp_path, monkeypatch):
@@ -182,6 +182,7 @@ def test_exact_machine_code_is_counted_where_a_short_run_will_load_it(tmp_path, 
     monkeypatch.setattr(compiled, "_folder", lambda: tmp_path)
     monkeypatch.setattr(compiled, "PLAIN", False)
     monkeypatch.setattr(compiled, "PATIENCE", 2.0)
+    compiled.kernels.cache_clear()  # other tests may have loaded machine code in this process
     looked = []
     monkeypatch.setattr(compiled.machine, "found", looked.append)
     found = {count: planned(text) for count, text in scenes.items()}
@@ -245,7 +246,7 @@ duration = "{} s"
 def test_always_a_random_run_keeps_as_many_samples_as_are_foreseen():
     """Of every cycle as many as the engine keeps, whatever the band asks of a march: 60 s took 1.5 GB, not 11."""
     found = planned(SHAKEN.format(2))
-    kept = of_rig.kept_samples(choose(found.model))
+    kept = costs.kept_samples(choose(found.model))
     assert run.run(found).window.time.size == pytest.approx(kept, rel=0.01)
     assert 1e9 < planned(SHAKEN.format(60)).bytes < 2e9
 

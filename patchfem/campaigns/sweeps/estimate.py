@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from ...core import PatchfemError
-from ...rates import START
-from ...runs import memory
 from ...runs.many.many import batch_compile_seconds, batch_of
 from ...runs.plan import plan
 from ...scene.axes import Axis
@@ -62,21 +60,22 @@ def estimate(asked: Asked, cases: Cases) -> dict:
         "values": {axis.key: _values(axis) for axis in cases.axes}}
 
 
-def _alone(plans: list) -> tuple:
-    """(seconds that all cases share, seconds of each of the planned cases by itself): without the start of a run and
-    the frames of its motion, and without condensing pieces that all cases have."""
-    own = [one.seconds - START - memory.code(one.model, one.engine).seconds for one in plans]
-    patches, shared = [one.model.patch for one in plans], 0.0
+def _alone(plans: list) -> tuple[float, list]:
+    """Return the seconds that all cases share, and the seconds of each planned case by itself.
+
+    A case of a sweep has no start of its own and makes no fields. Pieces that all cases have are condensed once.
+    """
+    costs, shared = [each.cost for each in plans], 0.0
+    left_out = {"start", "code", "fields"}
+    patches = [each.model.patch for each in plans]
     if None not in patches:
         from ...runs.patch.meshes import geometry_of  # not for sweeps of a point, which need no mesh
-        from ...runs.patch.plan import spared
 
-        parts = [spared(one.model.patch, one.model.patch.mesh_tolerance or one.model.accuracy.tolerance)
-                 for one in plans]
-        same = len({geometry_of(one) for one in patches}) == 1
-        own = [one - frames - same * condensed for one, (condensed, frames) in zip(own, parts)]
-        shared = same * max(condensed for condensed, _ in parts)
-    return shared, [max(one, 0.0) + ALONE for one in own]
+        if len({geometry_of(patch) for patch in patches}) == 1:
+            left_out.add("condensing")
+            shared = max(cost.times["condensing"] for cost in costs)
+    own = [sum(seconds for name, seconds in cost.times.items() if name not in left_out) for cost in costs]
+    return shared, [seconds + ALONE for seconds in own]
 
 
 def _values(axis: Axis) -> int:

@@ -11,16 +11,21 @@ import numpy as np
 
 from ... import rates
 from ...core import Missing
+from ...dynamics.march import capacity
 from ...effects import has, listed
 from ...friction.bonds import engines as bond_engines
 from ...friction.bonds import parameters
 from ...slip import shear_modes
+from ..cost import MARCH_CODE, NO_CODE, SHORT_CODE, Cost, MemoryPart
 
 CLOSED, ELEMENTS, POINTS, RECURSION, LIST, STEPPED, PLANE, LISTS = range(8)
 NAMES = {CLOSED: "closed form", ELEMENTS: "parallel elements", POINTS: "bond points", RECURSION: "recursion",
          STEPPED: "law step by step", PLANE: "two directions"}
 MOST_STEPS = 200_000  # per cycle over grooves
 FLANK = 20  # samples over a radian of grooves
+CODES = {CLOSED: NO_CODE, STEPPED: NO_CODE, PLANE: NO_CODE, ELEMENTS: SHORT_CODE, RECURSION: SHORT_CODE,
+         POINTS: MARCH_CODE, LIST: MARCH_CODE, LISTS: MARCH_CODE}
+SAMPLE_BYTES = 250.0  # bytes of a sample of the slide
 PASSES = 1 / 3  # of the passes over the list that a rig makes: a given slide needs no search for the increment
 
 
@@ -158,18 +163,39 @@ def slips_by_elements(model) -> bool:
     return model.soft and simple and not has(model.friction.law, "bonds")
 
 
-def cost(model, unknowns: dict) -> tuple:
-    """(engine, steps of all passes, seconds) of a bench."""
+def cost(model, points: int) -> Cost:
+    """Return the cost of a slide.
+
+    Parameters
+    ----------
+    model : Model
+    points : int
+        Nodes of the interface, 1 without a patch.
+    """
     per_cycle = steps_of(model)
     time, slide = model.slide.samples(per_cycle)[:2]
     if model.load_varies:
         time, slide = model.point.refined(model.slide, time, slide, per_cycle)
-    runs = bench_engine(model, slide, unknowns.get("interface_points", 1))
-    if runs.choice is not None and runs.choice.strips:
-        unknowns["bond_list_about"] = int(runs.choice.strips)
-    cells = has(model.friction.law, "cells") and runs.kind == ELEMENTS
-    steps = (2 + cells) * time.size  # half and a quarter of the steps and what checks the sum or the cells beside them
-    return runs.name, steps, steps * runs.seconds
+    engine = bench_engine(model, slide, points)
+    # each sample is passed in the run and in its runs at half and at a quarter of the steps, which take about as much
+    # as a second one; a sum over bonds or cells is checked by a further run
+    passes = 3 if has(model.friction.law, "cells") and engine.kind == ELEMENTS else 2
+    steps = passes * time.size
+    samples = MemoryPart(SAMPLE_BYTES * steps / 2, f"{steps // 2} samples of the slide", _samples_key(model))
+    sizes, lists = {}, ()
+    if engine.choice is not None and engine.choice.strips:
+        strips = int(engine.choice.strips)
+        sizes = {"bond_list_about": strips}
+        lists = (MemoryPart(capacity.most_bytes(strips), "the list of bonds", "accuracy.tail"),)
+    motion = Cost({"motion": steps * engine.seconds}, (samples, *lists), (), steps, sizes, engine.name)
+    return motion + CODES[engine.kind].cost()
+
+
+def _samples_key(model) -> str:
+    """Return the key of the scene that sets the number of samples."""
+    if model.slide.kind == "file":
+        return "slide.file"
+    return "accuracy.steps_per_cycle" if model.accuracy.steps_per_cycle else "slide.cycles"
 
 
 def groups(model) -> dict:

@@ -11,12 +11,16 @@ from ...mesh.nested import finer, plan_of
 from ...model.model import Model
 from ...model.patch import bars, block_shear
 from ...model.pieces import bodies_of
-from . import skin
+from ..cost import Cost, MemoryPart
+from . import skin, store
 from .grids import LEAST_LEVELS, OTHER, SPENT, base_grids, is_mirrored, node_counts, seconds_of
 from .ladder import meshes_beside
 
-# bytes of packages; per predicted byte of condensing; per node: of pieces beyond the interface, of frames
-PACKAGES, CONDENSED, OUTLINED_NODE, FRAMES_NODE = 2e7, 0.8, 4.6e3, 3.5e3
+PACKAGES = 2e7  # bytes of the packages that pieces import
+CONDENSED = 0.8  # bytes that are taken over those that condensing is predicted to take
+OUTLINED_NODE = 4.6e3  # bytes per node of pieces with cells beyond the interface
+FRAMES_NODE = 3.5e3  # bytes per node of the frames of a motion
+STRIP_NODE = 3000.0  # bytes per strip and node of the interface
 TIGHT_TOL = 2e-3  # tolerance below which a contact that ends inside, or over a jump, is expected to take a level more
 FULL = 0.7  # of the tilt at which bars open: elastic pieces, seen at height/length 0.08 to 4, open from 0.77 on
 
@@ -74,34 +78,40 @@ def _expected_levels(asked, tolerance: float) -> list:
     return levels
 
 
-def sizes(found: Sizes) -> dict:
-    """Sizes of a patch of such grids by name: interface points, and about how many elastic unknowns."""
-    return {"interface_points": found.points, "elastic_unknowns_about": int(2 * found.nodes)}
+def cost(model: Model) -> Cost:
+    """Return the cost of pressing the patch of a model, and those of its interfaces; equal ones are pressed once."""
+    tolerance = model.accuracy.tolerance
+    total = Cost() if model.patch is None else pressing_cost(model.patch, model.patch.mesh_tolerance or tolerance)
+    faces = {} if model.rig is None else {
+        store.content_key(one.patch): one.patch for one in model.rig.interfaces if one.patch is not None}
+    for patch in faces.values():
+        total += pressing_cost(patch, tolerance)
+    patches = [*faces.values()] if model.patch is None else [model.patch]
+    if not patches:
+        return total
+    points = total.sizes["interface_points"]
+    strips = max(patch.strips[0] if patch.strips else 1 for patch in patches)
+    key = "contact.mesh" if any(patch.mesh for patch in patches) else "contact.element_size"
+    parts = (MemoryPart(total.bytes, f"{points} nodes of the interface", key),
+             MemoryPart(STRIP_NODE * strips * points, f"{strips} strips of them", "contact.strips.count"))
+    return replace(total, parts=parts)
 
 
-def effort(asked, found: Sizes, tolerance: float) -> tuple:
-    """(seconds, bytes) of pressing a `PatchModel` on such grids and of its fields, besides the program itself.
+def pressing_cost(asked, tolerance: float) -> Cost:
+    """Return the cost of pressing one `PatchModel`, and of its fields.
 
-    Both follow from the work of condensing the grids, which is known from their sizes; what a unit of it takes, with
-    the fields and files of the finest grid, was measured over random patches.
+    The work of condensing its grids is known from their sizes; what a unit of it takes, with the fields and the files
+    of the finest grid, was measured over random patches.
     """
-    seconds = rates.PRESSED + (rates.OUTLINED if found.outlined else rates.CONDENSED) * found.seconds
+    found = expected_grids(asked, tolerance)
+    per_second = rates.OUTLINED if found.outlined else rates.CONDENSED
+    times = {"pressing": rates.PRESSED - rates.FIELDS, "condensing": per_second * found.seconds, "fields": rates.FIELDS}
     size = PACKAGES + (OUTLINED_NODE * found.nodes if found.outlined else CONDENSED * found.bytes)
     if not asked.still:
-        seconds, size = seconds + _frames(found), size + FRAMES_NODE * found.nodes
-    return seconds, size
-
-
-def spared(asked, tolerance: float) -> tuple:
-    """(seconds of condensing the pieces of a `PatchModel`, seconds of its fields and of the frames of its motion): what
-    of `effort` the cases of a sweep with the same pieces share, and what a case of a sweep does not make."""
-    found = expected_grids(asked, tolerance)
-    condensed = (rates.OUTLINED if found.outlined else rates.CONDENSED) * found.seconds
-    return condensed, rates.FIELDS + (0.0 if asked.still else _frames(found))
-
-
-def _frames(found: Sizes) -> float:
-    return rates.MOVING + rates.MOVING_NODE * found.nodes
+        times["fields"] += rates.MOVING + rates.MOVING_NODE * found.nodes
+        size += FRAMES_NODE * found.nodes
+    sizes = {"interface_points": found.points, "elastic_unknowns_about": int(2 * found.nodes)}
+    return Cost(times, (MemoryPart(size, "pieces"),), sizes=sizes)
 
 
 def chain(asked) -> dict:

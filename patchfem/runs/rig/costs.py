@@ -5,14 +5,17 @@ each. A spring that an element holds by rings on, which costs pieces only while 
 friction limit exceeds the push of the drive, hardly any where it is half of it.
 """
 
+from dataclasses import replace
 from functools import lru_cache
 from math import inf, log2, pi, sqrt
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ... import rates
+from ... import compiled, rates
 from ...core import Missing
+from ...dynamics import resume
+from ...dynamics.events import cost as events_cost
 from ...dynamics.events import plant
 from ...effects import has
 from ...friction import record
@@ -21,6 +24,7 @@ from ...friction.laws import stretch
 from ...model import patch as patch_model
 from ...model.model import Model
 from ...structure.drive_sizes import fastest, largest, omega_of, sinusoidal, slowest
+from ..cost import EVENT_CODE, LINEAR_CODE, SMOOTH_CODE, Cost, MemoryPart
 
 if TYPE_CHECKING:
     from ...friction.protocol import Element
@@ -38,6 +42,35 @@ REPEATS = 30.0  # times of decay of the slowest mode, after which a motion is se
 MORE = 3.5  # times the steps of a march, of which more are not worth their digits: a step costs less than one of it
 EASES = 9.0  # steps of a stiff law of the speed per cycle, over those of one that holds: .5 at r = 1.07, .1 at 1.26
 STABLE = 3.0  # times the length over which a state of a law relaxes, in a step
+RESAMPLED = ("exact", "piecewise", "smooth")  # engines that keep SAMPLES of each of the last cycles, not their steps
+SAMPLES = 400  # of a kept cycle, of `dynamics.events.histories` and `dynamics.smooth`
+TURNS = 4.0  # turns a cycle that are kept from before the last cycles
+
+
+class HistoryBytes(NamedTuple):
+    """Memory of the histories of an engine.
+
+    Attributes
+    ----------
+    sample : float
+        Bytes per number of a kept sample: the window, the response and what is read off it. Random records of 4e5 to
+        2e6 samples took 0.8 to 1.2 of this.
+    cycle : float
+        Bytes per cycle of a run: extremes, phasors and places of all cycles, of the run and of its coarser runs. Single
+        modes over 1e6 to 1e7 cycles took 0.8 to 1.3 of this.
+    turn : float
+        Bytes per number of a turn that is kept from before the last cycles. Runs of 1e5 to 1e6 cycles took 0.8 to 1.5
+        of this.
+    """
+
+    sample: float
+    cycle: float
+    turn: float
+
+
+EVENT_HISTORY = HistoryBytes(32.0, 85.0, 6.0)
+SMOOTH_HISTORY = HistoryBytes(80.0, 140.0, 16.0)
+MARCH_HISTORY = HistoryBytes(45.0, 50.0, 18.0)
 
 
 def steps_wanted(model: Model) -> int:
@@ -166,9 +199,49 @@ def refuse_endless(model: Model, numerics=None) -> None:
                       f'of modes and elements{march}', "")
 
 
-def exact_cost(model: Model, numerics, unknowns: dict) -> tuple:
-    """Pieces and seconds of a run from event to event."""
-    return int(pieces_per_cycle(model) * numerics.cycles), expected_seconds(model)
+def exact_cost(model: Model, numerics, points: int) -> Cost:
+    """Return the cost of a run from event to event."""
+    steps = int(pieces_per_cycle(model) * numerics.cycles)
+    times = {"motion": expected_seconds(model), "histories": rates.KEPT_EVENT_SAMPLE * kept_samples(numerics)}
+    code = EVENT_CODE if model.rig.interfaces else LINEAR_CODE
+    if _python_seconds(model) <= compiled.PATIENCE:
+        # without machine code such a run takes 86 MB; with it 152 MB, because it loads the library of LLVM
+        loading = replace((code if _is_loop_kept(model) else code._replace(bytes=0.0)).cost(), compile_seconds=0.0)
+    else:
+        loading = code.cost()
+    return Cost(times, history_parts(model, numerics, EVENT_HISTORY), (), steps) + loading
+
+
+def _python_seconds(model: Model) -> float:
+    """Return the CPU seconds of a run from event to event as Python, with all cells of a density."""
+    count, stiffness = expected_elements(model)
+    each = events_cost.python_seconds(model.rig.modes, model.rig.drive, stiffness, count if stiffness else 0)
+    return model.rig.cycles * each * 2 ** pairs_of(model)
+
+
+def _is_loop_kept(model: Model) -> bool:
+    """Return whether machine code of the loop from event to event is kept for the modes of a rig."""
+    from ...dynamics.events.histories import is_loop_kept  # a plan does not load the engine otherwise
+
+    return is_loop_kept(model.rig.modes, model.rig.drive)
+
+
+def kept_samples(numerics) -> float:
+    """Return how many samples of the last cycles a run keeps."""
+    each = SAMPLES if numerics.engine in RESAMPLED else numerics.steps
+    return float(max(2, numerics.window) * each)
+
+
+def history_parts(model: Model, numerics, history: HistoryBytes) -> tuple[MemoryPart, ...]:
+    """Return the memory of the last cycles and of what is kept of all others."""
+    rig, samples = model.rig, kept_samples(numerics)
+    width = 2.0 * len(rig.frequencies) + 12 + 6 * len(rig.interfaces)
+    length_key = "drive.duration" if rig.waveform.is_random else "drive.cycles"
+    key = "accuracy.steps_per_cycle" if model.accuracy.steps_per_cycle else length_key
+    turns = min(TURNS * rig.cycles, resume.MOST_KEPT)
+    early = history.cycle * rig.cycles + history.turn * width * turns
+    return (MemoryPart(history.sample * width * samples, f"{samples:.0f} samples of the last cycles", key),
+            MemoryPart(early, f"the histories of {rig.cycles:.3g} cycles", length_key))
 
 
 def exact_words(model: Model, engine: str) -> list:
@@ -240,10 +313,12 @@ def clings(model: Model, element: "Element") -> float:
     return min(1.0, float(np.exp(EASES * (1 - r))))
 
 
-def smooth_cost(model: Model, numerics, unknowns: dict) -> tuple:
-    """Steps of all runs of high order, and their seconds."""
+def smooth_cost(model: Model, numerics, points: int) -> Cost:
+    """Return the cost of all runs of high order."""
     rig, cycles = model.rig, model.rig.cycles
     if sinusoidal(rig.drive) and (decay := slowest(rig.modes) * rig.drive.period) > 0:  # then it repeats
         cycles = min(cycles, 20 + REPEATS / decay)
     steps = 2 * cycles * smooth_steps(model, smooth_element(model))
-    return int(steps), rates.SMOOTH + rates.SMOOTH_STEP * steps
+    times = {"motion": rates.SMOOTH + rates.SMOOTH_STEP * steps,
+             "histories": rates.KEPT_SAMPLE * kept_samples(numerics)}
+    return Cost(times, history_parts(model, numerics, SMOOTH_HISTORY), (), int(steps)) + SMOOTH_CODE.cost()

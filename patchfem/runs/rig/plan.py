@@ -7,20 +7,32 @@ import numpy as np
 
 from ... import rates
 from ...core import PatchfemError
+from ...dynamics.march import capacity
 from ...effects import LAWS, has
 from ...friction.bonds import parameters
 from ...model.model import Model
 from ...response.rows import of_first, of_number
 from ...slip import shear_modes
 from ...structure.drive_sizes import largest, omega_of
+from ..cost import (
+    BALANCE_CODE,
+    EVENT_CODE,
+    MARCH_CODE,
+    SHEAR_MARCH_CODE,
+    Cost,
+    EngineCode,
+    MemoryPart,
+)
 from . import lists
-from .costs import exact_words, ringing_and_events, steps_per_cycle
+from .costs import MARCH_HISTORY, exact_words, history_parts, kept_samples, ringing_and_events, steps_per_cycle
 from .engines import ENGINES, PIECES, steady_by
 from .numerics import choose
 
-OF_EVENTS = "exact", "piecewise"  # engines whose loop runs as Python where it is over soon
-RESAMPLED = *OF_EVENTS, "smooth"  # engines whose last cycles are kept at SAMPLES instants each, not at their steps
-SAMPLES = 400  # of a kept cycle, of `dynamics.events.histories` and `dynamics.smooth`
+MODE_PAIR = 125.0  # bytes per pair of coordinates: matrices, shapes and what diagonalises them
+HARMONIC_PAIR = 94.0  # bytes per pair of sines and cosines of a balance: its Jacobian and the factors of its error
+MODE_NODE = 24.0  # bytes per shear mode and node of the interface
+DRIVE_ROW = 400.0  # bytes per row of a recorded drive
+STEADY_CODES = {"exact": EVENT_CODE, "piecewise": EVENT_CODE, "harmonic": BALANCE_CODE, "march": None}
 CURVE = 160, 250  # points over a frequency, with those that its bends and its peak ask for: by a map, by a balance
 MARCHED = 400.0  # cycles of the marches until a motion repeats, of all steps
 RESONANT = 0.02  # of the frequency of a mode, within which a sine drives it at resonance
@@ -74,47 +86,71 @@ def modes_of(rig, chain: dict) -> list:
     return out
 
 
-def cost(model: Model, per_point: bool, unknowns: dict) -> tuple:
-    """Engine, steps of all passes and seconds of a coupled run; sizes that are foreseen go into `unknowns`."""
-    numerics = choose(model, per_point)
+def cost(model: Model, per_point: bool, points: int) -> Cost:
+    """Return the cost of a coupled run.
+
+    Parameters
+    ----------
+    model : Model
+    per_point : bool
+        Whether bonds are followed at every node.
+    points : int
+        Nodes of the interface, 1 without a patch.
+    """
+    rig, numerics = model.rig, choose(model, per_point)
     engine = ENGINES[numerics.engine]
-    steps, seconds = engine.call("cost", model, numerics, unknowns)
-    if not engine.steady:
-        seconds += kept_samples(numerics) * rates.KEPT_SAMPLE[numerics.engine in OF_EVENTS]
-    return numerics.engine, steps, seconds
+    count = len(rig.frequencies)
+    rows = len(getattr(rig.drive, "breaks", ())) if not rig.drive.segments else 0
+    rows_key = "drive.file" if "file" in rig.waveform.required_keys else "drive.duration"
+    structure = MemoryPart(MODE_PAIR * count**2, f"{count} modes", "structure")
+    drive = MemoryPart(DRIVE_ROW * rows, f"{rows} rows of the drive", rows_key)
+    words = tuple(engine.call("words", model, numerics)) if model.friction is not None else ()
+    whole = Cost(parts=(structure, drive), words=words, sizes={"modes": count}, engine=engine.name)
+    return whole + engine.call("cost", model, numerics, points)
 
 
-def kept_samples(numerics) -> float:
-    """Samples of the last cycles that a run keeps."""
-    each = SAMPLES if numerics.engine in RESAMPLED else numerics.steps
-    return float(max(2, numerics.window) * each)
-
-
-def march_cost(model: Model, numerics, unknowns: dict) -> tuple:
-    """Steps of a march and its coarser runs, and their seconds."""
+def march_cost(model: Model, numerics, points: int) -> Cost:
+    """Return the cost of a march with its coarser runs."""
     rig, f, soft = model.rig, model.friction, bool(model.soft)
     steps = int(numerics.cycles * numerics.steps)
-    each, points = _step(rig, f), unknowns.get("interface_points", 1)
-    if model.grooves is not None:
-        each = _of_modes(numerics, points, unknowns, True) if soft else rates.CLIMB
-    elif f is not None and has(f.law, "bonds"):
-        if lists.quadrature_of(model, numerics).engine != "recursion":
-            entries, seconds = lists.bonds_cost(model, numerics)
-            each, unknowns["bond_list_about"] = seconds / steps, int(entries)
-        elif soft:
-            each += _of_modes(numerics, points, unknowns, rig.load_varies)
-        elif numerics.per_point:
-            each = rates.FIELD_NODE * points
-    elif soft and rig.load_varies:
-        each = _of_modes(numerics, points, unknowns, True)
-    elif soft:
-        each = rates.SLIP_NODE * points + rates.LIST_STEP
-    elif rig.soft:
-        each += rates.SLIP_NODE * points
-    elif rig.load_varies and model.patch is not None:
-        each = rates.PRESSING_STEP + rates.PRESSING_NODE * points
+    is_bonds = model.grooves is None and f is not None and has(f.law, "bonds")
+    sizes, parts, modes = {}, [], 0
+    if is_bonds and lists.quadrature_of(model, numerics).engine != "recursion":
+        entries, seconds = lists.bonds_cost(model, numerics)
+        each, sizes["bond_list_about"] = seconds / steps, int(entries)
+        parts.append(MemoryPart(capacity.most_bytes(int(entries)), "the list of bonds", "accuracy.tail"))
+    elif soft and (is_bonds or model.grooves is not None or rig.load_varies):
+        sizes["shear_modes"] = modes = numerics.shear_modes or shear_modes.SHEAR_MODES
+        each = rates.behind_modes(points, modes, rig.load_varies or model.grooves is not None)
+        each += _step(rig, f) if is_bonds else 0.0
+        parts.append(MemoryPart(MODE_NODE * modes * points, f"{modes} shear modes", "accuracy.shear_modes"))
+    else:
+        each = _step_without_modes(model, numerics, points, is_bonds)
     passes = 0.75 + 2**(lists.halvings(model) + 1) - 1  # a half and a quarter of the steps, and each halving of them
-    return int(steps * passes), steps * passes * each
+    times = {"motion": steps * passes * each, "histories": rates.KEPT_SAMPLE * kept_samples(numerics)}
+    parts += history_parts(model, numerics, MARCH_HISTORY)
+    return Cost(times, tuple(parts), (), int(steps * passes), sizes) + march_code(model).cost()
+
+
+def march_code(model: Model) -> EngineCode:
+    """Return the compiled code of a march."""
+    return SHEAR_MARCH_CODE if model.soft else MARCH_CODE
+
+
+def _step_without_modes(model: Model, numerics, points: int, is_bonds: bool) -> float:
+    """Return the seconds of a step of a march without shear modes and without a list of bonds."""
+    rig, step = model.rig, _step(model.rig, model.friction)
+    if model.grooves is not None:
+        return rates.CLIMB
+    if is_bonds:
+        return rates.FIELD_NODE * points if numerics.per_point else step
+    if model.soft:
+        return rates.SLIP_NODE * points + rates.LIST_STEP
+    if rig.soft:
+        return step + rates.SLIP_NODE * points
+    if rig.load_varies and model.patch is not None:
+        return rates.PRESSING_STEP + rates.PRESSING_NODE * points
+    return step
 
 
 def _step(rig, f) -> float:
@@ -123,12 +159,6 @@ def _step(rig, f) -> float:
     grows = f is not None and f.slip_growth is not None and has(f.law, "bonds")
     return (rates.BOND_STEP + rates.STEP_MODE * (len(rig.frequencies) - 1)) * (rates.GROWS if grows else 1.0) * (
         rates.JOINT * faces if faces > 1 else 1.0)
-
-
-def _of_modes(numerics, points: int, unknowns: dict, load_varies: bool) -> float:
-    """Seconds of a step behind shear modes, whose number goes into `unknowns`."""
-    unknowns["shear_modes"] = numerics.shear_modes or shear_modes.SHEAR_MODES
-    return rates.behind_modes(points, unknowns["shear_modes"], load_varies)
 
 
 def groups(model: Model) -> dict:
@@ -201,14 +231,6 @@ def _sliding(d: float) -> str:
     return f"D = {d:.3g} is below pi/4: at resonance friction alone does not limit the amplitude"
 
 
-def sum_words(model: Model) -> list:
-    """Sentences on how the engine of a rig takes its law."""
-    if model.friction is None:
-        return []
-    numerics = choose(model)
-    return ENGINES[numerics.engine].call("words", model, numerics)
-
-
 def steady_words(model: Model, numerics) -> list:
     """The sentence on how a steady motion is found."""
     return [f"the steady motion is found by {steady_by(model).words}"]
@@ -247,17 +269,21 @@ def _held_words(model: Model) -> str:
             "list of bonds becomes longer in every time step")
 
 
-def steady_cost(model: Model, numerics, unknowns: dict) -> tuple:
-    """Points of a curve of steady motions and the seconds that they take, those of coarser runs and of one with more
-    modes of a reduced structure among them."""
-    rig, by = model.rig, steady_by(model).name
-    points = CURVE[by == "balance"] if rig.waveform.is_swept else max(1, len(rig.levels))
-    soft = [one for one in rig.interfaces if one.soft or model.soft] if by == "yields" else ()
+def steady_cost(model: Model, numerics, points: int) -> Cost:
+    """Return the cost of a curve of steady motions, with its coarser runs and the run with more modes of a reduced
+    structure."""
+    rig, finder = model.rig, steady_by(model)
+    places = CURVE[finder.name == "balance"] if rig.waveform.is_swept else max(1, len(rig.levels))
+    soft = [one for one in rig.interfaces if one.soft or model.soft] if finder.name == "yields" else ()
     passes = 1.0 + 0.5 * len(soft)  # a coarser mesh of each has half the elements
-    seconds = points * passes * _steady_point(model, by)
+    seconds = places * passes * _steady_point(model, finder.name)
     if rig.richer is not None:
-        seconds += points * _steady_point(replace(model, rig=rig.richer), by)
-    return points, seconds
+        seconds += places * _steady_point(replace(model, rig=rig.richer), finder.name)
+    harmonics = model.accuracy.harmonics or 0
+    balance = HARMONIC_PAIR * (2.0 * harmonics * max(1, len(rig.interfaces))) ** 2
+    parts = (MemoryPart(balance, f"{harmonics} harmonics", "accuracy.harmonics"),)
+    code = STEADY_CODES[finder.like] or march_code(model)
+    return Cost({"motion": seconds}, parts, (), places) + code.cost()
 
 
 def _steady_point(model: Model, by: str) -> float:

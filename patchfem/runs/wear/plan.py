@@ -6,6 +6,7 @@ from ...core import PatchfemError
 from ...model.patch import bars
 from ...structure.drive_sizes import largest, omega_of
 from ...wear.jumps import Wearing, after, start
+from ..cost import Cost
 from .evolve import next_row
 
 PRESSED = 20  # contact solves in a jump with its corrections
@@ -89,18 +90,22 @@ def _anew(model) -> bool:
     return bool(model.soft) or model.side == "lower" or model.grooves is not None or model.wear.friction is not None
 
 
-def cost(model, points: int, motion: float) -> float:
-    """Seconds of all jumps on a patch of so many interface points; motion: of the march or the bench with its coarser
-    runs, of which a jump takes one."""
-    again, asked = AGAIN * motion if _anew(model) else 0.0, model.patch.strips
-    pressings = PRESSED if asked is None else max(PRESSED, FEWER * asked[0])
-    return jumps_about(model) * (pressings * SOLVE * points**2 + 5e-3 + again)
+def cost(model, points: int, motion: float) -> Cost:
+    """Return the cost of all jumps.
 
-
-def verdict(model) -> str:
-    """A sentence on the jumps and on what they share."""
-    motion = "with the motion computed again after each jump" if _anew(model) else \
-        "with the motion computed only once, because wear does not change it"
-    many = f"{model.wear.jumps} jumps" if model.wear.jumps else (f"about {jumps_about(model)} jumps (the run chooses "
-                                                                 "their number)")
-    return f"wear: {model.wear.cycles:.6g} cycles in {many} {motion}"
+    Parameters
+    ----------
+    model : Model
+    points : int
+        Nodes of the interface.
+    motion : float
+        CPU seconds of the march or of the bench with its coarser runs, of which a jump takes one.
+    """
+    jumps, strips = jumps_about(model), model.patch.strips
+    again = AGAIN * motion if _anew(model) else 0.0
+    pressings = PRESSED if strips is None else max(PRESSED, FEWER * strips[0])
+    seconds = jumps * (pressings * SOLVE * points**2 + 5e-3 + again)
+    number = f"{jumps} jumps" if model.wear.jumps else f"about {jumps} jumps (the run chooses their number)"
+    once = "with the motion computed only once, because wear does not change it"
+    shared = "with the motion computed again after each jump" if _anew(model) else once
+    return Cost({"wear": seconds}, words=(f"wear: {model.wear.cycles:.6g} cycles in {number} {shared}",))
