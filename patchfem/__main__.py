@@ -96,6 +96,9 @@ SCREEN = {
 VERBS = {verb: row[0] for verbs in SCREEN.values() for verb, row in verbs.items()}
 
 REMOVED_OPTIONS = {  # (verb, option): what to do in its place
+    ("profile", "--level"): "read the material ratio of a level from the Abbott curve of the page (-o)",
+    ("profile", "--ratios"): "read the heights of two material ratios from the Abbott curve of the page (-o)",
+    ("profile", "--tip"): "compare the tip radius with 1/rms_curvature, which profile prints",
     ("sweep", "--device"): "batches of cases run on the processor; share them by -j N or --executor dask",
     ("report", "--measured"): "convert the file with `patchfem import FILE -o table.csv` and plot table.csv together "
                               "with result.nc of the run in a plotting program"}

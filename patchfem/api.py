@@ -36,6 +36,7 @@ from .export.pages import lead, released, words
 from .export.surfaces import compare as compared_data
 from .export.surfaces import pairs as pairs_data
 from .export.surfaces import roughness, worn
+from .export.surfaces.worn_runs import compare_runs
 from .export.sweeps import folder, page, tables
 from .export.sweeps import run as sweep_run
 from .mesh import files as mesh_files
@@ -352,21 +353,21 @@ def _words(given: str | Iterable[str], what: str) -> tuple:
 
 
 def profile(*files: str | Path, cutoff: float | str | None = None, window: Iterable | None = None,
-            tip: float | str | None = None, units: tuple[str, str] | None = None) -> dict[str, Any]:
+            units: tuple[str, str] | None = None) -> dict[str, Any]:
     """Compute the roughness of measured traces or areal scans: the dict of `patchfem profile --json`, in SI.
 
     cutoff: wavelength that separates roughness from waviness. window: first and last position; for a scan those in x
-    first. tip: tip radius of the stylus. Each is in m or a text such as "0.25 mm". units: units of x and z for files
-    that give none. The dict has `profiles` with an entry per file and `means` over all files. Raises PatchfemError for
-    a file that cannot be read and for invalid lengths.
+    first. Each is in m or a text such as "0.25 mm". units: units of x and z for files that give none. The dict has
+    `profiles` with an entry per file and `means` over all files. Raises PatchfemError for a file that cannot be read
+    and for invalid lengths.
     """
-    asked = {"cutoff": _metres(cutoff, "profile: cutoff"), "tip": _metres(tip, "profile: tip"), "window": None}
+    asked = {"cutoff": _metres(cutoff, "profile: cutoff"), "window": None}
     if window is not None:
         listed = window.split(",") if isinstance(window, str) else window if isinstance(window, Iterable) else [window]
         asked["window"] = tuple(_metres(one, "profile: window") for one in listed)
-    for name in ("cutoff", "tip"):
-        if asked[name] is not None and not 0 < asked[name] < float("inf"):
-            raise PatchfemError(f"profile: {name}: a length above zero is needed, not {asked[name]:g} m")
+    length = asked["cutoff"]
+    if length is not None and not 0 < length < float("inf"):
+        raise PatchfemError(f"profile: cutoff: a length above zero is needed, not {length:g} m")
     reports = [roughness_report.report_of(surfaces.read_surface(_path(one, "profile"), units), **asked)
                for one in files]
     return {"profiles": [roughness.data_of(one) for one in reports], "means": roughness.means_data(reports)}
@@ -474,7 +475,7 @@ def compare(*files: str | Path, direction: str = "", units: tuple[str, str] | No
     if pairs is None and len(files) > 1 and any(Path(one).is_dir() for one in files):
         if len(files) > 2 or direction or units is not None or shift is not None or keep_spikes or datum:
             raise PatchfemError("compare: give two results folders alone, without other files or settings of traces")
-        lost = worn.lost(*map(Path, files))
+        lost = compare_runs(*map(Path, files))
         return worn.data_of(lost, worn.verdict(lost))
     if pairs is None:
         return compared_data.data_of(*verdict.judged(files, direction, **how))

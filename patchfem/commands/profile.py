@@ -17,14 +17,8 @@ def profile(file: Path, /, *more: Path,
             form: word("form to subtract first: a polynomial, given by its degree from 1 (line or plane) to 9, such "
                        "as 2; or `cylinder`") = "1",
             s_filter: word('wavelength of the S-filter, such as "2.5 um"; shorter waves are removed first') = "",
-            level: word('height above the mean line at which the material ratio is computed, such as "0.5 '
-                        'um"') = "0 um",
-            ratios: word('two material ratios in percent, such as "10,90"; the height difference between them is '
-                         'computed') = "10,90",
             window: word('part to evaluate, between two positions such as "468 um,733 um"; a scan needs four '
                          'positions, first the two in x, then the two in y') = "",
-            tip: word('radius of the stylus tip, for a check whether the tip reaches the valleys, such as "12.5 '
-                      'um"') = "",
             units: Units = "",
             out: out_in("folder for a page, a table of the parameters and the levelled heights, such as "
                         "out/trace") = None, json_: Json = False,
@@ -35,16 +29,15 @@ def profile(file: Path, /, *more: Path,
     Example: patchfem profile trace.csv --cutoff "0.25 mm"
     """
     asked = {"window": _window(window) if window else None}
-    for name, text in (("cutoff", cutoff), ("tip", tip), ("s-filter", s_filter)):
-        asked[name] = quantity(text, "length", f"profile --{name}")
-        if asked[name] is not None and asked[name] <= 0:
+    for key, name, text in (("cutoff", "cutoff", cutoff), ("short", "s-filter", s_filter)):
+        asked[key] = quantity(text, "length", f"profile --{name}")
+        if asked[key] is not None and asked[key] <= 0:
             raise Refused(f"profile --{name} {text}: a length above zero is needed")
-    asked["settings"] = roughness_report.Settings(forms.form_of(form), asked.pop("s-filter"),
-                                                  quantity(level, "length", "profile --level"), _ratios(ratios))
+    asked["form"] = forms.parse_form(form)
     reports = [roughness_report.report_of(read.read_surface(path, pair(units)), **asked) for path in (file, *more)]
     for report in reports:
         if not json_:
-            print("\n".join(roughness.lines_of(report, verbose)))
+            print("\n".join(roughness.lines_of(report, verbose=verbose)))
         for text in report.notes:
             note(text)
     if not json_ and len(reports) > 1:
@@ -61,16 +54,6 @@ def profile(file: Path, /, *more: Path,
         print(json.dumps(answer, ensure_ascii=False, allow_nan=False))
     elif out is not None:
         print(f"results: {out}")
-
-
-def _ratios(text: str) -> tuple:
-    try:
-        first, second = (float(one.strip().removesuffix("%")) / 100 for one in text.split(","))
-    except ValueError:
-        first, second = 1.0, 0.0
-    if not 0 <= first < second <= 1:
-        raise Refused(f"profile --ratios '{text}': two rising percentages are needed, such as '10,90'")
-    return first, second
 
 
 def _window(text: str) -> tuple:

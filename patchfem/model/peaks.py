@@ -6,7 +6,7 @@ from pathlib import Path
 from ..core import PatchfemError
 from ..scene.keys.contact import Asperities
 from ..surface.files.read import read_profile
-from ..surface.roughness.peaks import Moments, Told, peaks_of, told_by
+from ..surface.roughness.peaks import Moments, TraceMoments, gaussian_peaks, trace_moments
 
 AT = "contact.asperities."
 
@@ -22,13 +22,13 @@ def skin_asked(table: Asperities, beside, cutoff: float | None = None) -> Asperi
         table = table.model_copy(update={"from_": str(beside(table.from_)), "cutoff": cutoff, **{
             f"rms_{name}": one for name, one in found._asdict().items()}})
     try:
-        one = peaks_of(Moments(table.rms_height, table.rms_slope, table.rms_curvature))
+        one = gaussian_peaks(Moments(table.rms_height, table.rms_slope, table.rms_curvature))
     except PatchfemError as error:
         raise PatchfemError(str(error), f"{AT}from" if table.from_ else f"{AT}rms_height") from None
     return table.model_copy(update={"radius": one.radius, "density": one.density, "height_deviation": one.deviation})
 
 
-def of_trace(path: Path, cutoff: float | None = None) -> Told:
+def of_trace(path: Path, cutoff: float | None = None) -> TraceMoments:
     """What the waves below a cut-off [m] of the trace in a file tell, None: all waves; a file is read once.
     PatchfemError with the key for one that has no peaks of a surface."""
     try:
@@ -39,7 +39,7 @@ def of_trace(path: Path, cutoff: float | None = None) -> Told:
 
 
 @lru_cache(maxsize=4)
-def _read(path: Path, stamp: int, cutoff: float | None) -> Told:
-    found = told_by(read_profile(path), cutoff)
-    peaks_of(found.fine)
+def _read(path: Path, stamp: int, cutoff: float | None) -> TraceMoments:
+    found = trace_moments(read_profile(path), cutoff)
+    gaussian_peaks(found.fine)
     return found

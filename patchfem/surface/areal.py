@@ -17,8 +17,7 @@ BILAPLACE = ((8 / 20, CROSS), (-2 / 20, ((1, 1), (1, -1), (-1, 1), (-1, -1))),
 class Areal:
     """Heights z (m, n) [m] at x (n,) [m] along a row and y (m,) [m] along a column, NaN where none was measured.
 
-    x and y increase. source: a name of the scan for messages; notes: what was done to it on the way, one sentence each;
-    tip_radius: of the stylus [m], None where the file does not tell it.
+    x and y increase. source: a name of the scan for messages; notes: what was done to it on the way, one sentence each.
     """
 
     x: np.ndarray
@@ -26,7 +25,6 @@ class Areal:
     z: np.ndarray
     source: str
     notes: tuple = ()
-    tip_radius: float | None = None
 
     @property
     def missing(self) -> np.ndarray:
@@ -49,8 +47,7 @@ class Areal:
         return k
 
     def _trace(self, along, heights, name: str) -> Profile:
-        return Profile(frozen_array(along), frozen_array(heights), f"{self.source}, {name}", self.notes,
-                       self.tip_radius)
+        return Profile(frozen_array(along), frozen_array(heights), f"{self.source}, {name}", self.notes)
 
 
 def filled(z, missing) -> np.ndarray:

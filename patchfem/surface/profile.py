@@ -19,14 +19,13 @@ class Profile:
     them.
 
     source: a name of the trace for messages; notes: what was done to it on the way, one sentence each, for the
-    warnings; tip_radius: of the stylus [m], None where the file does not tell it.
+    warnings.
     """
 
     x: np.ndarray
     z: np.ndarray
     source: str
     notes: tuple = ()
-    tip_radius: float | None = None
 
     @property
     def missing(self) -> np.ndarray:

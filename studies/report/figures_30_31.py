@@ -45,8 +45,9 @@ from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.export.surfaces.compare import write_trace
 from patchfem.surface.compare.compare import compared, directions_of
 from patchfem.surface.compare.verdict import changed, verdicts
-from patchfem.surface.profile import Profile
-from patchfem.surface.roughness.report import interval_of
+from patchfem.surface.profile import Profile, level
+from patchfem.surface.roughness.report import report_of
+from patchfem.surface.roughness.spectrum import BAND, amplitude_of, spectrum_of
 
 HERE = Path(__file__).parent
 QUESTION, ANSWER = told(__doc__)
@@ -98,14 +99,19 @@ def held(sets: list, row) -> int:
                for one in sets for way in (0, 1))
 
 
+def amplitude(trace: Profile) -> float:
+    """Amplitude [m] of the waves of the band."""
+    return amplitude_of(spectrum_of(level(trace).z, bands.STEP), *BAND)
+
+
 def heights(sets: list, when: int) -> np.ndarray:
     """Wave heights (2 sets,) [m] of all traces before (0) or after (1): twice the amplitude of the band."""
-    return np.array([2 * interval_of("band_amplitude", pair[when]).value for one in sets for pair in one.traces])
+    return np.array([2 * amplitude(pair[when]) for one in sets for pair in one.traces])
 
 
 def totals(sets: list, way: int) -> np.ndarray:
     """Total heights Pt (2, sets) [m] of the traces along x (0) or y (1), before and after."""
-    return np.array([[interval_of("Pt", one.traces[way][when]).value for one in sets] for when in (0, 1)])
+    return np.array([[np.ptp(level(one.traces[way][when]).z) for one in sets] for when in (0, 1)])
 
 
 def middle(sets: list) -> Set:
@@ -124,7 +130,7 @@ def picture(sets: list, path: Path) -> Path:
         for when, number, colour in ((0, 30, GREY), (1, 31, BLUE)):
             for way, axis in zip((0, 1), axes[when]):
                 one = middle(sets).traces[way][when]
-                found = interval_of("band_amplitude", one)
+                found = report_of(one)["band_amplitude"]
                 axis.plot(1e3 * one.x, (one.z - one.z.mean()) / UM, color=colour, lw=1)
                 axis.set(xlabel="along the trace [mm]", ylabel="height [um]", xlim=(0, 1.02), ylim=(-24, 24),
                          title=f"Fig. {number}, {('before', 'after')[when]}, along {'xy'[way]}: waves "

@@ -13,7 +13,7 @@ from test_compare_verb import NAMES
 
 import patchfem as pf
 from patchfem.export.surfaces import worn
-from patchfem.export.surfaces.worn import hidden_line, hidden_plane
+from patchfem.export.surfaces.worn_runs import compare_runs, hidden_line, hidden_plane
 
 ROOT = Path(__file__).parents[2]
 GUIDE = ROOT / "patchfem" / "scene" / "GUIDE.md"
@@ -103,7 +103,7 @@ def test_exact_the_verb_says_what_python_says_and_writes_a_page(runs, tmp_path):
     assert found == pf.compare(runs / "half", runs / "worn") == json.loads((tmp_path / "out/compare.json").read_text())
     page = (tmp_path / "out" / "report.html").read_text()
     assert found["verdict"][1:] in page and "Friction loop before" in page and "<script" not in page
-    lost = worn.lost(runs / "half", runs / "worn")
+    lost = compare_runs(runs / "half", runs / "worn")
     table = "\n".join(worn.lines_of(lost, worn.verdict(lost)))
     assert found["verdict"] in table and "worn volume" in table and "pressure peak" in table
 
@@ -111,7 +111,7 @@ def test_exact_the_verb_says_what_python_says_and_writes_a_page(runs, tmp_path):
 @pytest.mark.parametrize("ends, kind", [((0.0, 2.0), "a wedge"), ((2.0, 0.3), "a wedge"), ((1.0, 2.0), "uniform wear "
                                          "with a wedge"), ((2.0, 1.7), "uniform wear"), ((1.0, 1.0), "uniform wear")])
 def test_exact_kinds_of_hidden_wear(ends, kind):
-    assert worn._kind(ends) == kind
+    assert worn.describe_hidden_wear(ends) == kind
 
 
 STORY = re.search(r"in three commands:\n\n```bash\n(.*?)```\n\n((?:> [^\n]*\n)+)", GUIDE.read_text(), re.S)
@@ -189,11 +189,11 @@ def test_exact_a_table_of_results_folders_beside_traces(runs, tmp_path):
 
 
 def test_exact_strips_before_and_after_are_compared_over_x_and_the_width(runs):
-    found, one = pf.compare(runs / "rolled", runs / "rolled_worn"), worn.lost(runs / "rolled", runs / "rolled_worn")
+    found, one = pf.compare(runs / "rolled", runs / "rolled_worn"), compare_runs(runs / "rolled", runs / "rolled_worn")
     volume = found["worn_volume"]
     assert volume["value"] == pytest.approx(PER_CYCLE * MANY, rel=1e-11)
-    assert float((one.depth * one.after.area).sum()) == pytest.approx(volume["value"], rel=1e-11)
-    assert one.depth.shape == (4, one.after.x.size) and one.depth.max() == found["worn_depth_max"]["value"]
+    assert float((one.depth * one.after.surface.area).sum()) == pytest.approx(volume["value"], rel=1e-11)
+    assert one.depth.shape == (4, one.after.surface.x.size) and one.depth.max() == found["worn_depth_max"]["value"]
     assert found["track"] is None and "y = -3.75 mm" in found["sentences"][0]
     hidden = found["hidden_wear"]["value"]
     assert "that a scan alone could not show" in found["verdict"] and 0 < hidden < found["worn_depth_mean"]["value"]

@@ -75,11 +75,10 @@ def test_exact_json_in_si(trace, scan):
 
 def test_exact_the_page_and_its_numbers(trace, tmp_path):
     out = tmp_path / "out"
-    answer = cli("profile", trace, "--cutoff", "0.25 mm", "--tip", "12.5 um", "-o", out)
+    answer = cli("profile", trace, "--cutoff", "0.25 mm", "-o", out)
     assert answer.out.splitlines()[-1] == f"results: {out}"
     page, data = (out / "report.html").read_text(), json.loads((out / "profile.json").read_text())
     assert page.count("<figure>") == 3 == page.count('role="img" aria-label="')
-    assert data["profiles"][0]["tip"]["radius"] == pytest.approx(12.5 * UM)
     assert all(f"<td>{name}</td>" in page for name in data["profiles"][0]["measures"])
     assert "http" not in page.replace("http://www.w3.org", "")
 
@@ -109,7 +108,9 @@ def test_exact_means_over_files_a_table_of_them_and_the_levelled_heights(tmp_pat
 @pytest.mark.parametrize("words, says", [
     (("--cutoff", "0.25"), "patchfem: profile --cutoff: '0.25' is a bare number without a unit"),
     (("--cutoff", "-1 mm"), "patchfem: profile --cutoff -1 mm: a length above zero is needed"),
-    (("--tip", "0 um"), "patchfem: profile --tip 0 um: a length above zero is needed"),
+    (("--tip", "5 um"), "patchfem: profile --tip was removed in patchfem 1.0; compare the tip radius with"),
+    (("--level=1 um",), "patchfem: profile --level was removed in patchfem 1.0; read the material ratio"),
+    (("--ratios", "5,50"), "patchfem: profile --ratios was removed in patchfem 1.0; read the heights of two"),
     (("--cutoff", "5 mm"), "the trace is 4 mm long; half a cut-off of 5 mm is trimmed at each end"),
     (("--window", "1 mm"), "--window '1 mm': two positions are needed, such as '468 um,733 um'; a scan needs four"),
     (("--window", "1 mm,9 mm"), "the window runs from 1 mm to 9 mm, but the trace runs from 0 um to 4 mm"),

@@ -72,7 +72,7 @@ def means(kind: str) -> dict:
     """Mean of every parameter over the others, by name: no interval is worked out."""
     from patchfem.surface.profile import level
     from patchfem.surface.roughness import rows
-    from patchfem.surface.roughness.filter import filtered
+    from patchfem.surface.roughness.filter import filter_trace
     from patchfem.surface.roughness.parameters import Heights
     from patchfem.surface.roughness.spectrum import BAND, amplitude_of, spectrum_of
 
@@ -80,11 +80,11 @@ def means(kind: str) -> dict:
     for seed in range(FIRST, FIRST + OTHERS):
         one = level(trace(kind, seed))
         heights = Heights(one.z, STEP)
-        rough = Heights(filtered(one, CUTOFF)[1].z, STEP, CUTOFF)
+        rough = Heights(filter_trace(one, CUTOFF)[1].z, STEP, CUTOFF)
         spectrum = spectrum_of(one.z, STEP)
         for row, of in [*((row, heights) for row in rows.PRIMARY), *((row, rough) for row in rows.ROUGH)]:
-            if row.of is not None:
-                found[row.name].append(row.of(of))
+            if row.compute is not None:
+                found[row.name].append(row.compute(of))
         found["band_amplitude"].append(amplitude_of(spectrum, *BAND))
         found["dominant_wavelength"].append(spectrum.dominant)
     return {name: float(np.mean([one for one in values if one is not None])) for name, values in found.items()

@@ -10,7 +10,7 @@ from patchfem.surface.areal import Areal, level_plane
 def scan(z, notes=("one",)) -> Areal:
     rows, columns = z.shape
     return Areal(frozen_array(1e-3 + 5e-6 * np.arange(columns)), frozen_array(-2e-3 + 7e-6 * np.arange(rows)),
-                 frozen_array(z), "scan.txt", notes, 2e-6)
+                 frozen_array(z), "scan.txt", notes)
 
 
 def bumps(shape, missing=0.0, seed=5) -> np.ndarray:
@@ -27,7 +27,7 @@ def test_exact_a_plane_is_taken_out_and_nothing_else(missing):
     again = level_plane(tilted)
     assert np.array_equal(np.isnan(again.z), flat.missing)
     assert np.nanmax(np.abs(again.z - flat.z)) < 1e-18
-    assert again.notes == ("one",) and again.tip_radius == 2e-6 and not again.z.flags.writeable
+    assert again.notes == ("one",) and not again.z.flags.writeable
 
 
 def test_exact_the_plane_of_a_dense_least_squares_solve():
@@ -44,7 +44,7 @@ def test_exact_rows_and_columns_are_traces():
     assert np.array_equal(row.x, one.x) and np.array_equal(row.z, one.z[2], equal_nan=True)
     assert np.array_equal(column.x, one.y) and np.array_equal(column.z, one.z[:, 5], equal_nan=True)
     assert (row.source, column.source) == ("scan.txt, row 2", "scan.txt, column -1")
-    assert row.notes == ("one",) and column.tip_radius == 2e-6
+    assert row.notes == ("one",)
 
 
 def test_refuses_rows_that_are_not_there_and_heights_in_one_line():

@@ -56,7 +56,6 @@ def test_exact_the_step_of_the_stylus_is_length_over_points(data):
     assert profile.x[0] == 0 and profile.x[-1] == pytest.approx(9599 * 0.15625e-6, rel=1e-14)
     assert profile.notes[0].endswith("x is rounded to 100 nm in the file; the step 1.5 mm/9600 = 156.2 nm of the "
                                      "header is used")
-    assert profile.tip_radius == pytest.approx(2.5e-6)
 
 
 def test_exact_the_instrument_s_own_results_between_its_cursors(data, truth):

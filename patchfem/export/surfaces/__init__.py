@@ -1,6 +1,7 @@
-"""Pages about measured surfaces.
+"""Pages, tables and files about measured surfaces: roughness and wear.
 
-In: the records of `surface.roughness` and `surface.compare`. Out: a page that stands alone, and the same numbers
-as plain data and as lines of text. `areal` writes heights as X3P and text. Read `roughness` first, then
-`pictures`.
+In: the records of `surface.roughness`, `surface.compare` and `surface.scans`, or two results
+folders of runs with wear (`worn_runs`). Out: lines for the screen, plain data for JSON, CSV and X3P
+files, and a page that needs no other file. `quantities` has the one table of quantities that all of
+them use; `pictures` draws. Read `roughness` first.
 """

@@ -1,77 +1,115 @@
-"""The peaks of a measured surface as a table [contact.asperities] to paste, and how far they can be trusted."""
+"""Asperities of a measured surface as a table [contact.asperities] to paste into a scene."""
 
 import numpy as np
 
 from ...contact.skin_laws import HertzSkin
 from ...core import PatchfemError, say
 from ...scales import short
-from ...surface.roughness.peaks import PERSSON, Told, peaks_of
+from ...surface.roughness.peaks import (
+    PERSSON,
+    Peaks,
+    TraceMoments,
+    gaussian_peaks,
+    persson_stiffness,
+)
 
-LIGHT = 1e-5  # of the combined modulus, the pressure at which stiffnesses are told: 1.2 MPa on steel
+PRESSURE_FRACTION = (
+    1e-5  # pressure / combined modulus at which stiffnesses are stated: 1.2 MPa on steel
+)
 
 
-def data_of(told: Told | None, cutoff: float | None) -> dict | None:
-    """Root mean squares of the waves of a trace below a cut-off [m] (None: of all) and their peaks in SI, with the
-    stiffness over the pressure [1/m] at LIGHT; of every second sample that alone. A reason where no surface has such
-    peaks, None of a flat trace."""
-    if told is None:
+def data_of(moments: TraceMoments | None, cutoff: float | None) -> dict | None:
+    """Return the moments of a trace and its peaks as plain data in SI, None for a flat trace.
+
+    cutoff: [m] below which waves count, None for all. `stiffness` is the ratio of stiffness to
+    pressure [1/m], and `stiffness_half_sampled` that from every second sample; `reason` stands in
+    their place if no surface has such moments.
+    """
+    if moments is None:
         return None
-    out = {"cutoff": cutoff, **{f"rms_{name}": one for name, one in told.fine._asdict().items()}}
+    out = {"cutoff": cutoff}
+    for name, value in moments.fine._asdict().items():
+        out[f"rms_{name}"] = value
     try:
-        one = peaks_of(told.fine)
+        peaks = gaussian_peaks(moments.fine)
     except PatchfemError as error:
         return out | {"reason": str(error)}
-    out |= {"radius": one.radius, "density": one.density, "height_deviation": one.deviation, "stiffness": _steep(one),
-            "notes": [*told.walls, *[told.doubt] * bool(told.doubt)]}
-    try:
-        return out | {"stiffness_half_sampled": None if told.coarse is None else _steep(peaks_of(told.coarse))}
-    except PatchfemError:
-        return out | {"stiffness_half_sampled": None}
+    notes = [*moments.dust, *([moments.not_gaussian] if moments.not_gaussian else [])]
+    out |= {"radius": peaks.radius, "density": peaks.density, "height_deviation": peaks.deviation}
+    out |= {"stiffness": _stiffness_ratio(peaks), "notes": notes, "stiffness_half_sampled": None}
+    if moments.coarse is not None:
+        try:
+            out["stiffness_half_sampled"] = _stiffness_ratio(gaussian_peaks(moments.coarse))
+        except PatchfemError:
+            pass  # every second sample fits no such surface, which None states
+    return out
 
 
-def lines_of(told: Told | None, cutoff: float | None) -> list:
-    """`data_of` as lines of text, ready to paste."""
-    one = data_of(told, cutoff)
-    if one is None:
+def lines_of(moments: TraceMoments | None, cutoff: float | None) -> list:
+    """Return `data_of` as lines of text, ready to paste."""
+    data = data_of(moments, cutoff)
+    if data is None:
         return []
-    if "reason" in one:
-        return [f"  the trace gives no table [contact.asperities]: {one['reason']}"]
-    fine = told.fine
-    soft, stiff = (1 / (share * fine.height) for share in reversed(PERSSON))
+    if "reason" in data:
+        return [f"  the trace gives no table [contact.asperities]: {data['reason']}"]
+    fine = moments.fine
+    soft, stiff = persson_stiffness(1.0, fine.height)
     decay = sum(PERSSON) / 2 * fine.height
-    half = one["stiffness_half_sampled"]
-    sampled = ("with every second sample of the trace, height, slope and curvature do not fit any Greenwood-Williamson "
-               "surface") if half is None else \
-        f"with every second sample of the trace the ratio is {_per(half)}, a change of " \
-        f"{100 * (half / one['stiffness'] - 1):+.2g} %"
-    return ["  paste this into a scene if the other face is smooth (Greenwood-Williamson: peaks of radius "
-            f"{short(one['radius'], 'm', 3)}, {1e-6 * one['density']:.3g} of them per mm^2):",
-            "    [contact.asperities]", '    law = "hertz"', f'    rms_height = "{fine.height * 1e6:.5g} um"',
-            f"    rms_slope = {fine.slope:.5g}", f'    rms_curvature = "{fine.curvature:.5g} 1/m"',
-            *([f'    cutoff = "{say(cutoff)}"'] if cutoff else []),
-            f"  At a pressure of {LIGHT:g} of the combined modulus the ratio of stiffness to pressure is "
-            f"{_per(one['stiffness'])}; {sampled}. Waves shorter than two samples are not included.",
-            f"  Persson's theory, which includes waves of all lengths, gives {_per(soft)} to {_per(stiff)}, as does "
-            f'law = "exponential" with decay_length = "{decay * 1e6:.3g} um".', f"  {_split(cutoff)}",
-            *[f"  In this table {one}." for one in told.walls],
-            *([f"  Not Gaussian: {told.doubt}."] if told.doubt else [])]
+    half = data["stiffness_half_sampled"]
+    if half is None:
+        sampled = (
+            "with every second sample of the trace, height, slope and curvature do not fit any "
+            "Greenwood-Williamson surface"
+        )
+    else:
+        change = 100 * (half / data["stiffness"] - 1)
+        sampled = (
+            f"with every second sample of the trace the ratio is {_per_um(half)}, "
+            f"a change of {change:+.2g} %"
+        )
+    out = [
+        "  paste this into a scene if the other face is smooth (Greenwood-Williamson: peaks of "
+        f"radius {short(data['radius'], 'm', 3)}, {1e-6 * data['density']:.3g} of them per mm^2):",
+        "    [contact.asperities]",
+        '    law = "hertz"',
+        f'    rms_height = "{fine.height * 1e6:.5g} um"',
+        f"    rms_slope = {fine.slope:.5g}",
+        f'    rms_curvature = "{fine.curvature:.5g} 1/m"',
+    ]
+    if cutoff:
+        out.append(f'    cutoff = "{say(cutoff)}"')
+    out += [
+        f"  At a pressure of {PRESSURE_FRACTION:g} of the combined modulus the ratio of stiffness "
+        f"to pressure is {_per_um(data['stiffness'])}; {sampled}. Waves shorter than two samples "
+        "are not included.",
+        f"  Persson's theory, which includes waves of all lengths, gives {_per_um(soft)} to "
+        f"{_per_um(stiff)}, as does "
+        f'law = "exponential" with decay_length = "{decay * 1e6:.3g} um".',
+        f"  {_describe_split(cutoff)}",
+    ]
+    out += [f"  In this table {text}." for text in moments.dust]
+    return out + ([f"  Not Gaussian: {moments.not_gaussian}."] if moments.not_gaussian else [])
 
 
-def _split(cutoff: float | None) -> str:
-    """Which waves of a trace its peaks are, and which are left to the profile."""
+def _describe_split(cutoff: float | None) -> str:
+    """State which waves of a trace the table describes, and which are left to [contact.profile]."""
     if cutoff is None:
-        return ("This table describes all waves of the trace. If [contact.profile] takes the same trace, split the "
-                "trace with --cutoff; otherwise the long waves count twice.")
-    return (f"This table describes only waves below the cut-off of {say(cutoff)}. If [contact.profile] takes the same "
-            "trace, the gap follows the longer waves, so that no wave counts twice.")
+        return (
+            "This table describes all waves of the trace. If [contact.profile] takes the same "
+            "trace, split the trace with --cutoff; otherwise the long waves count twice."
+        )
+    return (
+        f"This table describes only waves below the cut-off of {say(cutoff)}. If [contact.profile] "
+        "takes the same trace, the gap follows the longer waves, so that no wave counts twice."
+    )
 
 
-def _steep(one) -> float:
-    """Stiffness over pressure [1/m] of peaks under LIGHT of their modulus."""
-    law = HertzSkin(*one, 1.0)
-    return float(law.stiffness(law.separation(np.array([LIGHT])))[0] / LIGHT)
+def _stiffness_ratio(peaks: Peaks) -> float:
+    """Compute stiffness over pressure [1/m] of peaks at PRESSURE_FRACTION."""
+    law = HertzSkin(*peaks, 1.0)
+    separation = law.separation(np.array([PRESSURE_FRACTION]))
+    return float(law.stiffness(separation)[0] / PRESSURE_FRACTION)
 
 
-def _per(value: float) -> str:
-    """A number per length as text."""
+def _per_um(value: float) -> str:
     return f"{value * 1e-6:.3g} 1/um"

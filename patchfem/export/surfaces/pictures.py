@@ -1,266 +1,541 @@
-"""Figures of surfaces: a trace, its Abbott curve and spectrum, a scan; traces before and after, and their pressure."""
+"""Pictures of measured surfaces, before and after wear."""
+
+from typing import NamedTuple
 
 import numpy as np
 
 from ...scales import axis_unit
-from ...surface.profile import level
-from ...surface.roughness.filter import even
+from ...surface.profile import even, level
+from ...surface.quantity import Quantity
+from ...surface.roughness.parameters import Heights, abbott
+from ...surface.roughness.spectrum import Spectrum
 from ..drawing.charts import axis, chart, line, mark
 from ..drawing.pictures import BLUE, draw, drawing, styled
 
-POINTS, CURVE = 2400, 400  # of a line and of a spectrum
-BINS = 120  # of a histogram
-FINE = 400  # samples that the closer view shows, at least
+MAX_POINTS = 2400  # points of a drawn line: eight for each pixel column of the page
+MAX_SPECTRUM_POINTS = (
+    400  # points of a drawn spectrum, evenly spread over the logarithm of the frequency
+)
+N_BINS = 120  # classes of a histogram
+MAX_PIXELS = 400  # heights of a drawn map along each axis
+MIN_DETAIL_SAMPLES = 400  # samples of the enlarged part of two traces
+MAX_SECTION_RULES = (
+    60  # more sections of a roughness profile are drawn without the lines between them
+)
+OUTLIERS = (0.002, 0.998)  # quantiles of the heights that the colours of a map span
+UM3 = 1e18  # cubic micrometres in a cubic metre
+GREY = "#4d4d4d"
 SIDES = (("soft", "before"), ("accent", "after"))
-VOLUME = 1e18  # um^3
+
+
+class Picture(NamedTuple):
+    """Drawn picture of a page with its caption and its alternative text."""
+
+    svg: str
+    caption: str
+    alternative: str
 
 
 def trace(primary, waviness) -> str:
-    """The levelled trace, and the waviness on it where there is one."""
-    (along, mm), (up, um) = axis_unit(primary.x, "m"), axis_unit(primary.z, "m")
-    marks = [line(primary.x * mm, primary.z * um, "accent", most=POINTS, width=0.7)]
-    if waviness is not None:
-        marks = [marks[0] | {"colour": "soft", "name": "levelled trace"},
-                 line(waviness.x * mm, waviness.z * um, "warm", "waviness", most=POINTS, width=1.6)]
-    return draw([chart("", _place("x", along, primary.x * mm), axis("height", up), marks)], height=2.7)
+    """Draw a levelled trace and, if there is one, its waviness."""
+    along, mm = axis_unit(primary.x, "m")
+    up, um = axis_unit(primary.z, "m")
+    if waviness is None:
+        marks = [line(primary.x * mm, primary.z * um, "accent", most=MAX_POINTS, width=0.7)]
+    else:
+        marks = [
+            line(
+                primary.x * mm, primary.z * um, "soft", "levelled trace", most=MAX_POINTS, width=0.7
+            ),
+            line(waviness.x * mm, waviness.z * um, "warm", "waviness", most=MAX_POINTS, width=1.6),
+        ]
+    return draw(
+        [chart("", _full_axis("x", along, primary.x * mm), axis("height", up), marks)], height=2.7
+    )
 
 
 def rough(roughness, ends: tuple, cutoff: float) -> str:
-    """The roughness profile with its sections of one cut-off [m]; ends [m] of the trace."""
-    (along, mm), (up, um) = axis_unit(ends, "m"), axis_unit(roughness.z, "m")
-    marks, count = [line(roughness.x * mm, roughness.z * um, "accent", most=POINTS, width=0.7)], \
-        (roughness.x[-1] - roughness.x[0]) / cutoff
-    if count < 60:
-        marks += [mark("rule", "soft", x=(roughness.x[0] + k * cutoff) * mm, dash="dotted")
-                  for k in range(int(count + 1e-6) + 1)]
-    return draw([chart("", _place("x", along, np.array(ends) * mm), axis("roughness", up), marks)], height=2.4)
+    """Draw a roughness profile with its sections.
+
+    Parameters
+    ----------
+    roughness : Profile
+    ends : tuple [m]
+        First and last position of the trace.
+    cutoff : float [m]
+        Length of a section.
+
+    Returns
+    -------
+    str
+        The picture as SVG.
+    """
+    along, mm = axis_unit(ends, "m")
+    up, um = axis_unit(roughness.z, "m")
+    marks = [line(roughness.x * mm, roughness.z * um, "accent", most=MAX_POINTS, width=0.7)]
+    count = roughness.length / cutoff
+    if count < MAX_SECTION_RULES:
+        places = roughness.x[0] + cutoff * np.arange(int(count + 1e-6) + 1)
+        marks += [mark("rule", "soft", x=place * mm, dash="dotted") for place in places]
+    return draw(
+        [chart("", _full_axis("x", along, np.array(ends) * mm), axis("roughness", up), marks)],
+        height=2.4,
+    )
 
 
-def bearing(abbott: tuple, core, names: tuple = ("Mr1", "Mr2")) -> dict:
-    """The Abbott curve with the straight line of its core; names: of the material ratios where the core ends."""
-    (ratio, height), (up, um) = abbott, axis_unit(abbott[1], "m")
+def bearing(heights: Heights, names: tuple = ("Mr1", "Mr2")) -> dict:
+    """Chart an Abbott curve with the straight line of its core.
+
+    Names: of the material ratios where the core ends.
+    """
+    ratio, height = abbott(heights)
+    core = heights.core
+    up, um = axis_unit(height, "m")
     marks = [line(100 * ratio, height * um, "accent")]
     if core is not None:
-        low = core.top - core.core
-        marks.append(line([0, 100], [core.top * um, low * um], "warm", width=1.2, dash="dashed"))
-        marks += [mark("dots", "warm", f"{name} {100 * at:.1f} %", x=[100 * at], y=[height * um], shape=shape)
-                  for name, at, height, shape in zip(names, (core.first, core.second), (core.top, low),
-                                                     ("circle", "square"))]
-    return chart("Abbott curve", _place("material ratio", "%", [0, 100]), axis("height", up), marks)
+        bottom = core.top - core.height
+        marks.append(line([0, 100], [core.top * um, bottom * um], "warm", width=1.2, dash="dashed"))
+        ends = ((core.first_ratio, core.top, "circle"), (core.second_ratio, bottom, "square"))
+        for name, (place, level_of_end, shape) in zip(names, ends):
+            label = f"{name} {100 * place:.1f} %"
+            marks.append(
+                mark("dots", "warm", label, x=[100 * place], y=[level_of_end * um], shape=shape)
+            )
+    return chart(
+        "Abbott curve", _full_axis("material ratio", "%", [0, 100]), axis("height", up), marks
+    )
 
 
-def statistics(abbott: tuple, core, spectrum, band: tuple, cutoff: float | None) -> str:
-    """The Abbott curve with the straight line of its core, and the spectrum with its 95 % band."""
-    left, title = bearing(abbott, core), "Power spectral density"
+def statistics(heights: Heights, spectrum: Spectrum, band: tuple, cutoff: float | None) -> str:
+    """Draw an Abbott curve with its core, and a spectrum with its 95 % band.
+
+    Parameters
+    ----------
+    heights : Heights
+    spectrum : Spectrum
+    band : tuple [m]
+        Wavelengths that are marked.
+    cutoff : float or None [m]
+        Cut-off that is marked.
+
+    Returns
+    -------
+    str
+        The picture as SVG.
+    """
+    left = bearing(heights)
+    title = "Power spectral density"
     if not spectrum.density.any():
-        return draw([left, chart(f"{title}: the trace is flat", axis("wavelength"), axis("density"), [])])
-    name, scale = _wave(spectrum)
-    marks = _density(spectrum, scale, "accent", "95 % band", "")
-    ends = marks[-1]["x"]
+        return draw(
+            [left, chart(f"{title}: the trace is flat", axis("wavelength"), axis("density"), [])]
+        )
+    name, scale = _wavelength_unit(spectrum)
+    marks = _density_marks(spectrum, scale, "accent", band="95 % band")
+    waves = marks[-1]["x"]
     if band[1] > 1 / spectrum.frequency[-1] and band[0] < 1 / spectrum.frequency[0]:
-        marks.append(mark("span", "soft", "wavelengths of band_amplitude", left=band[0] * scale, right=band[1] * scale))
+        marks.append(
+            mark(
+                "span",
+                "soft",
+                "wavelengths of band_amplitude",
+                left=band[0] * scale,
+                right=band[1] * scale,
+            )
+        )
     if spectrum.dominant is not None:
-        marks.append(mark("rule", "warm", "dominant wavelength", x=spectrum.dominant * scale, dash="dashed"))
+        marks.append(
+            mark("rule", "warm", "dominant wavelength", x=spectrum.dominant * scale, dash="dashed")
+        )
     if cutoff is not None:
-        marks.append(mark("rule", "#4d4d4d", "cut-off", x=cutoff * scale, dash="dotted"))
-    waves = axis("wavelength", name, True) | {"range": [ends.min(), ends.max()]}
-    return draw([left, chart(title, waves, axis("density", "um$^3$", True), marks)])
+        marks.append(mark("rule", GREY, "cut-off", x=cutoff * scale, dash="dotted"))
+    wavelength = axis("wavelength", name, True) | {"range": [waves.min(), waves.max()]}
+    return draw([left, chart(title, wavelength, axis("density", "um$^3$", True), marks)])
 
 
-def _place(label: str, unit: str, x) -> dict:
-    """The axis of places x, all of which are shown."""
+def _full_axis(label: str, unit: str, x) -> dict:
+    """Return an axis whose range is that of the places x."""
     return axis(label, unit) | {"range": [x[0], x[-1]]}
 
 
-def _wave(spectrum) -> tuple:
+def depth_axis(unit: str, depth, scale: float) -> dict:
+    """Return an axis of depths [m] that points down."""
+    room = 0.05 * float(np.ptp(depth))
+    return axis("worn depth", unit) | {
+        "range": [(np.max(depth) + room) * scale, (np.min(depth) - room) * scale]
+    }
+
+
+def _wavelength_unit(spectrum: Spectrum) -> tuple:
     return axis_unit([1 / spectrum.frequency[0] / 4], "m")
 
 
-def _density(spectrum, scale: float, colour: str, band: str, name: str) -> list:
-    """A spectrum over the wavelength with its 95 % band."""
+def _density_marks(
+    spectrum: Spectrum, scale: float, colour: str, name: str = "", band: str = ""
+) -> list:
+    """Return the marks of a spectrum over the wavelength and of its 95 % band."""
     low, high = spectrum.band()
-    pick = np.unique(np.round(np.geomspace(1, spectrum.frequency.size, CURVE)).astype(int)) - 1
+    pick = np.geomspace(1, spectrum.frequency.size, MAX_SPECTRUM_POINTS)
+    pick = np.unique(np.round(pick).astype(int)) - 1
     pick = pick[spectrum.density[pick] > 0]
     waves = scale / spectrum.frequency[pick]
-    return [mark("band", colour, band, x=waves, low=low[pick] * VOLUME, high=high[pick] * VOLUME),
-            line(waves, spectrum.density[pick] * VOLUME, colour, name, width=1.0)]
+    return [
+        mark("band", colour, band, x=waves, low=low[pick] * UM3, high=high[pick] * UM3),
+        line(waves, spectrum.density[pick] * UM3, colour, name, width=1.0),
+    ]
 
 
 @styled
 def scan(x, y, z):
-    """Draw the heights z (m, n) [m] of a levelled scan over x (n,) and y (m,) [m], and how often each occurs."""
+    """Draw the heights of a levelled scan and their distribution.
+
+    Parameters
+    ----------
+    x, y : (n,), (m,) arrays [m]
+    z : (m, n) array [m]
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
     figure, (left, right) = drawing(2, 3.8, width_ratios=(1.2, 1))
-    along, mm = axis_unit(np.concatenate([x, y]), "m")
+    known = z[~np.isnan(z)]
+    _draw_map(figure, left, (x, y, z), np.quantile(known, OUTLIERS), "viridis")
+    left.set(title="Heights")
     up, um = axis_unit(z, "m")
-    step = (max(1, z.shape[0] // 600), max(1, z.shape[1] // 600))
-    known = z[~np.isnan(z)] * um
-    low, high = np.quantile(known, (0.002, 0.998))
-    mesh = left.pcolormesh(x[::step[1]] * mm, y[::step[0]] * mm, z[::step[0], ::step[1]] * um, cmap="viridis",
-                           vmin=low, vmax=high, rasterized=True, shading="nearest")
-    figure.colorbar(mesh, ax=left, label=f"height [{up}]", extend="both", fraction=0.05, pad=0.02)
-    left.set(xlabel=f"x [{along}]", ylabel=f"y [{along}]", aspect="equal", title="Heights")
-    left.grid(False)
-    right.hist(known, bins=120, color=BLUE, weights=np.full(known.size, 100 / known.size))
-    right.set(xlabel=f"height [{up}]", ylabel="share of the points [%]", title="Distribution of the heights")
+    right.hist(known * um, bins=N_BINS, color=BLUE, weights=np.full(known.size, 100 / known.size))
+    right.set(
+        xlabel=f"height [{up}]",
+        ylabel="share of the points [%]",
+        title="Distribution of the heights",
+    )
     return figure
 
 
 @styled
 def maps(x, y, heights: tuple):
-    """Draw the scan before, the scan after laid on it and the worn depth, (m, n) [m] each, over x (n,), y (m,) [m]."""
+    """Draw the scan before, the scan after and the worn depth side by side.
+
+    Parameters
+    ----------
+    x, y : (n,), (m,) arrays [m]
+    heights : three (m, n) arrays [m]
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
     figure, panels = drawing(3, float(np.clip(0.8 + 2.6 * np.ptp(y) / np.ptp(x), 1.6, 6.0)))
-    along, mm = axis_unit(np.concatenate([x - x[0], y - y[0]]), "m")
-    known = heights[0][~np.isnan(heights[0])]
-    ends = np.quantile(known, (0.002, 0.998))
-    reach = np.nanquantile(np.abs(heights[2]), 0.998)
-    step = tuple(max(1, count // 400) for count in heights[0].shape)
-    for panel, z, title, (low, high), colours in zip(
-            panels, heights, ("before", "after", "worn depth"), (ends, ends, (-reach, reach)),
-            ("viridis", "viridis", "RdBu_r")):
-        up, um = axis_unit([low, high], "m")
-        mesh = panel.pcolormesh(x[::step[1]] * mm, y[::step[0]] * mm, z[::step[0], ::step[1]] * um, cmap=colours,
-                                vmin=low * um, vmax=high * um, rasterized=True, shading="nearest")
-        name = "depth" if title == "worn depth" else "height"
-        figure.colorbar(mesh, ax=panel, label=f"{name} [{up}]", extend="both", fraction=0.05, pad=0.02)
-        panel.set(xlabel=f"x [{along}]", ylabel=f"y [{along}]", aspect="equal", title=title)
-        panel.grid(False)
+    before, after, depth = heights
+    ends = np.quantile(before[~np.isnan(before)], OUTLIERS)
+    _draw_map(figure, panels[0], (x, y, before), ends, "viridis")
+    _draw_map(figure, panels[1], (x, y, after), ends, "viridis")
+    reach = np.nanquantile(np.abs(depth), OUTLIERS[1])
+    _draw_map(figure, panels[2], (x, y, depth), (-reach, reach), "RdBu_r", name="depth")
+    for panel, title in zip(panels, ("before", "after", "worn depth")):
+        panel.set(title=title)
     return figure
 
 
-def both_heights(heights: tuple, curves: tuple) -> str:
-    """How often heights (k,) [m] before and after occur, and their Abbott curves ((ratio, height) each)."""
+def _draw_map(figure, panel, scan: tuple, ends: tuple, colours: str, name: str = "height") -> None:
+    """Draw a scan (x, y, z) [m] on matplotlib Axes in colours that span `ends` [m]."""
+    x, y, z = scan
+    along, mm = axis_unit(np.concatenate([x, y]), "m")
+    up, um = axis_unit(ends, "m")
+    rows, columns = (slice(None, None, max(1, count // MAX_PIXELS)) for count in z.shape)
+    mesh = panel.pcolormesh(
+        x[columns] * mm,
+        y[rows] * mm,
+        z[rows, columns] * um,
+        cmap=colours,
+        vmin=ends[0] * um,
+        vmax=ends[1] * um,
+        rasterized=True,
+        shading="nearest",
+    )
+    figure.colorbar(mesh, ax=panel, label=f"{name} [{up}]", extend="both", fraction=0.05, pad=0.02)
+    panel.set(xlabel=f"x [{along}]", ylabel=f"y [{along}]", aspect="equal")
+    panel.grid(False)
+
+
+def both_heights(heights: tuple) -> str:
+    """Draw the distributions and the Abbott curves of the heights (k,) [m] before and after."""
     both = np.concatenate(heights)
     up, um = axis_unit(both, "m")
-    edges = np.linspace(*np.quantile(both, (0.001, 0.999)), BINS + 1)
-    shares = [np.histogram(z, edges)[0] * 100 / z.size for z in heights]
-    bars = [line((edges[:-1] + edges[1:]) / 2 * um, share, *side, width=1.2) for share, side in zip(shares, SIDES)]
-    lines = [line(100 * ratio, height * um, *side) for (ratio, height), side in zip(curves, SIDES)]
-    return draw([chart("Heights", axis("height", up), axis("share of the points", "%"), bars),
-                 chart("Abbott curves", _place("material ratio", "%", [0, 100]), axis("height", up), lines)])
+    edges = np.linspace(*np.quantile(both, (0.001, 0.999)), N_BINS + 1)
+    middles = (edges[:-1] + edges[1:]) / 2 * um
+    bars = []
+    for z, (colour, name) in zip(heights, SIDES):
+        percent = np.histogram(z, edges)[0] * 100 / z.size
+        bars.append(line(middles, percent, colour, name, width=1.2))
+    return draw(
+        [
+            chart("Heights", axis("height", up), axis("share of the points", "%"), bars),
+            _abbott_chart(heights),
+        ]
+    )
+
+
+def _abbott_chart(heights: tuple) -> dict:
+    """Chart the Abbott curves of heights (k,) [m] before and after."""
+    curves = [abbott(Heights(z, 1.0)) for z in heights]
+    up, um = axis_unit(np.concatenate([height for _, height in curves]), "m")
+    lines = []
+    for (ratio, height), (colour, name) in zip(curves, SIDES):
+        lines.append(line(100 * ratio, height * um, colour, name))
+    return chart(
+        "Abbott curves", _full_axis("material ratio", "%", [0, 100]), axis("height", up), lines
+    )
 
 
 def mean_section(track, start: float, end: float) -> str:
-    """The mean section of a track, its scatter, and where the track begins and ends [m]."""
-    there = np.isfinite(track.section)
-    x, depth, spread = track.across[there], track.section[there], track.spread[there]
-    (along, mm), (up, um) = axis_unit(x, "m"), axis_unit(depth, "m")
-    marks = [mark("band", "soft", "scatter of the sections", x=x * mm, low=(depth - spread) * um,
-                  high=(depth + spread) * um), line(x * mm, depth * um, "warm", "mean", most=POINTS, width=1.2),
-             line(x[[0, -1]] * mm, [0.0, 0.0], "#4d4d4d", width=0.8),
-             *(mark("rule", "#4d4d4d", x=place * mm, dash="dotted") for place in (start, end))]
-    low, high = float((depth - spread).min()), float((depth + spread).max())
-    room = 0.05 * (high - low)
-    return draw([chart("", _place("across the track", along, x * mm),
-                       axis("worn depth", up) | {"range": [(high + room) * um, (low - room) * um]}, marks)], height=2.7)
+    """Draw the mean section of a track with its scatter.
 
+    Parameters
+    ----------
+    track : ScanTrack
+        With `across`, `section` and `spread` (n,) [m].
+    start, end : float [m]
+        Where the track begins and ends.
 
-def overlay(x, first, second, rest, where: tuple) -> str:
-    """Both traces (n,) [m] over x (n,) [m], the second laid on the first, and between them what wore off.
-
-    rest (n,) [m]: depth; where: (from, to) [m] of the closer view on the right.
+    Returns
+    -------
+    str
+        The picture as SVG.
     """
-    (along, mm), (up, um) = axis_unit(x, "m"), axis_unit(np.concatenate([first, second]), "m")
-    marks = [line(x * mm, z * um, colour, name, most=POINTS, width=1.0)
-             for z, (colour, name) in zip((first, second), SIDES)]
-    marks.append(mark("band", "warm", "worn off", x=x * mm, low=np.where(rest > 0, second, np.nan) * um,
-                      high=first * um))
-    inside = (x >= where[0]) & (x <= where[1])
-    both = np.concatenate([first[inside], second[inside]]) * um
-    label, up = "x of the second trace", axis("height", up)
-    ends = [both.min() - 0.1 * np.ptp(both), both.max() + 0.15 * np.ptp(both)]
-    return draw([chart("Both traces", _place(label, along, x * mm), up, marks),
-                 chart("A part of them", _place(label, along, np.array(where) * mm), up | {"range": ends}, marks)],
-                height=3.4)
+    known = np.isfinite(track.section)
+    x = track.across[known]
+    depth = track.section[known]
+    spread = track.spread[known]
+    along, mm = axis_unit(x, "m")
+    up, um = axis_unit(depth, "m")
+    low = depth - spread
+    high = depth + spread
+    marks = [
+        mark("band", "soft", "scatter of the sections", x=x * mm, low=low * um, high=high * um),
+        line(x * mm, depth * um, "warm", "mean", most=MAX_POINTS, width=1.2),
+        line(x[[0, -1]] * mm, [0.0, 0.0], GREY, width=0.8),
+    ]
+    marks += [mark("rule", GREY, x=place * mm, dash="dotted") for place in (start, end)]
+    down = depth_axis(up, [low.min(), high.max()], um)
+    return draw([chart("", _full_axis("across the track", along, x * mm), down, marks)], height=2.7)
+
+
+def overlay(x, first, second, worn) -> str:
+    """Draw two aligned traces, and enlarged the part around the largest wear.
+
+    Parameters
+    ----------
+    x : (n,) array [m]
+    first, second : (n,) arrays [m]
+        Heights before and after.
+    worn : (n,) array [m]
+        Worn depth, 0 where nothing wore off.
+
+    Returns
+    -------
+    str
+        The picture as SVG.
+    """
+    along, mm = axis_unit(x, "m")
+    up, um = axis_unit(np.concatenate([first, second]), "m")
+    marks = []
+    for z, (colour, name) in zip((first, second), SIDES):
+        marks.append(line(x * mm, z * um, colour, name, most=MAX_POINTS, width=1.0))
+    bottom = np.where(worn > 0, second, np.nan)
+    marks.append(mark("band", "warm", "worn off", x=x * mm, low=bottom * um, high=first * um))
+    ends = _detail_ends(x, worn)
+    inside = (x >= ends[0]) & (x <= ends[1])
+    detail = np.concatenate([first[inside], second[inside]]) * um
+    room = np.ptp(detail)
+    label = "x of the second trace"
+    height = axis("height", up)
+    detail_height = height | {"range": [detail.min() - 0.1 * room, detail.max() + 0.15 * room]}
+    whole = chart("Both traces", _full_axis(label, along, x * mm), height, marks)
+    part = chart("A part of them", _full_axis(label, along, ends * mm), detail_height, marks)
+    return draw([whole, part], height=3.4)
+
+
+def _detail_ends(x, worn) -> np.ndarray:
+    """Choose the ends [m] of the enlarged part: a sixth of the traces around the largest wear."""
+    half = max((x[-1] - x[0]) / 12, MIN_DETAIL_SAMPLES / 4 * (x[1] - x[0]))
+    half = min(half, (x[-1] - x[0]) / 2)
+    centre = float(np.clip(x[int(np.argmax(worn))], x[0] + half, x[-1] - half))
+    return np.array([centre - half, centre + half])
 
 
 def apart(before, after) -> str:
-    """Both traces for themselves, one above the other: their places have nothing in common."""
-    flat = [level(even(one)) for one in (before, after)]
-    along, mm = axis_unit(np.concatenate([one.x - one.x[0] for one in flat]), "m")
-    up, um = axis_unit(np.concatenate([one.z for one in flat]), "m")
+    """Draw two traces without a common place, one above the other."""
+    flat = [level(even(profile)) for profile in (before, after)]
+    along, mm = axis_unit(np.concatenate([profile.x - profile.x[0] for profile in flat]), "m")
+    up, um = axis_unit(np.concatenate([profile.z for profile in flat]), "m")
     lift = 1.1 * (np.ptp(flat[1].z) / 2 + np.ptp(flat[0].z) / 2)
-    marks = [line((one.x - one.x[0]) * mm, (one.z + by) * um, colour, name, most=POINTS, width=0.8)
-             for one, by, (colour, name) in zip(flat, (lift, 0.0), SIDES)]
-    return draw([chart("", axis("along the trace", along), axis("height, shifted", up), marks)], height=3.4)
+    marks = []
+    for profile, shift, (colour, name) in zip(flat, (lift, 0.0), SIDES):
+        x = (profile.x - profile.x[0]) * mm
+        marks.append(line(x, (profile.z + shift) * um, colour, name, most=MAX_POINTS, width=0.8))
+    return draw(
+        [chart("", axis("along the trace", along), axis("height, shifted", up), marks)], height=3.4
+    )
 
 
-def difference(x, rest, used, noise: float | None, ends: tuple | None) -> str:
-    """The depth (n,) [m] of the trace after below its reference, and the unworn heights that carry it."""
-    (along, mm), (up, um) = axis_unit(x, "m"), axis_unit(rest, "m")
-    marks = [line(x * mm, rest * um, "warm", "depth of the second trace", most=POINTS, width=1.0),
-             line(x[[0, -1]] * mm, [0.0, 0.0], "#4d4d4d", width=0.8)]
+def difference(x, depth, used=None, ends: tuple | None = None) -> str:
+    """Draw the depth of the second trace below its reference.
+
+    Parameters
+    ----------
+    x, depth : (n,) arrays [m]
+    used : (n,) bool array, optional
+        Unworn heights that the alignment used.
+    ends : tuple, optional
+        Where the track begins and ends [m].
+
+    Returns
+    -------
+    str
+        The picture as SVG.
+    """
+    along, mm = axis_unit(x, "m")
+    up, um = axis_unit(depth, "m")
+    marks = [
+        line(x * mm, depth * um, "warm", "depth of the second trace", most=MAX_POINTS, width=1.0),
+        line(x[[0, -1]] * mm, [0.0, 0.0], GREY, width=0.8),
+    ]
     if used is not None:
-        marks.append(mark("dots", "accent", "unworn heights, used for the alignment", x=x[used] * mm, y=rest[used] * um,
-                          size=1.5))
+        name = "unworn heights, used for the alignment"
+        marks.append(mark("dots", "accent", name, x=x[used] * mm, y=depth[used] * um, size=1.5))
     if ends is not None:
         marks.append(mark("span", "soft", "track", left=ends[0] * mm, right=ends[1] * mm))
-    room = 0.05 * np.ptp(rest)
-    down = axis("worn depth", up) | {"range": [(rest.max() + room) * um, (rest.min() - room) * um]}
-    return draw([chart("", _place("x of the second trace", along, x * mm), down, marks)], height=2.5)
+    place = _full_axis("x of the second trace", along, x * mm)
+    return draw([chart("", place, depth_axis(up, depth, um), marks)], height=2.5)
 
 
-def both_statistics(curves: tuple, spectra: tuple, band: tuple) -> str:
-    """The Abbott curves ((ratio, height) each) and the spectra with their 95 % bands, before and after."""
-    up, um = axis_unit(np.concatenate([height for _, height in curves]), "m")
-    lines = [line(100 * ratio, height * um, *side) for (ratio, height), side in zip(curves, SIDES)]
-    unit, scale = _wave(spectra[0])
-    marks = [one for found, (colour, name) in zip(spectra, SIDES)
-             for one in _density(found, scale, colour, "", name)]
-    marks.append(mark("span", "warm", "band of the amplitude ratio", left=band[0] * scale, right=band[1] * scale))
-    return draw([chart("Abbott curves", _place("material ratio", "%", [0, 100]), axis("height", up), lines),
-                 chart("Power spectral density, 95 % bands", axis("wavelength", unit, True),
-                       axis("density", "um$^3$", True), marks)])
+def both_statistics(heights: tuple, spectra: tuple, band: tuple) -> str:
+    """Draw the Abbott curves and the spectra with their 95 % bands, before and after.
+
+    Parameters
+    ----------
+    heights : two (k,) arrays [m]
+    spectra : two Spectrum
+    band : tuple [m]
+        Wavelengths of the amplitude ratio.
+
+    Returns
+    -------
+    str
+        The picture as SVG.
+    """
+    unit, scale = _wavelength_unit(spectra[0])
+    marks = []
+    for spectrum, (colour, name) in zip(spectra, SIDES):
+        marks += _density_marks(spectrum, scale, colour, name)
+    marks.append(
+        mark(
+            "span",
+            "warm",
+            "band of the amplitude ratio",
+            left=band[0] * scale,
+            right=band[1] * scale,
+        )
+    )
+    density = axis("density", "um$^3$", True)
+    right = chart(
+        "Power spectral density, 95 % bands", axis("wavelength", unit, True), density, marks
+    )
+    return draw([_abbott_chart(heights), right])
 
 
 def crossed(parts: list, directions: list) -> str:
-    """Spectra along x and y before and after in one chart, and the ratios x over y with their intervals; directions:
-    (when, amplitude ratio, slope ratio) each."""
-    made, unit, scale = [], *_wave(parts[0].sizes[0].spectrum)
-    for one, colour in zip(parts, ("accent", "warm")):
-        for found, when, dash in zip((each.spectrum for each in one.sizes), ("before", "after"), ("dashed", "solid")):
-            *_, curve = _density(found, scale, colour, "", f"{one.direction} {when}")
-            made.append(curve | {"dash": dash})
-    marks, places = [line([0.5, 2 * len(directions) + 0.5], [1.0, 1.0], "#4d4d4d", width=0.8)], []
-    for row, name in enumerate(("amplitude", "slope")):
-        for when, *ratios in directions:
-            one, place = ratios[row], len(places) + 1
-            places.append((place, f"{name}\n{when}"))
-            if one.value is not None:
-                marks += [line([place, place], [one.low, one.high], "accent"),
-                          mark("dots", "accent", x=[place], y=[one.value])]
-    ratio = axis("") | {"range": [0.5, len(places) + 0.5], "ticks": places}
-    return draw([chart("Power spectral density", axis("wavelength", unit, True), axis("density", "um$^3$", True), made),
-                 chart("x over y", ratio, axis("ratio"), marks)])
+    """Draw the spectra along x and y, and the ratios x over y with their intervals.
+
+    directions: (when, amplitude ratio, slope ratio) each.
+    """
+    unit, scale = _wavelength_unit(parts[0].sizes[0].spectrum)
+    curves = []
+    for part, colour in zip(parts, ("accent", "warm")):
+        for size, when, dash in zip(part.sizes, ("before", "after"), ("dashed", "solid")):
+            *_, curve = _density_marks(size.spectrum, scale, colour, f"{part.direction} {when}")
+            curves.append(curve | {"dash": dash})
+    bars = [(f"amplitude\n{when}", amplitude) for when, amplitude, _ in directions]
+    bars += [(f"slope\n{when}", slope) for when, _, slope in directions]
+    marks = [line([0.5, len(bars) + 0.5], [1.0, 1.0], GREY, width=0.8)]
+    for place, (_, ratio) in enumerate(bars, 1):
+        if ratio.value is not None:
+            marks.append(line([place, place], [ratio.low, ratio.high], "accent"))
+            marks.append(mark("dots", "accent", x=[place], y=[ratio.value]))
+    ticks = [(place, label) for place, (label, _) in enumerate(bars, 1)]
+    places = axis("") | {"range": [0.5, len(bars) + 0.5], "ticks": ticks}
+    density = axis("density", "um$^3$", True)
+    left = chart("Power spectral density", axis("wavelength", unit, True), density, curves)
+    return draw([left, chart("x over y", places, axis("ratio"), marks)])
+
+
+class PairsPanel(NamedTuple):
+    """Quantity of each pair by the line of the pair in its table, and the mean over the pairs."""
+
+    title: str
+    values: dict
+    mean: Quantity
 
 
 def each_and_mean(panels: list) -> str:
-    """Numbers of pairs with their intervals, and their mean; panels: (title, [(line of the pair, quantity)], mean)
-    each."""
-    made = []
-    for title, each, mean in panels:
-        known = [(k, one) for k, one in each if one.value is not None]
-        ends = [end for _, one in known for end in (one.low, one.high) if end is not None]
-        unit, scale = axis_unit(ends, mean.unit) if mean.unit != "1" else ("", 1.0)
-        wide = np.array([each[0][0] - 0.5, each[-1][0] + 0.5])
-        marks = [mark("band", "soft", "mean", x=wide, low=np.full(2, mean.low * scale),
-                      high=np.full(2, mean.high * scale)), line(wide, np.full(2, mean.value * scale), "soft")]
-        marks += [line([k, k], [one.low * scale, one.high * scale], "accent", width=1.0) for k, one in known
-                  if one.high is not None]
-        marks.append(mark("dots", "accent", "each pair", x=np.array([k for k, _ in known], float),
-                          y=np.array([one.value * scale for _, one in known]), size=4.0))
-        made.append(chart(title, axis("line number in the table") | {"range": wide}, axis("", unit), marks))
-    return draw(made, height=2.7)
+    """Draw quantities of pairs with their intervals and the mean of them; panels: of PairsPanel."""
+    charts = []
+    for panel in panels:
+        mean = panel.mean
+        known = {number: value for number, value in panel.values.items() if value.value is not None}
+        bounds = [
+            bound
+            for value in known.values()
+            for bound in (value.low, value.high)
+            if bound is not None
+        ]
+        unit, scale = ("", 1.0) if mean.unit == "1" else axis_unit(bounds, mean.unit)
+        ends = np.array([min(panel.values) - 0.5, max(panel.values) + 0.5])
+        low, middle, high = (
+            np.full(2, value * scale) for value in (mean.low, mean.value, mean.high)
+        )
+        marks = [
+            mark("band", "soft", "mean", x=ends, low=low, high=high),
+            line(ends, middle, "soft"),
+        ]
+        for number, value in known.items():
+            if value.high is not None:
+                bar = [value.low * scale, value.high * scale]
+                marks.append(line([number, number], bar, "accent", width=1.0))
+        heights = np.array([value.value * scale for value in known.values()])
+        marks.append(
+            mark("dots", "accent", "each pair", x=np.array([*known], float), y=heights, size=4.0)
+        )
+        place = axis("line number in the table") | {"range": ends}
+        charts.append(chart(panel.title, place, axis("", unit), marks))
+    return draw(charts, height=2.7)
+
+
+class PressedSide(NamedTuple):
+    """Normal stress (n,) [Pa] over x (n,) [m] with the surface "before" or "after"."""
+
+    x: np.ndarray
+    stress: np.ndarray
+    name: str
 
 
 def pressures(sides: list) -> str:
-    """The normal stress of the patch with each surface; sides: (x (n,) [m], stress (n,) [Pa], name)."""
-    along, mm = axis_unit(sides[0][0], "m")
-    unit, scale = axis_unit(np.concatenate([stress for _, stress, _ in sides]), "Pa")
-    top, made = 1.05 * max(float(stress.max()) for _, stress, _ in sides) * scale, []
-    for x, stress, name in sides:
-        colour = dict(map(reversed, SIDES))[name]
-        made.append(chart(f"Pressure with the surface {name}", _place("x", along, x * mm), axis(
-            "normal stress", unit) | {"range": [0.0, top]}, [
-                mark("band", colour, x=x * mm, low=0 * x, high=stress * scale),
-                line(x * mm, stress * scale, colour, width=0.9)]))
-    return draw(made, height=2.9)
+    """Draw the normal stress of the patch with each surface; sides: of PressedSide."""
+    along, mm = axis_unit(sides[0].x, "m")
+    unit, scale = axis_unit(np.concatenate([side.stress for side in sides]), "Pa")
+    top = 1.05 * max(float(side.stress.max()) for side in sides) * scale
+    colours = {name: colour for colour, name in SIDES}
+    charts = []
+    for side in sides:
+        x = side.x * mm
+        stress = side.stress * scale
+        colour = colours[side.name]
+        marks = [
+            mark("band", colour, x=x, low=0 * x, high=stress),
+            line(x, stress, colour, width=0.9),
+        ]
+        up = axis("normal stress", unit) | {"range": [0.0, top]}
+        charts.append(
+            chart(f"Pressure with the surface {side.name}", _full_axis("x", along, x), up, marks)
+        )
+    return draw(charts, height=2.9)

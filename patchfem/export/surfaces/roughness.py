@@ -1,4 +1,4 @@
-"""Roughness of one or several surfaces on paper: lines of text, plain data, a page that stands alone."""
+"""Roughness of one or several surfaces as lines of text, as plain data and as a page."""
 
 from html import escape
 from pathlib import Path
@@ -9,295 +9,405 @@ from ... import __version__
 from ...core import PatchfemError, say
 from ...disk.whole import write_rows, write_text
 from ...scales import LADDERS, plain, step_of
-from ...surface.quantity import Mean, Quantity
-from ...surface.roughness import means, peaks
+from ...surface.roughness.means import KINDS, Means, average_reports
+from ...surface.roughness.peaks import TraceMoments, trace_moments
 from ...surface.roughness.report import RoughnessReport, fitting_cutoff
+from ...surface.roughness.spectrum import BAND
 from ..pages.document import Section, document, figure, prose, table, warned
 from . import asperities, pictures
 from .areal import write_columns, write_profile, write_x3p
+from .pictures import Picture
+from .quantities import QuantityTable, Row, format_quantity
 
-ALONG = ("PSm", "RSm", "dominant_wavelength", "Sal")  # lengths along the surface; all others are heights
-AREAL = ("Interval: 90 % interval (from 5 % to 95 %) of the mean over all scans of this size, for a surface with "
-         "Gaussian heights and the spectrum of this scan. A kurtosis above 3 makes the interval wider. The interval "
-         "holds neither for a surface that differs from place to place nor for waves longer than the scan.")
-MEANS = ("Interval: 95 % interval of the mean, by Student's t from the scatter of the files, each with equal weight. "
-         "The interval does not include an error common to all files, such as calibration. Scatter: standard "
-         "deviation of the values of "
-         "single files.")
-INTERVAL = ("Interval: 90 % interval (from 5 % to 95 %) of the mean over all traces of this length, for a surface with "
-            "Gaussian heights and the spectrum of this trace. A kurtosis above 3 makes the interval wider. The "
-            "interval does not hold for a surface that differs from place to place.")
-
-
-def shown(one: Quantity, unit: tuple | None = None) -> tuple:
-    """Value, interval and unit as texts; no interval is an empty text.
-
-    unit: (name, scale) for a length, None for the one that suits the value. An angle is in degrees.
-    """
-    name, scale = ("", 1.0) if one.unit == "1" else ("deg", np.degrees(1.0)) if one.unit == "rad" else \
-        unit or step_of(LADDERS[one.unit], one.value or 0.0)
-    if one.value is None:
-        return "none", "", ""
-    interval = "" if one.low is None else f"{plain(one.low * scale, 3)} .. {plain(one.high * scale, 3)}"
-    return plain(one.value * scale, 5), interval, name
+LATERAL = (
+    "PSm",
+    "RSm",
+    "dominant_wavelength",
+    "Sal",
+)  # lengths along the surface; all others are heights
+INTERVAL = (
+    "Interval: 90 % interval (from 5 % to 95 %) of the mean over all {} of this {}, for a surface with Gaussian "
+    "heights and the spectrum of this {}. A kurtosis above 3 makes the interval wider. The interval does not hold for "
+    "a surface that differs from place to place."
+)
+SCAN_INTERVAL = INTERVAL.format("scans", "size", "scan")
+TRACE_INTERVAL = INTERVAL.format("traces", "length", "trace")
+MEANS = (
+    "Interval: 95 % interval of the mean, by Student's t from the scatter of the files, each with "
+    "equal weight. The interval does not include an error common to all files, such as "
+    "calibration. Scatter: standard deviation of the values of single files."
+)
 
 
-def units_of(report: RoughnessReport) -> dict:
-    """One unit (name, scale) for all heights of a report and one for all lengths along it, by parameter."""
-    root = report["Sq" if report.kind == "areal" else "Pq"].value
-    along = [one.value for one in report.values if one.name in ALONG and one.value is not None]
-    units = step_of(LADDERS["m"], max(along, default=1e-3)), step_of(LADDERS["m"], 3 * root)
-    return {one.name: units[one.name not in ALONG] for one in report.values}
+def _units(report: RoughnessReport) -> dict:
+    """Choose one unit (name, scale) for all heights and one for all lengths, by parameter."""
+    rms = report["Sq" if report.kind == "areal" else "Pq"].value
+    lengths = [
+        value.value for value in report.values if value.name in LATERAL and value.value is not None
+    ]
+    lateral = step_of(LADDERS["m"], max(lengths, default=1e-3))
+    vertical = step_of(LADDERS["m"], 3 * rms)
+    units = {}
+    for value in report.values:
+        units[value.name] = lateral if value.name in LATERAL else vertical
+        if value.unit == "1":
+            units[value.name] = ("", 1.0)
+    return units
+
+
+def _parameters(report: RoughnessReport) -> QuantityTable:
+    units = _units(report)
+    rows = []
+    for value in report.values:
+        reason = value.reason if value.value is None else ""
+        rows.append(Row(value.name, value, units[value.name], remark=reason, meaning=reason))
+    return QuantityTable(("parameter", "value", "90 %: from .. to", "unit"), rows)
 
 
 def heading(report: RoughnessReport) -> str:
-    """What was measured and how it was treated, in one line."""
-    shape = " x ".join(str(count) for count in report.shape)
-    text = f"{shape} heights" if report.measured in (None, report.shape[-1]) else \
-        f"{report.measured} heights, resampled to {shape}"
-    text += f", {say(report.length)} long, every {say(report.step)}"
-    if report.window is not None:
-        ends = [f"{say(low)} to {say(high)}" for low, high in zip(report.window[::2], report.window[1::2])]
-        text += f", window {' in x, '.join(ends)}{' in y' * (len(ends) > 1)}"
-    text += f", about the least-squares {report.form}"
-    short = report.settings.short
+    """Describe the surface and its treatment in one line."""
+    size = report.sampling
+    treatment = report.treatment
+    shape = " x ".join(map(str, size.shape))
+    text = f"{shape} heights"
+    if size.measured not in (None, size.shape[-1]):
+        text = f"{size.measured} heights, resampled to {shape}"
+    text += f", {say(size.length)} long, every {say(size.step)}"
+    if treatment.window is not None:
+        ends = [
+            f"{say(low)} to {say(high)}"
+            for low, high in zip(treatment.window[::2], treatment.window[1::2])
+        ]
+        text += (
+            f", window {ends[0]}" if len(ends) == 1 else f", window {ends[0]} in x, {ends[1]} in y"
+        )
+    text += f", about the least-squares {treatment.form}"
     if report.kind == "areal":
-        return text + _areal_filters(short, report.cutoff, bool(np.isnan(report.scan.z).any()))
-    if report.cutoff is None:
-        fits = fitting_cutoff(report.length + report.step, report.step)  # a step for each sample
-        text += "; no cut-off, so no roughness profile" + (
-            f' (--cutoff "{say(fits)}" is the longest standard cut-off of which five fit into the trace once half a '
-            'cut-off is trimmed at each end)' if fits else
-            "; no standard cut-off fits five times into the trace once half of it is trimmed at each end")
-        return text + (f"; S-filter at {say(short)}, half this length trimmed at each end" if short else "")
-    return (f"{text}; Gaussian filter at {say(report.cutoff)}, half this length trimmed at each end, "
-            + (f"S-filter at {say(short)}, half this length trimmed at each end" if short else
-               "no filter for short waves"))
+        return text + _areal_filters(
+            treatment.short, treatment.cutoff, has_holes=bool(np.isnan(report.surface.z).any())
+        )
+    short = (
+        f"S-filter at {say(treatment.short)}, half this length trimmed at each end"
+        if treatment.short
+        else ""
+    )
+    if treatment.cutoff is not None:
+        cutoff = f"Gaussian filter at {say(treatment.cutoff)}, half this length trimmed at each end"
+        return f"{text}; {cutoff}, {short or 'no filter for short waves'}"
+    fitting = fitting_cutoff(
+        size.length + size.step, size.step
+    )  # a trace has one step for each sample
+    advice = "; no standard cut-off fits five times into the trace once half of it is trimmed at each end"
+    if fitting:
+        advice = (
+            f' (--cutoff "{say(fitting)}" is the longest standard cut-off of which five fit into the trace once half a '
+            "cut-off is trimmed at each end)"
+        )
+    return f"{text}; no cut-off, so no roughness profile{advice}" + (f"; {short}" if short else "")
 
 
-def _areal_filters(short: float | None, cutoff: float | None, holes: bool) -> str:
-    """The filters of a scan in words, and the name of the surface behind them."""
-    parts = [f"{name}-filter at {say(one)}" for name, one in (("S", short), ("L", cutoff)) if one]
+def _areal_filters(short: float | None, cutoff: float | None, *, has_holes: bool) -> str:
+    """Name the filters of a scan and the surface that they leave."""
+    parts = [
+        f"{name}-filter at {say(length)}"
+        for name, length in (("S", short), ("L", cutoff))
+        if length
+    ]
     if not parts:
         return "; no filter"
-    surface = " (the S-L surface)" if short and cutoff else " (the S-F surface)" if short else ""
-    lengths = "each length" if parts[1:] else "this length"
-    return (f"; Gaussian {' and '.join(parts)}{surface}, half {lengths} trimmed at each border"
-            + ("; near a hole the filter weights of the measured heights are scaled to a sum of one" if holes else ""))
+    surface = ""
+    if short:
+        surface = " (the S-L surface)" if cutoff else " (the S-F surface)"
+    lengths = "each length" if len(parts) > 1 else "this length"
+    holes = (
+        "; near a hole the filter weights of the measured heights are scaled to a sum of one"
+        if has_holes
+        else ""
+    )
+    return (
+        f"; Gaussian {' and '.join(parts)}{surface}, half {lengths} trimmed at each border{holes}"
+    )
 
 
-def lines_of(report: RoughnessReport, verbose: bool = False) -> list:
-    """The report as lines: a table of value, interval and unit, with definitions where asked."""
-    out = [f"{report.source}: {heading(report)}"]
-    out.append(f"  {'':<20} {'value':>10}  {'90 %: from .. to':<20} unit")
-    units = units_of(report)
-    for one in report.values:
-        value, interval, unit = shown(one, units[one.name])
-        tail = one.reason if one.value is None else ""
-        out.append(f"  {one.name:<20} {value:>10}  {interval:<20} {unit:<4} {tail}".rstrip())
-        if verbose:
-            out.append(f"  {'':<20}   {one.text}")
-    out += [f"  no interval of {', '.join(names)}: {reason}" for reason, names in _untold(report).items()]
-    out += asperities.lines_of(_told(report), report.cutoff) if report.kind == "profile" else []
-    if report.tip is not None:
-        out.append(f"  {report.tip.sentence}")
-    return out
+def lines_of(report: RoughnessReport, *, verbose: bool = False) -> list:
+    """Return the report as lines: a table of the parameters, with their definitions if verbose."""
+    out = [f"{report.source}: {heading(report)}", *_parameters(report).lines()]
+    if verbose:
+        out += [f"  {value.name}: {value.text}" for value in report.values]
+    out += [
+        f"  no interval of {', '.join(names)}: {reason}"
+        for reason, names in _names_by_reason(report).items()
+    ]
+    return out + _asperity_lines(report)
 
 
-def _told(report: RoughnessReport) -> peaks.Told | None:
-    """What the primary profile below the cut-off tells of its peaks, None where it tells none."""
+def _asperities(report: RoughnessReport) -> TraceMoments | None:
+    """Measure the moments of the primary profile below the cut-off, None if it has none."""
     try:
-        return peaks.told_by(report.primary, report.cutoff)
+        return trace_moments(report.surface.primary, report.treatment.cutoff)
     except PatchfemError:
         return None
 
 
+def _asperity_lines(report: RoughnessReport) -> list:
+    if report.kind == "areal":
+        return []
+    return asperities.lines_of(_asperities(report), report.treatment.cutoff)
+
+
 def means_lines(reports: list) -> list:
-    """The means over several files as lines, of two traces also as the faces of one contact; () without any."""
+    """Return the means over several files as lines.
+
+    Of two traces also the asperities of both faces combined.
+    """
     out = []
-    if len(reports) == 2 and all(one.kind == "profile" for one in reports):
-        one, other = map(_told, reports)
-        out = ["", "Both surfaces as the two faces of one contact:",
-               *asperities.lines_of(one and other and one.beside(other), reports[0].cutoff)]
-    for each in means.means_of(reports):
-        out += ["", _of_many(each), f"  {'':<20} {'mean':>10}  {'95 %: from .. to':<20} {'scatter':<10} unit"]
-        out += [f"  {name:<20} {value:>10}  {interval:<20} {scatter:<10} {unit}".rstrip()
-                for name, value, interval, scatter, unit in _means(each)]
-        out += [f"  {each.doubt}"] * bool(each.doubt)
+    if len(reports) == 2 and all(report.kind == "profile" for report in reports):
+        first, second = map(_asperities, reports)
+        both = first.combine(second) if first and second else None
+        out = ["", "Both surfaces as the two faces of one contact:"]
+        out += asperities.lines_of(both, reports[0].treatment.cutoff)
+    for means in average_reports(reports):
+        out += ["", _means_heading(means), *_means_table(means).lines()]
+        if means.caution:
+            out.append(f"  {means.caution}")
     return out
 
 
-def _of_many(each: means.Means) -> str:
-    return f"Mean of {each.count} {means.KINDS[each.kind]}"
+def _means_heading(means: Means) -> str:
+    return f"Mean of {means.count} {KINDS[means.kind]}"
 
 
-def _means(each: means.Means) -> list:
-    """Name, mean, interval, scatter and unit of each mean, as texts."""
-    out = []
-    for name, one in each.values.items():
-        unit = ("", 1.0) if one.mean.unit == "1" else step_of(LADDERS[one.mean.unit], one.mean.value)
-        value, interval, _ = shown(one.mean, unit)
-        out.append([name, value, interval, plain(one.scatter * unit[1], 3), unit[0]])
-    return out
+def _means_table(means: Means) -> QuantityTable:
+    rows = []
+    for name, average in means.values.items():
+        unit = ("", 1.0)
+        if average.mean.unit != "1":
+            unit = step_of(LADDERS[average.mean.unit], average.mean.value)
+        rows.append(Row(name, average.mean, unit, (plain(average.scatter * unit[1], 3),)))
+    return QuantityTable(("parameter", "mean", "95 %: from .. to", "scatter", "unit"), rows)
 
 
 def means_data(reports: list) -> list:
-    """The means over several files as plain data in SI."""
-    def data(one: Mean) -> dict:
-        value, low, high, unit = one.mean[:4]
-        return {"value": value, "low": low, "high": high, "unit": unit, "scatter": one.scatter}
-    return [{"kind": each.kind, "files": each.count, "confidence": 0.95, "notes": [each.doubt] * bool(each.doubt),
-             "measures": {name: data(one) for name, one in each.values.items()}} for each in means.means_of(reports)]
+    """Return the means over several files as plain data in SI."""
+    out = []
+    for means in average_reports(reports):
+        measures = {}
+        for name, average in means.values.items():
+            value, low, high, unit = average.mean[:4]
+            measures[name] = {
+                "value": value,
+                "low": low,
+                "high": high,
+                "unit": unit,
+                "scatter": average.scatter,
+            }
+        notes = [means.caution] if means.caution else []
+        out.append(
+            {
+                "kind": means.kind,
+                "files": means.count,
+                "confidence": 0.95,
+                "notes": notes,
+                "measures": measures,
+            }
+        )
+    return out
 
 
 def write_csv(path: Path, reports: list) -> None:
-    """Write a row for each file: its parameters with the ends of their intervals in SI, "" for what it has not."""
-    names = {one.name: one.unit for report in reports for one in report.values}
-    rows = [["file", *(f"{name}{end} [{unit}]" for name, unit in names.items() for end in ("", "_low", "_high"))]]
+    """Write a row for each file: its parameters and their bounds in SI, "" if missing."""
+    units = {value.name: value.unit for report in reports for value in report.values}
+    columns = [(name, field) for name in units for field in ("value", "low", "high")]
+    head = ["file"]
+    for name, field in columns:
+        head.append(f"{name}{'' if field == 'value' else f'_{field}'} [{units[name]}]")
+    lines = [head]
     for report in reports:
-        own = {one.name: one[:3] for one in report.values}
-        rows.append([report.source, *("" if value is None else repr(value) for name in names
-                                      for value in own.get(name, (None, None, None)))])
-    write_rows(path, rows)
+        values = {value.name: value for value in report.values}
+        numbers = [getattr(values.get(name), field, None) for name, field in columns]
+        lines.append(
+            [report.source, *("" if number is None else repr(number) for number in numbers)]
+        )
+    write_rows(path, lines)
 
 
 def write_surfaces(folder: Path, reports: list) -> None:
-    """Write the heights that the parameters are read from into `surfaces`: of a trace `primary.csv`, with a cut-off
-    also `roughness.csv`, of a scan `surface.x3p` and `surface.csv`; of several files with its number behind the name.
+    """Write the heights that the parameters are read from into `surfaces`.
+
+    Of a trace these are `primary.csv` and, with a cut-off, `roughness.csv`; of a scan `surface.x3p`
+    and `surface.csv`. With several files the number of the file is appended to the name.
     """
     folder = folder / "surfaces"
     folder.mkdir()
-    for number, one in enumerate(reports, 1):
-        tail = f"-{number}" * (len(reports) > 1)
-        for name in ("primary", "roughness"):
-            if (trace := getattr(one, name)) is not None:
-                write_profile(folder / f"{name}{tail}.csv", trace.x, trace.z)
-        if (scan := one.scan) is not None:
-            write_x3p(folder / f"surface{tail}.x3p", scan.x, scan.y, scan.z, f"{Path(one.source).name}: {heading(one)}")
-            write_columns(folder / f"surface{tail}.csv", scan.x, scan.y, scan.z)
+    for number, report in enumerate(reports, 1):
+        suffix = f"-{number}" if len(reports) > 1 else ""
+        surface = report.surface
+        if report.kind == "areal":
+            title = f"{Path(report.source).name}: {heading(report)}"
+            write_x3p(folder / f"surface{suffix}.x3p", surface.x, surface.y, surface.z, title)
+            write_columns(folder / f"surface{suffix}.csv", surface.x, surface.y, surface.z)
+            continue
+        write_profile(folder / f"primary{suffix}.csv", surface.primary.x, surface.primary.z)
+        if surface.roughness is not None:
+            write_profile(
+                folder / f"roughness{suffix}.csv", surface.roughness.x, surface.roughness.z
+            )
 
 
-def _untold(report: RoughnessReport) -> dict:
-    """The parameters without an interval, by the reason."""
+def _names_by_reason(report: RoughnessReport) -> dict:
+    """Group the parameters without an interval by the reason."""
     out: dict = {}
-    for one in report.values:
-        if one.value is not None and one.low is None and one.reason:
-            out.setdefault(one.reason, []).append(one.name)
+    for value in report.values:
+        if value.value is not None and value.low is None and value.reason:
+            out.setdefault(value.reason, []).append(value.name)
     return out
 
 
 def data_of(report: RoughnessReport) -> dict:
-    """The report as plain data in SI."""
+    """Return the report as plain data in SI."""
     measures = {}
-    for one in report.values:
-        measures[one.name] = {"value": one.value, "low": one.low, "high": one.high, "unit": one.unit}
-        if one.reason:
-            measures[one.name]["reason"] = one.reason
-    out = {"file": report.source, "kind": report.kind, "length": report.length, "step": report.step,
-           "shape": list(report.shape), "cutoff": report.cutoff,
-           "window": None if report.window is None else list(report.window), "form": report.form,
-           "s_filter": report.settings.short, "confidence": 0.9, "measures": measures,
-           "notes": list(report.notes)}
+    for value in report.values:
+        measures[value.name] = {
+            "value": value.value,
+            "low": value.low,
+            "high": value.high,
+            "unit": value.unit,
+        }
+        if value.reason:
+            measures[value.name]["reason"] = value.reason
+    treatment = report.treatment
+    out = {
+        "file": report.source,
+        "kind": report.kind,
+        "length": report.sampling.length,
+        "step": report.sampling.step,
+        "shape": list(report.sampling.shape),
+        "cutoff": treatment.cutoff,
+        "window": None if treatment.window is None else list(treatment.window),
+        "form": treatment.form,
+        "s_filter": treatment.short,
+        "confidence": 0.9,
+        "measures": measures,
+        "notes": list(report.notes),
+    }
     if report.kind == "profile":
-        out["band"] = list(report.band)
-        out["asperities"] = asperities.data_of(_told(report), report.cutoff)
-    if report.tip is not None:
-        out["tip"] = {"radius": report.tip.radius, "valley_radius": report.tip.valleys,
-                      "narrow_share": report.tip.share, "text": report.tip.sentence}
+        out["band"] = list(BAND)
+        out["asperities"] = asperities.data_of(_asperities(report), treatment.cutoff)
     return out
 
 
 def page(reports: list) -> str:
-    """The page of one or several surfaces, nothing fetched."""
-    title = "Roughness of " + ", ".join(Path(one.source).name for one in reports)
-    sections = [_mean_section(one) for one in means.means_of(reports)]
-    sections += [_section(number, one) for number, one in enumerate(reports)]
+    """Return the page of one or several surfaces, which needs no other file."""
+    title = "Roughness of " + ", ".join(Path(report.source).name for report in reports)
+    sections = [_means_section(means) for means in average_reports(reports)]
+    sections += [_section(number, report) for number, report in enumerate(reports)]
     return document(title, f"<p class=soft>patchfem {escape(__version__)}</p>", sections)
 
 
 def write_page(path: Path, reports: list) -> None:
-    """Write the page."""
+    """Write the page of one or several surfaces."""
     write_text(path, page(reports))
 
 
-def _mean_section(each: means.Means) -> Section:
-    rows = table(("parameter", ">mean", ">95 %: from .. to", ">scatter", "unit"), _means(each))
-    doubt = warned([f"{each.doubt[0].upper()}{each.doubt[1:]}."]) if each.doubt else ""
-    return Section(f"mean-{each.kind}", _of_many(each), f"{doubt}{rows}<p class=soft>{prose(MEANS)}</p>")
+def _means_section(means: Means) -> Section:
+    caution = warned([f"{means.caution[0].upper()}{means.caution[1:]}."]) if means.caution else ""
+    body = f"{caution}{_means_table(means).html()}<p class=soft>{prose(MEANS)}</p>"
+    return Section(f"mean-{means.kind}", _means_heading(means), body)
 
 
 def _section(number: int, report: RoughnessReport) -> Section:
-    parts = [f"<p class=verdict>{verdict(report)}</p>", f"<p class=soft>{escape(heading(report))}.</p>"]
-    told = [*report.notes, *([report.tip.sentence] if report.tip is not None and not report.tip.reaches else [])]
-    parts.append(warned([f"{text}." for text in told]))
-    if report.tip is not None and report.tip.reaches:
-        parts.append(f"<p class=soft>Stylus: {prose(report.tip.sentence)}.</p>")
-    parts += [figure(f"{number}{place}", *one) for place, one in enumerate(figures(report))]
-    parts += [_table(report), _definitions(report)]
+    parts = [
+        f"<p class=verdict>{_verdict(report)}</p>",
+        f"<p class=soft>{escape(heading(report))}.</p>",
+        warned([f"{text}." for text in report.notes]),
+    ]
+    drawn = _scan_pictures(report) if report.kind == "areal" else _trace_pictures(report)
+    parts += [figure(f"{number}{place}", *picture) for place, picture in enumerate(drawn)]
+    parts.append(f"<h3>Parameters</h3>{_parameters(report).html()}")
+    if any(value.low is not None for value in report.values):
+        parts.append(
+            f"<p class=soft>{SCAN_INTERVAL if report.kind == 'areal' else TRACE_INTERVAL}</p>"
+        )
+    for reason, names in _names_by_reason(report).items():
+        parts.append(
+            f"<p class=soft>No interval of {escape(', '.join(names))}: {prose(reason)}.</p>"
+        )
+    definitions = [[escape(value.name), prose(value.text)] for value in report.values]
+    parts.append(f"<h3>Definitions</h3>{table(('', ''), definitions)}")
     if report.kind == "profile":
-        parts.append(f"<pre>{escape(chr(10).join(asperities.lines_of(_told(report), report.cutoff)))}</pre>")
+        parts.append(f"<pre>{escape(chr(10).join(_asperity_lines(report)))}</pre>")
     return Section(f"surface{number}", report.source, "\n".join(parts))
 
 
-def verdict(report: RoughnessReport) -> str:
-    """The answer in a sentence."""
+def _verdict(report: RoughnessReport) -> str:
+    """Return the main parameters as one sentence of HTML."""
     if report.kind == "areal":
         names = ("Sa", "Sq", "Sz", "Ssk")
     else:
-        names = ("Ra", "Rz", "RSm") if report.cutoff is not None else ("Pa", "Pq", "Pt")
+        names = ("Pa", "Pq", "Pt") if report.treatment.cutoff is None else ("Ra", "Rz", "RSm")
         names += ("dominant_wavelength", "band_amplitude")
-    known = [report[name] for name in names]
-    return "; ".join(f"<span class=v><b>{escape(one.name.replace('_', ' '))}</b> {escape(_said(one))}</span>"
-                     for one in known if one.value is not None) + "."
+    spans = [
+        f"<span class=v><b>{escape(name.replace('_', ' '))}</b> "
+        f"{escape(_text(report, name))}</span>"
+        for name in names
+        if report[name].value is not None
+    ]
+    return "; ".join(spans) + "."
 
 
-def _said(one: Quantity) -> str:
-    value, interval, unit = shown(one)
-    return f"{value} {unit}".rstrip() + (f" ({interval})" if interval else "")
+def _text(report: RoughnessReport, name: str) -> str:
+    return format_quantity(report[name]).long
 
 
-def figures(report: RoughnessReport) -> list:
-    """Pictures [(svg, caption, alternative text)] of a report."""
-    if report.kind == "areal":
-        flat = report.scan
-        return [(pictures.scan(flat.x, flat.y, flat.z), "Heights from which the parameters are computed, and their "
-                                                        "distribution; the colours leave out the outermost 0.2 % of "
-                                                        "the points.",
-                 f"Map and histogram of the heights of {report.source}: {_said(report['Sq'])} root mean square"),
-                (pictures.draw([pictures.bearing(report.abbott, report.core, ("Smr1", "Smr2"))]),
-                 "Abbott curve of these heights; dashed: the straight line of its core.",
-                 f"Abbott curve of {report.source}: core height {_said(report['Sk'])}")]
-    lines = "the waviness drawn on it" if report.waviness is not None else "no cut-off was given"
-    height = report["Pt"]
-    out = [(pictures.trace(report.primary, report.waviness), f"Trace about the least-squares {report.form}; {lines}.",
-            f"Heights of {report.source} along x: {_said(height)} from the deepest valley to the highest peak")]
-    if report.roughness is not None:
-        out.append((pictures.rough(report.roughness, (report.primary.x[0], report.primary.x[-1]), report.cutoff),
-                    f"Roughness: the trace minus the waviness, in sections of {say(report.cutoff)}; half a section is "
-                    "trimmed at each end.", f"Roughness profile: Rq {_said(report['Rq'])}"))
-    kind = "roughness profile" if report.roughness is not None else "levelled trace"
-    count, wave = report.spectrum.tapers, report["dominant_wavelength"]
-    out.append((pictures.statistics(report.abbott, report.core, report.spectrum, report.band, report.cutoff),
-                f"Left: Abbott curve of the {kind}; dashed: the straight line of its core. Right: spectrum of the "
-                f"levelled trace, the mean of {count} sine tapers, with its 95 % band by chi-square of {2 * count} "
-                "degrees of freedom.",
-                f"Abbott curve and power spectral density; the dominant wavelength is {_said(wave)}"))
+def _scan_pictures(report: RoughnessReport) -> list:
+    surface = report.surface
+    heights = Picture(
+        pictures.scan(surface.x, surface.y, surface.z),
+        "Heights from which the parameters are computed, and their distribution; the colours leave "
+        "out the outermost 0.2 % of the points.",
+        f"Map and histogram of the heights of {report.source}: {_text(report, 'Sq')} root mean "
+        "square",
+    )
+    bearing = Picture(
+        pictures.draw([pictures.bearing(report.heights, ("Smr1", "Smr2"))]),
+        "Abbott curve of these heights; dashed: the straight line of its core.",
+        f"Abbott curve of {report.source}: core height {_text(report, 'Sk')}",
+    )
+    return [heights, bearing]
+
+
+def _trace_pictures(report: RoughnessReport) -> list:
+    parts = report.surface
+    cutoff = report.treatment.cutoff
+    waviness = "no cut-off was given" if cutoff is None else "the waviness drawn on it"
+    kind = "levelled trace" if cutoff is None else "roughness profile"
+    out = [
+        Picture(
+            pictures.trace(parts.primary, parts.waviness),
+            f"Trace about the least-squares {report.treatment.form}; {waviness}.",
+            f"Heights of {report.source} along x: {_text(report, 'Pt')} from the deepest valley to "
+            "the highest peak",
+        )
+    ]
+    if cutoff is not None:
+        ends = (parts.primary.x[0], parts.primary.x[-1])
+        out.append(
+            Picture(
+                pictures.rough(parts.roughness, ends, cutoff),
+                f"Roughness: the trace minus the waviness, in sections of {say(cutoff)}; half a "
+                "section is trimmed at each end.",
+                f"Roughness profile: Rq {_text(report, 'Rq')}",
+            )
+        )
+    tapers = parts.spectrum.tapers
+    out.append(
+        Picture(
+            pictures.statistics(report.heights, parts.spectrum, BAND, cutoff),
+            f"Left: Abbott curve of the {kind}; dashed: the straight line of its core. Right: "
+            f"spectrum of the levelled trace, the mean of {tapers} sine tapers, with its 95 % band "
+            f"by chi-square of {2 * tapers} degrees of freedom.",
+            "Abbott curve and power spectral density; the dominant wavelength is "
+            f"{_text(report, 'dominant_wavelength')}",
+        )
+    )
     return out
-
-
-def _table(report: RoughnessReport) -> str:
-    rows, units = [], units_of(report)
-    for one in report.values:
-        value, interval, unit = shown(one, units[one.name])
-        rows.append([escape(one.name), *([escape(value), escape(interval), escape(unit)] if one.value is not None else
-                                         [f"<td colspan=3 class=soft>{prose(one.reason)}</td>"])])
-    return (f"<h3>Parameters</h3>{table(('parameter', '>value', '>90 %: from .. to', 'unit'), rows)}"
-            + (f"<p class=soft>{escape(AREAL if report.kind == 'areal' else INTERVAL)}</p>"
-               if any(one.low is not None for one in report.values) else "")
-            + "".join(f"<p class=soft>No interval of {escape(', '.join(names))}: {prose(reason)}.</p>"
-                      for reason, names in _untold(report).items()))
-
-
-def _definitions(report: RoughnessReport) -> str:
-    rows = [[escape(one.name), prose(one.text)] for one in report.values]
-    return f"<h3>Definitions</h3>{table(('', ''), rows)}"

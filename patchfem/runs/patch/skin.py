@@ -47,7 +47,7 @@ def ranged(asked, pressure: float) -> list:
     if part.from_ is not None:
         found = traces.of_trace(Path(part.from_), part.cutoff)
         half = f" (from every second sample: {_half(asked, found.coarse, pressure)})"
-        told = [f"contact.asperities: {one}" for one in (*found.walls, found.doubt) if one]
+        told = [f"contact.asperities: {one}" for one in (*found.dust, found.not_gaussian) if one]
     elif asked.gap.profile is not None and part.cutoff is None:
         told = ["contact.asperities.rms_height: the profile already contains all waves longer than "
                 f"{say(2 * asked.gap.average)}; if rms_height comes from the same trace as the profile, give the rms "
@@ -62,7 +62,7 @@ def ranged(asked, pressure: float) -> list:
 def _half(asked, coarse, pressure: float) -> str:
     """The stiffness of the peaks that the Moments of every second sample of the trace tell, as words."""
     try:
-        one = peaks.peaks_of(coarse) if coarse else None
+        one = peaks.gaussian_peaks(coarse) if coarse else None
     except PatchfemError:
         one = None
     if one is None:

@@ -24,7 +24,7 @@ _HEADER = re.compile(r"^\s*Lateral\s+(\w+)\s*,\s*Raw\s+(\w+)[^\n]*$", re.MULTILI
 
 
 def dektak(raw: Raw) -> Profile:
-    """The trace of a Dektak export, with the tip's radius; PatchfemError names the line."""
+    """The trace of a Dektak export; PatchfemError names the line."""
     path, text = raw.path, text_of(raw)
     header = _HEADER.search(text)
     if header is None:
@@ -39,8 +39,7 @@ def dektak(raw: Raw) -> Profile:
     settings = _settings(text[:header.start()])
     x, notes = _stepped(path, found["x"], _length(settings.get("Length", "")), factors[0])
     found = checked(path, x, found["z"], at, tuple(factors))
-    tip = re.search(r"Radius:\s*(.*)", settings.get("Stylus", ""))
-    return replace(found, notes=notes + found.notes, tip_radius=_length(tip[1]) if tip else None)
+    return replace(found, notes=notes + found.notes)
 
 
 def _settings(head: str) -> dict:

@@ -1,7 +1,8 @@
-"""Roughness of a trace or of an areal scan: filter, parameters, spectrum, each with its interval.
+"""Roughness of a trace or of an areal scan: filters, parameters, spectrum, intervals.
 
-In: a `Profile` or an `Areal` [m]. Out: a `RoughnessReport`: the parameters of ISO 21920-2 (4287, 13565-2), of the
-primary profile without a cut-off and of the roughness profile with one, spectrum, Abbott curve, the stylus's reach.
-The filter is that of ISO 16610-21; `rows` has the definitions, one record each; `intervals` says what a single trace
-can tell. Read `report` first, then `rows`.
+In: a `Profile` or an `Areal` [m]. Out: a `RoughnessReport` with the parameters of ISO 21920-2 and
+ISO 13565-2 of the primary profile, with a cut-off also those of the roughness profile (Gaussian
+filter, ISO 16610-21), or those of ISO 25178-2 for a scan. A single measurement gives an interval
+for many of them (`intervals`). `peaks` derives the asperities of a surface from its traces. Read
+`report` first, then `rows`, which defines each parameter.
 """

@@ -1,4 +1,4 @@
-"""Gaussian filters: a trace splits into waviness and roughness at a cut-off (ISO 16610-21), a scan likewise (-61)."""
+"""Gaussian filters of traces (ISO 16610-21) and of areal scans (ISO 16610-61)."""
 
 from dataclasses import replace
 
@@ -8,116 +8,117 @@ from ...core import PatchfemError, frozen_array, say
 from ..areal import Areal
 from ..profile import Profile, even, level
 
-ALPHA = np.sqrt(np.log(2) / np.pi)  # half of a wave as long as the cut-off passes
-REACH = 1.25  # cut-offs to either side; beyond them lies 1.5e-10 of the weight
-FEWEST = 4  # steps of a cut-off
+ALPHA = np.sqrt(
+    np.log(2) / np.pi
+)  # width of the weights / cut-off; a wave of one cut-off passes with half its height
+REACH_FACTOR = 1.25  # half-length of the weights / cut-off; only 1.5e-10 of their sum lies beyond
+MIN_CUTOFF_STEPS = 4  # a shorter cut-off, in steps, is not resolved by the samples
 
 
-def filtered(profile: Profile, cutoff: float, ends: str = "trimmed") -> tuple:
-    """Waviness and roughness of a trace at a cut-off [m], both of them a Profile.
+def filter_trace(profile: Profile, cutoff: float) -> tuple[Profile, Profile]:
+    """Split a trace at a cut-off [m] into waviness and roughness.
 
-    The trace is put on an even step (`even`), its least-squares line is subtracted, and the weighting function of
-    ISO 16610-21, exp(-pi (x / (alpha cutoff))^2) / (alpha cutoff) with alpha = sqrt(ln 2 / pi), takes the mean line.
-    ends: "trimmed": half a cut-off is left off at each end, and where the weighting function still reaches beyond the
-    trace, the part within is scaled to a sum of one; "whole": nothing is left off, and the mean line at the ends is
-    that of the weighted least-squares line (ISO 16610-28, first moment). PatchfemError for a cut-off of fewer
-    than four steps or, trimmed, as long as the trace.
+    The trace is put on an even step and levelled. The mean line is its convolution with the weights
+    exp(-pi (x / (alpha cutoff))^2), alpha = sqrt(ln 2 / pi); half a cut-off is trimmed at each end.
+    Raises PatchfemError if the cut-off is shorter than four steps or as long as the trace.
     """
-    if ends not in ("trimmed", "whole"):
-        raise PatchfemError(f"a filtered trace has no treatment of its ends called '{ends}'; use trimmed or whole")
     flat = level(even(profile))
     step = flat.length / (flat.x.size - 1)
-    _refuse_short(profile.source, cutoff, step)
-    edge = int(np.ceil(cutoff / 2 / step * (1 - 1e-9))) if ends == "trimmed" else 0
-    if 2 * edge > flat.x.size - 2 or cutoff > 2 * flat.length:
-        raise PatchfemError(f"{profile.source}: the trace is {say(flat.length)} long; half a cut-off of {say(cutoff)} "
-                            "is trimmed at each end, so the cut-off must be shorter than the trace")
-    line = mean_line(flat.z, cutoff / step, ends == "whole")
-    keep = slice(edge, flat.x.size - edge)
-    x = frozen_array(flat.x[keep])
-    return (replace(flat, x=x, z=frozen_array(line[keep])), replace(flat, x=x, z=frozen_array((flat.z - line)[keep])))
+    kept = _trim(profile.source, cutoff, flat.x, "trace")
+    line = mean_line(flat.z, cutoff / step)
+    x = frozen_array(flat.x[kept])
+    waviness = replace(flat, x=x, z=frozen_array(line[kept]))
+    roughness = replace(flat, x=x, z=frozen_array((flat.z - line)[kept]))
+    return waviness, roughness
 
 
-def _refuse_short(source: str, cutoff: float, step: float) -> None:
-    if not np.isfinite(cutoff) or cutoff < FEWEST * step * (1 - 1e-9):
-        raise PatchfemError(f"{source}: a cut-off of {say(cutoff)} is shorter than {FEWEST} steps of {say(step)}; for "
-                            f"this trace the cut-off must be at least {say(FEWEST * step)}")
+def filter_scan(scan: Areal, cutoff: float) -> tuple[Areal, Areal]:
+    """Split a levelled scan at a nesting index [m] into its long and its short waves.
 
-
-def filtered_scan(scan: Areal, cutoff: float) -> tuple:
-    """Waves longer and shorter than a cut-off [m] (the nesting index) of a scan, both of them an Areal.
-
-    The weighting function is that of ISO 16610-61, the product of those of a trace along x and along y. Half a cut-off
-    is left off at each border. A missing height has no weight and stays missing; beside it, and where the function
-    still reaches beyond the border, the part on measured heights is scaled to a sum of one. The scan should be level:
-    its form is bent beside holes and borders. PatchfemError for a cut-off of fewer than four steps or as long as the
-    shorter side. 1000 x 1000 heights: 0.4 s.
+    Half a cut-off is trimmed at each border. Missing heights have no weight and stay missing.
+    Raises PatchfemError if the cut-off is shorter than four steps or as long as the shorter side.
+    1000 x 1000 heights take 0.4 s.
     """
-    steps = [float(axis[-1] - axis[0]) / (axis.size - 1) for axis in (scan.y, scan.x)]
-    _refuse_short(scan.source, cutoff, max(steps))
-    edges = [int(np.ceil(cutoff / 2 / step * (1 - 1e-9))) for step in steps]
-    if any(2 * edge > count - 2 for edge, count in zip(edges, scan.z.shape)):
-        short = min(float(axis[-1] - axis[0]) for axis in (scan.y, scan.x))
-        raise PatchfemError(f"{scan.source}: the shorter side is {say(short)} long; half a cut-off of {say(cutoff)} "
-                            "is trimmed at each border, so the cut-off must be shorter than that side")
-    waves = mean_surface(scan.z, tuple(cutoff / step for step in steps))
-    rows, columns = (slice(edge, count - edge) for edge, count in zip(edges, scan.z.shape))
+    axes = (scan.y, scan.x)
+    _trim(scan.source, cutoff, min(axes, key=np.ptp), "shorter side")
+    rows, columns = (_trim(scan.source, cutoff, axis, "shorter side") for axis in axes)
+    cutoffs = tuple(cutoff * (axis.size - 1) / float(axis[-1] - axis[0]) for axis in axes)
+    waves = mean_surface(scan.z, cutoffs)
     inner = replace(scan, x=frozen_array(scan.x[columns]), y=frozen_array(scan.y[rows]))
-    return (replace(inner, z=frozen_array(waves[rows, columns])),
-            replace(inner, z=frozen_array((scan.z - waves)[rows, columns])))
+    long_waves = replace(inner, z=frozen_array(waves[rows, columns]))
+    short_waves = replace(inner, z=frozen_array((scan.z - waves)[rows, columns]))
+    return long_waves, short_waves
+
+
+def _trim(source: str, cutoff: float, axis: np.ndarray, name: str) -> slice:
+    """Return the samples of an axis that lie half a cut-off [m] or more from both of its ends."""
+    length = float(axis[-1] - axis[0])
+    step = length / (axis.size - 1)
+    if not np.isfinite(cutoff) or cutoff < MIN_CUTOFF_STEPS * step * (1 - 1e-9):
+        raise PatchfemError(
+            f"{source}: a cut-off of {say(cutoff)} is shorter than {MIN_CUTOFF_STEPS} steps of "
+            f"{say(step)}; for this trace the cut-off must be at least "
+            f"{say(MIN_CUTOFF_STEPS * step)}"
+        )
+    edge = int(np.ceil(cutoff / 2 / step * (1 - 1e-9)))
+    if 2 * edge > axis.size - 2:
+        raise PatchfemError(
+            f"{source}: the {name} is {say(length)} long; half a cut-off of {say(cutoff)} is "
+            f"trimmed at each end, so the cut-off must be shorter than the {name}"
+        )
+    return slice(edge, axis.size - edge)
 
 
 def mean_surface(z: np.ndarray, cutoffs: tuple) -> np.ndarray:
-    """Mean surface (m, n) of heights z (m, n), NaN where missing, at cut-offs in steps down and along the rows."""
+    """Compute the mean surface (m, n) of heights z (m, n), NaN where missing.
+
+    Cut-offs in steps along y and x.
+    """
     from scipy.signal import oaconvolve
 
-    there, sums = ~np.isnan(z), []
-    for values in (np.where(there, z, 0.0), there.astype(float)):
+    known = ~np.isnan(z)
+    sums = []
+    for values in (np.where(known, z, 0.0), known.astype(float)):
         for axis, cutoff in enumerate(cutoffs):
-            half = min(int(np.ceil(REACH * cutoff)), z.shape[axis] - 1)
-            weight = np.exp(-np.pi * (np.arange(-half, half + 1.0) / (ALPHA * cutoff)) ** 2)
+            _, weight = _weights(cutoff, z.shape[axis])
             values = oaconvolve(values, np.expand_dims(weight, 1 - axis), "same", axes=axis)
         sums.append(values)
-    return np.divide(*sums, out=np.full(z.shape, np.nan), where=there)
+    return np.divide(*sums, out=np.full(z.shape, np.nan), where=known)
 
 
-def mean_line(z: np.ndarray, cutoff: float, tilted: bool = False) -> np.ndarray:
-    """Mean line (n,) of even heights z (n,) at a cut-off in steps, scaled at the ends, or tilted with the trace there.
+def mean_line(z: np.ndarray, cutoff: float, *, tilted: bool = False) -> np.ndarray:
+    """Compute the mean line (n,) of evenly spaced heights z (n,).
 
-    One transform of the length of the trace and the weighting function. A million samples: 0.2 s.
+    Parameters
+    ----------
+    z : (n,) array [m]
+    cutoff : float
+        Cut-off in steps.
+    tilted : bool
+        Whether the weights that an end cuts off fit a straight line (ISO 16610-28, first moment),
+        not a constant.
+
+    Returns
+    -------
+    (n,) array [m]
+        A million samples take 0.2 s.
     """
-    from scipy.fft import irfft, next_fast_len, rfft
+    from scipy.signal import oaconvolve
 
-    half = min(int(np.ceil(REACH * cutoff)), z.size - 1)
-    t = np.arange(-half, half + 1.0)
-    weight = np.exp(-np.pi * (t / (ALPHA * cutoff)) ** 2)
-    size = next_fast_len(z.size + half, real=True)  # what wraps falls beyond the trace
-    transform = rfft(z, size)
-
-    def through(kernel):
-        return irfft(transform * rfft(np.roll(np.pad(kernel, (0, size - kernel.size)), -half), size), size)[:z.size]
-
-    line = through(weight) / weight.sum()
-    last = min(half, (z.size - 1) // 2) + 1  # samples that see an end
-    for flip in (False, True):
-        place = np.arange(z.size)[::-1][:last] if flip else np.arange(last)
-        line[place] = _at_end(z[::-1] if flip else z, weight, last, line[place] * weight.sum(), tilted)
-    return line
-
-
-def _at_end(z, weight, last: int, means, tilted: bool) -> np.ndarray:
-    """Mean line at the first samples, whose weights start at the first sample and, in short traces, end at the last."""
-    half, at = weight.size // 2, np.arange(last)
-    low, high = np.maximum(half - at, 0), np.minimum(half + z.size - at, weight.size)
-
-    def moment(values):
-        total = np.concatenate([[0.0], np.cumsum(values)])
-        return total[high] - total[low]
-
-    t = np.arange(-half, half + 1.0)
-    m0 = moment(weight)
+    offsets, weight = _weights(cutoff, z.size)
+    ones = np.ones(z.size)
+    sum_w = oaconvolve(ones, weight, "same")
+    sum_wz = oaconvolve(z, weight, "same")
     if not tilted:
-        return means / m0
-    m1, m2 = moment(weight * t), moment(weight * t * t)
-    first = np.array([(weight[a:b] * t[a:b]) @ z[i - half + a:i - half + b] for i, a, b in zip(at, low, high)])
-    return (means * m2 - first * m1) / (m0 * m2 - m1**2)
+        return sum_wz / sum_w
+    sum_wt = oaconvolve(ones, -offsets * weight, "same")  # a convolution reverses the weights
+    sum_wtt = oaconvolve(ones, offsets**2 * weight, "same")
+    sum_wtz = oaconvolve(z, -offsets * weight, "same")
+    return (sum_wz * sum_wtt - sum_wtz * sum_wt) / (sum_w * sum_wtt - sum_wt**2)
+
+
+def _weights(cutoff: float, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """Return offsets and Gaussian weights for a cut-off in steps, over `count` samples at most."""
+    half = min(int(np.ceil(REACH_FACTOR * cutoff)), count - 1)
+    offsets = np.arange(-half, half + 1.0)
+    return offsets, np.exp(-np.pi * (offsets / (ALPHA * cutoff)) ** 2)

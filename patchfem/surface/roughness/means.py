@@ -1,4 +1,4 @@
-"""Means of the parameters of several traces, or of several scans, that were measured on alike surfaces."""
+"""Means of the parameters of several traces, or of several scans, of alike surfaces."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -6,48 +6,63 @@ from typing import NamedTuple
 from ..quantity import Quantity, mean_of
 from .report import RoughnessReport
 
-ALIKE = 1e-3  # share to which lengths and spacings agree
+MAX_SIZE_RATIO = 1.001  # ratio of two lengths or spacings above which they differ
 KINDS = {"profile": "traces", "areal": "scans"}
 
 
 class Means(NamedTuple):
-    """kind: of the reports; count: how many; values: name -> `Mean`; doubt: what the means do not know, a sentence, ""
-    for nothing."""
+    """Means of `count` reports of one kind.
+
+    values: `Mean` by name; caution: a sentence on their limits, "" for none.
+    """
 
     kind: str
     count: int
     values: Mapping
-    doubt: str
+    caution: str
 
 
-def means_of(reports: list[RoughnessReport]) -> list[Means]:
-    """The means of the parameters that all traces have, and those that all scans have, where there are two of them.
+def average_reports(reports: list[RoughnessReport]) -> list[Means]:
+    """Average the parameters that all traces have, and those that all scans have.
 
-    Their 95 % interval is Student's t of the scatter; the interval of each file tells of the same scatter. A direction
-    (Std), which turns round at 180 degrees, has no mean.
+    Each kind needs two reports or more.     The 95 % intervals are Student's t of the scatter; the
+    interval of a single file describes the same scatter.
     """
     out = []
     for kind in KINDS:
-        of = [one for one in reports if one.kind == kind]
-        if len(of) < 2:
+        alike = [report for report in reports if report.kind == kind]
+        if len(alike) < 2:
             continue
-        each = [{value.name: value for value in one.values if value.value is not None} for one in of]
-        names = [name for name, one in each[0].items() if one.unit != "rad" and all(name in other for other in each)]
-        out.append(Means(kind, len(of), {name: mean_of([_bare(one[name]) for one in each], each[0][name].text)
-                                         for name in names}, _doubt(of)))
+        tables = [
+            {value.name: value for value in report.values if value.value is not None}
+            for report in alike
+        ]
+        values = {}
+        for name, first in tables[0].items():
+            if all(name in table for table in tables):
+                values[name] = mean_of(
+                    [_without_interval(table[name]) for table in tables], first.text
+                )
+        out.append(Means(kind, len(alike), values, _caution(alike)))
     return out
 
 
-def _bare(one: Quantity) -> Quantity:
-    """A parameter without its own interval; only skewness and the step of a window may be negative."""
-    return one._replace(low=None if one.name.endswith("sk") or one.name == "ASH" else 0.0, high=None)
+def _without_interval(value: Quantity) -> Quantity:
+    """Drop the interval of a parameter; only skewness and the step of a window may be negative."""
+    is_signed = value.name.endswith("sk") or value.name == "ASH"
+    return value._replace(low=None if is_signed else 0.0, high=None)
 
 
-def _doubt(reports: list) -> str:
-    if len({one.source for one in reports}) < len(reports):
+def _caution(reports: list[RoughnessReport]) -> str:
+    if len({report.source for report in reports}) < len(reports):
         return "one file is given twice, so this file counts twice in the means"
-    parts = [name for name, sizes in (("lengths", [one.length for one in reports]),
-                                      ("spacings", [one.step for one in reports]))
-             if max(sizes) > (1 + ALIKE) * min(sizes)]
-    return (f"the {KINDS[reports[0].kind]} differ in their {' and '.join(parts)}, so the means of extremes and slopes "
-            "mix quantities that are defined differently") if parts else ""
+    lengths = [report.sampling.length for report in reports]
+    steps = [report.sampling.step for report in reports]
+    sizes = {"lengths": lengths, "spacings": steps}
+    parts = [name for name, each in sizes.items() if max(each) > MAX_SIZE_RATIO * min(each)]
+    if not parts:
+        return ""
+    return (
+        f"the {KINDS[reports[0].kind]} differ in their {' and '.join(parts)}, so the means of "
+        "extremes and slopes mix quantities that are defined differently"
+    )

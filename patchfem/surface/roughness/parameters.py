@@ -1,50 +1,53 @@
-"""The even heights that all parameters of a trace are read from, with what several of them share: moments, the spacing
-of hills and dales (ISO 4287, ISO 21920-2), the Abbott curve, its core (ISO 13565-2, ISO 21920-2) and its volumes
-(ISO 25178-2)."""
+"""Heights of an evenly sampled profile and the quantities that several roughness parameters share.
 
+These are the moments, the spacing of hills and dales (ISO 21920-2), the Abbott curve, its core (ISO
+13565-2) and its volumes (ISO 25178-2).
+"""
+
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 
-HIGH = 0.10  # of Rz: a hill or dale below this does not count
-WIDE = 0.01  # of the section: nor one narrower than this
-CENTRE = 0.40  # share of the length under the secant of the core
+MIN_HEIGHT_FRACTION = 0.10  # lower hills and dales, as a fraction of Rz, do not count (ISO 21920-2)
+MIN_WIDTH_FRACTION = 0.01  # narrower ones, as a fraction of the section, do not count either
+CORE_FRACTION = 0.40  # fraction of the length under the secant of the core (ISO 13565-2)
 
 
 @dataclass(frozen=True, eq=False)
 class Heights:
-    """Heights z (n,) [m] about their mean line, every `step` [m]: the primary or the roughness profile.
+    """Heights z (n,) [m] about their mean line, one every `step` [m].
 
-    section: length [m] over which a peak, a valley or a spacing is looked for, the cut-off; None: the whole trace.
-    level: height [m] above the mean line at which a material ratio is read; ratios: the two material ratios [1] whose
-    heights are set side by side.
+    section: length [m] over which peaks, valleys and spacings are looked for, which is the cut-off;
+    None for the whole trace.
     """
 
     z: np.ndarray
     step: float
     section: float | None = None
-    level: float = 0.0
-    ratios: tuple = (0.1, 0.9)
 
     @property
     def length(self) -> float:
-        """Length [m] of the trace, a step for each sample."""
+        """Length [m] of the trace, one step for each sample."""
         return self.z.size * self.step
 
     @cached_property
     def sections(self) -> np.ndarray:
-        """The whole sections (k, samples) [m] from the start of the trace; what is left at its end belongs to none."""
+        """Whole sections (k, samples) [m], counted from the start.
+
+        The remainder at the end is left out.
+        """
         if self.section is None:
             return self.z[None, :]
         size = round(self.section / self.step)
         count = self.z.size // size
-        return self.z[:count * size].reshape(count, size)
+        return self.z[: count * size].reshape(count, size)
 
     @cached_property
     def ordered(self) -> np.ndarray:
-        """The heights from the highest to the lowest (n,) [m]."""
+        """Heights (n,) [m] from the highest to the lowest."""
         return np.sort(self.z)[::-1]
 
     @cached_property
@@ -54,96 +57,127 @@ class Heights:
 
     @cached_property
     def core(self) -> "Core | None":
-        """The core of its Abbott curve, worked out once for its five parameters; None for a flat trace."""
-        return core(self)
+        """Core of the Abbott curve, None for a flat trace."""
+        return fit_core(self)
 
 
 def root_mean_square(heights: Heights) -> float:
-    """Rq: root mean square of the heights [m]."""
+    """Compute Rq, the root mean square of the heights [m]."""
     return float(np.sqrt(heights.power))
 
 
-def moment(heights: Heights, order: int) -> float | None:
-    """Mean 3rd or 4th power of the heights over that of their root mean square [1], None for a flat trace."""
+def mean_absolute(heights: Heights) -> float:
+    """Compute Ra, the mean of the absolute heights [m]."""
+    return float(np.abs(heights.z).mean())
+
+
+def total_height(heights: Heights) -> float:
+    """Compute Rt, the distance from the lowest to the highest sample [m]."""
+    return float(np.ptp(heights.z))
+
+
+def skewness(heights: Heights) -> float | None:
+    """Compute the mean cube of the heights over Rq^3 [1], None for a flat trace."""
+    return _moment(heights, 3)
+
+
+def kurtosis(heights: Heights) -> float | None:
+    """Compute the mean fourth power of the heights over Rq^4 [1], None for a flat trace."""
+    return _moment(heights, 4)
+
+
+def _moment(heights: Heights, order: int) -> float | None:
     rms = np.sqrt(heights.power)
     if rms == 0:
         return None
     unit = heights.z / rms
     square = unit * unit
-    return float((square @ unit if order == 3 else square @ square) / unit.size)
+    return float(square @ (unit if order == 3 else square)) / unit.size
 
 
-def of_sections(heights: Heights, size) -> float | None:
-    """Mean over the sections of size((k, samples) [m]) -> (k,), None where the trace is shorter than one."""
+def rms_slope(heights: Heights) -> float:
+    """Compute Rdq, the root mean square of the slope between neighbouring samples [1]."""
+    rise = np.diff(heights.z)
+    return float(np.sqrt(rise @ rise / rise.size) / heights.step)
+
+
+def mean_over_sections(heights: Heights, size: Callable) -> float | None:
+    """Average size((k, samples) [m]) -> (k,) over the sections.
+
+    None if the trace is shorter than one.
+    """
     return float(size(heights.sections).mean()) if len(heights.sections) else None
 
 
 def peak_to_valley(heights: Heights) -> float | None:
-    """Rz: from the deepest valley to the highest peak [m], mean over the sections."""
-    return of_sections(heights, lambda z: z.max(axis=1) - z.min(axis=1))
+    """Compute Rz, the mean height [m] of the sections from the lowest to the highest sample."""
+    return mean_over_sections(heights, lambda z: np.ptp(z, axis=1))
 
 
 def mean_spacing(heights: Heights) -> float | None:
-    """RSm: mean length of a hill and its neighbouring dale [m], None where the trace holds none.
+    """Compute RSm, the mean length of an element: a hill with its neighbouring dale [m].
 
-    The mean line cuts the trace into hills and dales. Those lower than 10 % of Rz or narrower than 1 % of the section
-    do not count, and neighbours of one sign become one. Without a cut-off the height alone decides: a share of the
-    trace's length would make the spacing one of the length. An element reaches from a
-    rise through the mean line to the next rise, or from a fall to the next fall; the mean is over both kinds.
+    An element reaches from a rise through the mean line to the next rise, or from a fall to the
+    next fall; the mean is over both kinds. None if the trace holds no element.
     """
     places = crossings(heights)
     if places.size < 3:
         return None
-    spans = [part[-1] - part[0] for part in (places[::2], places[1::2]) if part.size > 1]
-    count = sum(part.size - 1 for part in (places[::2], places[1::2]) if part.size > 1)
-    return float(sum(spans)) / count
+    spans = np.concatenate([np.diff(places[::2]), np.diff(places[1::2])])
+    return float(spans.sum()) / spans.size
 
 
-def mean_element(heights: Heights) -> float | None:
-    """Rc: mean height of the elements of `mean_spacing` from dale to hill [m], None where the trace holds none."""
+def mean_element_height(heights: Heights) -> float | None:
+    """Compute Rc, the mean height of the elements of `mean_spacing` [m], None without one."""
     places = crossings(heights)
     if places.size < 3:
         return None
-    parts = np.maximum.reduceat(np.abs(heights.z), np.floor(places / heights.step).astype(int) + 1)[:-1]
+    starts = np.floor(places / heights.step).astype(int) + 1
+    parts = np.maximum.reduceat(np.abs(heights.z), starts)[:-1]
     return float((parts[1:] + parts[:-1]).mean())
 
 
 def crossings(heights: Heights) -> np.ndarray:
-    """Places [m] from the first sample where a hill that counts ends and a dale that counts begins, or the reverse."""
-    z, step = heights.z, heights.step
+    """Find the places [m] where a hill ends and a dale begins, or the reverse.
+
+    The mean line cuts the trace into hills and dales. Those lower than 10 % of Rz or narrower than
+    1 % of the section do not count, and neighbours of one sign become one. Without a section the
+    height alone decides.
+    """
+    z = heights.z
     rough = peak_to_valley(heights)
     if rough is None:
-        rough = float(np.ptp(z))
+        rough = total_height(heights)
     above = z > 0
     starts = np.flatnonzero(above[1:] != above[:-1])  # the last sample before each crossing
     if not starts.size or rough == 0:
         return np.empty(0)
-    at = (starts + z[starts] / (z[starts] - z[starts + 1])) * step
+    places = (starts + z[starts] / (z[starts] - z[starts + 1])) * heights.step
     first = np.concatenate([[0], starts + 1])
     extent = np.maximum.reduceat(np.abs(z), first)
-    width = np.diff(np.concatenate([[0.0], at, [(z.size - 1) * step]]))
-    counts = (extent >= HIGH * rough) & (width >= WIDE * (heights.section or 0.0))
-    counts[[0, -1]] = extent[[0, -1]] >= HIGH * rough  # cut off by the ends: their width is not known
-    kept = np.flatnonzero(counts)
+    width = np.diff(np.concatenate([[0.0], places, [(z.size - 1) * heights.step]]))
+    width[[0, -1]] = np.inf  # the ends of the trace cut these two, so that their width is unknown
+    is_high = extent >= MIN_HEIGHT_FRACTION * rough
+    is_wide = width >= MIN_WIDTH_FRACTION * (heights.section or 0.0)
+    kept = np.flatnonzero(is_high & is_wide)
     signs = above[first[kept]]
-    turns = np.flatnonzero(signs[1:] != signs[:-1]) + 1
-    return at[kept[turns] - 1]  # a part begins at the crossing before it
+    changes = np.flatnonzero(signs[1:] != signs[:-1]) + 1
+    return places[kept[changes] - 1]  # a hill or dale begins at the crossing before it
 
 
 class Core(NamedTuple):
-    """Core height Rk, reduced peak height Rpk and reduced valley depth Rvk [m], and the material ratios Mr1 and Mr2 [1]
-    between which the core lies; slope [m] and top [m]: the straight line of the core, top - slope ratio."""
+    """Core of an Abbott curve: Rk, Rpk, Rvk [m], material ratios Mr1 and Mr2 [1], top [m]."""
 
-    core: float
-    peaks: float
-    valleys: float
-    first: float
-    second: float
+    height: float
+    peak_height: float
+    valley_depth: float
+    first_ratio: float
+    second_ratio: float
     top: float
 
 
-def abbott(heights: Heights, count: int = 501) -> tuple:
-    """Abbott curve: material ratio (count,) [1] from 0 to 1 and the height (count,) [m] that it is reached at."""
+def abbott(heights: Heights, count: int = 501) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the Abbott curve: material ratio (count,) from 0 to 1 and height (count,) [m]."""
     ratio = np.linspace(0.0, 1.0, count)
     return ratio, np.interp(ratio, _ratios(heights.z.size), heights.ordered)
 
@@ -152,61 +186,59 @@ def _ratios(count: int) -> np.ndarray:
     return (np.arange(count) + 0.5) / count
 
 
-def core(heights: Heights) -> Core | None:
-    """Core of a trace, None for a flat one.
+def fit_core(heights: Heights) -> Core | None:
+    """Fit the straight core line of the Abbott curve (ISO 13565-2), None for a flat trace.
 
-    The straight line of the core is the least-squares line of the heights in that 40 % of the Abbott curve whose secant
-    falls least (the first such part). It runs from the top at ratio 0 to the bottom at ratio 1, and their distance is
-    Rk. Rpk is twice the area of the peaks above the top over Mr1, Rvk twice that of the valleys below the bottom over
-    1 - Mr2: triangles of equal area. The trace is filtered like that of the other parameters, without the second stage
-    of ISO 13565-1.
+    The line is the least-squares line of that 40 % of the curve whose secant falls least (the first
+    such part). It falls by Rk from ratio 0 to ratio 1. Rpk and Rvk are the heights of triangles
+    with the areas of the peaks above and the valleys below. The second filter stage of ISO 13565-1
+    is not used.
     """
     z = heights.ordered
     n = z.size
-    size = max(round(CENTRE * n), 2)
     if n < 5 or z[0] == z[-1]:
         return None
-    falls = z[:n - size + 1] - z[size - 1:]
-    start = int(np.argmin(falls))
-    t = _ratios(n)[start:start + size]
-    middle, part = t.mean(), z[start:start + size]
-    slope = float((t - middle) @ (part - part.mean()) / ((t - middle) @ (t - middle)))
-    top = float(part.mean() - slope * middle)
+    size = max(round(CORE_FRACTION * n), 2)
+    start = int(np.argmin(z[: n - size + 1] - z[size - 1 :]))
+    part = z[start : start + size]
+    ratio = _ratios(n)[start : start + size]
+    centred = ratio - ratio.mean()
+    slope = float(centred @ (part - part.mean()) / (centred @ centred))
+    top = float(part.mean() - slope * ratio.mean())
     bottom = top + slope
-    first, second = (_ratio_at(z, level) for level in (top, bottom))
-    above = z[:np.searchsorted(-z, -top)]
-    below = z[np.searchsorted(-z, -bottom, "right"):]
-    peaks = 2 * float((above - top).sum()) / n / first if first > 0 else 0.0
-    valleys = 2 * float((bottom - below).sum()) / n / (1 - second) if second < 1 else 0.0
-    return Core(-slope, peaks, valleys, first, second, top)
+    first = _ratio_above(z, top)
+    second = _ratio_above(z, bottom)
+    peaks = 2 * float(np.maximum(z - top, 0.0).sum()) / n
+    valleys = 2 * float(np.maximum(bottom - z, 0.0).sum()) / n
+    return Core(
+        height=-slope,
+        peak_height=peaks / first if first > 0 else 0.0,
+        valley_depth=valleys / (1 - second) if second < 1 else 0.0,
+        first_ratio=first,
+        second_ratio=second,
+        top=top,
+    )
 
 
-def height_at(heights: Heights, ratio: float) -> float:
-    """Height [m] that this share [1] of the length lies above."""
-    return float(np.interp(ratio, _ratios(heights.z.size), heights.ordered))
-
-
-def material_ratio(heights: Heights) -> float:
-    """Rmr(c): share [1] of the length that lies above the height c, `level`."""
-    return _ratio_at(heights.ordered, heights.level)
-
-
-def ratio_heights(heights: Heights) -> float:
-    """Rdc: height [m] between two material ratios, `ratios`."""
-    first, second = (height_at(heights, one) for one in heights.ratios)
-    return first - second
-
-
-def volume(heights: Heights, ratio: float, material: bool) -> float:
-    """Volume of the material above, or of the void below, the height of a material ratio, per area [m3/m2]."""
-    off = heights.ordered - height_at(heights, ratio)
-    return float(np.maximum(off if material else -off, 0.0).mean())
-
-
-def _ratio_at(z, level: float) -> float:
-    """Share of the length that lies above a height, straight between samples."""
+def _ratio_above(z, level: float) -> float:
+    """Return the fraction of the length above a level, for ordered heights z (n,)."""
     n = z.size
     k = int(np.searchsorted(-z, -level))
     if k in (0, n):
         return k / n
-    return float((k - 0.5 + (z[k - 1] - level) / (z[k - 1] - z[k] if z[k - 1] > z[k] else 1.0)) / n)
+    fall = z[k - 1] - z[k]
+    return float((k - 0.5 + (z[k - 1] - level) / (fall if fall > 0 else 1.0)) / n)
+
+
+def material_volume(heights: Heights, ratio: float) -> float:
+    """Compute the volume of material above the height of a material ratio, per area [m3/m2]."""
+    return float(np.maximum(heights.ordered - _height_at(heights, ratio), 0.0).mean())
+
+
+def void_volume(heights: Heights, ratio: float) -> float:
+    """Compute the volume of void below the height of a material ratio, per area [m3/m2]."""
+    return float(np.maximum(_height_at(heights, ratio) - heights.ordered, 0.0).mean())
+
+
+def _height_at(heights: Heights, ratio: float) -> float:
+    return float(np.interp(ratio, _ratios(heights.z.size), heights.ordered))

@@ -1,11 +1,12 @@
-"""Peaks of a rough surface from mean squares of a trace over it, for Greenwood and Williamson's contact of peaks.
+"""Peaks of a rough surface from a trace, for the asperity law of Greenwood and Williamson.
 
-A surface of Gaussian heights, alike in all directions, whose traces have the mean squares m_0, m_2, m_4 of height,
-slope and curvature has m_4/(6 pi 3^(1/2) m_2) summits per area of mean curvature (8/3) (m_4/pi)^(1/2) (Nayak, J. Lubr.
-Technol. 93, 398, 1971). Their heights have the variance m_0 (1 - 0.8968/alpha) with alpha = m_0 m_4/m_2^2 (Bush, Gibson
-and Keogh, Mech. Res. Commun. 3, 169, 1976); McCool (Wear 107, 37, 1986) makes the contact of peaks of them. No such
-surface has alpha < 3/2. The shortest waves decide on m_4: the peaks are those of a sampling step, not of a surface. The
-longest decide on m_0, so that a cut-off keeps those away which the mesh holds already.
+A surface of Gaussian heights, alike in all directions, whose traces have the mean squares m_0, m_2,
+m_4 of height, slope and curvature has m_4/(6 pi 3^(1/2) m_2) summits per area of mean curvature
+(8/3) (m_4/pi)^(1/2) (Nayak, J. Lubr. Technol. 93, 398, 1971). Their heights have the variance m_0
+(1 - 0.8968/alpha) with alpha = m_0 m_4/m_2^2 (Bush, Gibson and Keogh, Mech. Res. Commun. 3, 169,
+1976); McCool (Wear 107, 37, 1986) derives the contact of peaks from them. No such surface has alpha
+< 3/2. The shortest waves decide on m_4, so the peaks are those of a sampling step; the longest
+decide on m_0, so a cut-off removes the waves that the mesh resolves.
 """
 
 from typing import NamedTuple
@@ -15,17 +16,25 @@ import numpy as np
 from ...core import PatchfemError, say
 from ...scales import plain
 from ..profile import Profile, despiked, even, level
-from .filter import filtered
+from .filter import filter_trace
 
-SUMMITS = 0.8968  # of m_0/alpha, that the heights of summits scatter less than all heights
-NARROWEST = 1.5  # alpha of waves of one length in all directions
-PERSSON = 0.4, 0.5  # u_0 over the rms height: Persson 2007, and Pastewka et al. 2013 by simulation
-FEWEST = 16  # samples of a trace
-FEW, MOSTLY = 0.005, 0.5  # share of the heights, and of the mean square curvature that so few of a surface do not have
-SPIKY = 0.1  # share of the samples from which they are a surface and no spikes
-ROUND = 1e-12  # of its heights, what levelling leaves of a straight line
-SKEWED, PEAKED = 0.5, 1.0  # skewness and excess kurtosis from which heights are told not to be Gaussian
-SURE = 3  # standard deviations of either over traces of that many waves, which it must exceed too
+SUMMIT_FACTOR = (
+    0.8968  # alpha (1 - variance of summit heights / variance of heights), Bush et al. 1976
+)
+MIN_ALPHA = 1.5  # alpha of waves of one length in all directions
+PERSSON = (0.4, 0.5)  # u_0 / rms height: Persson 2007, and Pastewka et al. 2013 by simulation
+MIN_SAMPLES = 16  # samples of a trace; fewer give no mean square of the curvature
+SHARPEST_FRACTION = 0.005  # fraction of the heights; Gaussian ones have 5 % of the curvature
+MAX_SHARPEST_POWER = 0.5  # fraction of the mean square curvature; sharper heights may be dust
+MAX_SPIKE_FRACTION = 0.1  # fraction of the samples; more "spikes" than that are the surface itself
+ROUND_OFF = 1e-12  # fraction of the heights that levelling leaves of a straight line
+MAX_SKEWNESS = (
+    0.5  # larger skewness changes the stiffness by more than the theory's own uncertainty
+)
+MAX_EXCESS = 1.0  # the same for the kurtosis minus 3
+MAX_DEVIATIONS = (
+    3  # standard deviations of Gaussian traces that skewness and kurtosis must exceed too
+)
 
 
 class Moments(NamedTuple):
@@ -38,139 +47,175 @@ class Moments(NamedTuple):
     @property
     def alpha(self) -> float:
         """Nayak's bandwidth m_0 m_4/m_2^2."""
-        return (self.height * self.curvature / self.slope**2)**2
+        return (self.height * self.curvature / self.slope**2) ** 2
 
-    def beside(self, other: "Moments") -> "Moments":
-        """Those of the gap between two rough surfaces, whose mean squares add up."""
+    def combine(self, other: "Moments") -> "Moments":
+        """Return the moments of the gap between two rough surfaces, whose mean squares add up."""
         return Moments(*np.hypot(self, other).tolist())
 
 
 class Peaks(NamedTuple):
-    """Peaks of a surface: radius [m] of the mean curvature of their tips, density [1/m2], deviation [m] of their
-    heights."""
+    """Peaks of a surface: radius of their mean curvature [m], density [1/m2], height deviation [m]."""
 
     radius: float
     density: float
     deviation: float
 
 
-class Told(NamedTuple):
-    """What a trace tells of its peaks: Moments of its samples; Moments of every second one, None where these tell
-    none; how far its heights are from Gaussian ones, a clause or ""; which heights count too much or not at all,
-    clauses (`_walls`)."""
+class TraceMoments(NamedTuple):
+    """Moments of a trace and how far they can be trusted.
+
+    fine: from all samples; coarse: from every second sample, None if these are too few;
+    not_gaussian: a clause if the heights are not Gaussian, else ""; dust: clauses on heights that
+    were left out or that look like dust.
+    """
 
     fine: Moments
     coarse: Moments | None
-    doubt: str
-    walls: tuple = ()
+    not_gaussian: str
+    dust: tuple = ()
 
-    def beside(self, other: "Told") -> "Told":
-        """What two rough faces tell of the gap between them."""
-        coarse = self.coarse.beside(other.coarse) if self.coarse and other.coarse else None
-        return Told(self.fine.beside(other.fine), coarse, self.doubt or other.doubt,
-                    (*self.walls, *other.walls))
-
-
-def told_by(trace: Profile, cutoff: float | None = None) -> Told:
-    """What the waves of a trace below a cut-off [m] tell (`moments_of`), None: all of its waves."""
-    short = _short_waves(trace, cutoff)
-    fine = _moments(short, 1)
-    try:
-        coarse = _moments(short, 2)
-    except PatchfemError:
-        coarse = None
-    left = int((_clean(trace).missing & ~trace.missing).sum())
-    walls = (f"{left} of {trace.z.size} heights are spikes, dropouts or dust and are left out",) if left else ()
-    return Told(fine, coarse, _uneven(short.z, fine, short.length), (*walls, *_walls(short)))
+    def combine(self, other: "TraceMoments") -> "TraceMoments":
+        """Return the moments of the gap between two rough faces."""
+        coarse = self.coarse.combine(other.coarse) if self.coarse and other.coarse else None
+        fine = self.fine.combine(other.fine)
+        return TraceMoments(
+            fine, coarse, self.not_gaussian or other.not_gaussian, (*self.dust, *other.dust)
+        )
 
 
-def moments_of(trace: Profile, every: int = 1, cutoff: float | None = None) -> Moments:
-    """Moments of a trace, levelled and without spikes, from neighbouring samples or every second (third, ...) of them.
+def trace_moments(trace: Profile, cutoff: float | None = None) -> TraceMoments:
+    """Measure the moments of the waves of a trace below a cut-off [m], None for all waves.
 
-    cutoff [m]: only the roughness below it counts (ISO 16610-21, half a cut-off trimmed at each end); a trace no longer
-    than that holds no longer waves. Slope and curvature are first and second differences, which see a wave of length L
-    as sinc(step/L) and sinc^2 of its own. PatchfemError for a trace of less than FEWEST such samples, for one without
-    heights and for a cut-off of fewer than four steps.
+    Spikes are left out. With a cut-off the roughness profile counts (ISO 16610-21, half a cut-off
+    trimmed at each end); a trace no longer than the cut-off keeps all of its waves. Raises
+    PatchfemError for fewer than 16 samples, for a flat trace and for a cut-off of fewer than four
+    steps.
     """
-    return _moments(_short_waves(trace, cutoff), every)
+    clean = _remove_spikes(trace)
+    removed = int((clean.missing & ~trace.missing).sum())
+    flat = _short_waves(clean, cutoff)
+    fine = rms_moments(flat)
+    coarse = rms_moments(flat, 2) if flat.z.size >= 2 * MIN_SAMPLES - 1 else None
+    dust = ()
+    if removed:
+        dust = (
+            f"{removed} of {trace.z.size} heights are spikes, dropouts or dust and are left out",
+        )
+    return TraceMoments(
+        fine, coarse, _describe_skew(flat.z, fine, flat.length), (*dust, *_describe_dust(flat))
+    )
+
+
+def rms_moments(trace: Profile, every: int = 1) -> Moments:
+    """Compute the moments of an even, level trace from every n-th sample.
+
+    Slope and curvature are first and second differences, which see a wave of length L as
+    sinc(step/L) and its square.
+    """
+    z = trace.z[::every]
+    step = every * trace.length / (trace.z.size - 1)
+    if z.size < MIN_SAMPLES:
+        raise PatchfemError(
+            f"{trace.source}: {z.size} samples give no curvature; at least {MIN_SAMPLES} are needed"
+        )
+    return Moments(
+        *(float(np.sqrt(np.mean(np.diff(z, order) ** 2)) / step**order) for order in range(3))
+    )
+
+
+def _remove_spikes(trace: Profile) -> Profile:
+    """Remove the spikes of a trace, unless they are too many for spikes."""
+    clean = despiked(trace)
+    return clean if (clean.missing & ~trace.missing).mean() <= MAX_SPIKE_FRACTION else trace
 
 
 def _short_waves(trace: Profile, cutoff: float | None) -> Profile:
-    """The trace without spikes, levelled, and without waves longer than the cut-off."""
-    tilted = even(_clean(trace))
+    tilted = even(trace)
     flat = level(tilted)
-    if flat.z.size >= FEWEST and not np.ptp(flat.z) > ROUND * np.ptp(tilted.z):
-        raise PatchfemError(f"{trace.source}: the trace is flat, so it has no peaks; leave [contact.asperities] out")
-    return flat if cutoff is None or cutoff >= flat.length else filtered(flat, cutoff)[1]
+    if flat.z.size >= MIN_SAMPLES and not np.ptp(flat.z) > ROUND_OFF * np.ptp(tilted.z):
+        raise PatchfemError(
+            f"{trace.source}: the trace is flat, so it has no peaks; leave [contact.asperities] out"
+        )
+    return flat if cutoff is None or cutoff >= flat.length else filter_trace(flat, cutoff)[1]
 
 
-def _clean(trace: Profile) -> Profile:
-    """The trace without spikes, itself where these are too many for spikes."""
-    clean = despiked(trace)
-    return clean if (clean.missing & ~trace.missing).mean() <= SPIKY else trace
+def _describe_dust(trace: Profile) -> tuple:
+    """Describe the few heights that make up most of the mean square curvature, as dust does.
 
-
-def _walls(trace: Profile) -> tuple:
-    """That a few heights make up most of the mean square curvature, as the walls of dust do, a clause with the moments
-    without them; () where not: of Gaussian heights these few make up a twentieth."""
-    bent = np.diff(trace.z, 2)**2
-    few = max(int(FEW * bent.size), 1)
-    most = np.argsort(bent)[-few:]
-    share = float(bent[most].sum()) / max(float(bent.sum()), 1e-300)
-    if share < MOSTLY:
+    () if none do.
+    """
+    bend = np.diff(trace.z, 2) ** 2
+    count = max(int(SHARPEST_FRACTION * bend.size), 1)
+    sharpest = np.argsort(bend)[-count:]
+    power = float(bend[sharpest].sum()) / max(float(bend.sum()), 1e-300)
+    if power < MAX_SHARPEST_POWER:
         return ()
-    step, there = trace.length / (trace.z.size - 1), np.ones(trace.z.size, bool)
-    worst = int(most[-1]) + 1
-    there[most + 1] = False
-    slope = np.diff(trace.z)[there[1:] & there[:-1]] / step
-    curvature = float(np.sqrt(bent[there[1:-1]].mean())) / step**2
-    return (f"{few} of {trace.z.size} heights, the sharpest at x = {say(float(trace.x[worst]))}, make up "
-            f"{100 * share:.3g} % of the mean square curvature, as dust does; without them rms_slope is "
-            f"{float(np.sqrt(np.mean(slope**2))):.4g} and rms_curvature {plain(curvature, 4)} 1/m; if they are dust, "
-            "use these values or remove the dust from the trace",)
+    step = trace.length / (trace.z.size - 1)
+    kept = np.ones(trace.z.size, bool)
+    kept[sharpest + 1] = False
+    slope = np.diff(trace.z)[kept[1:] & kept[:-1]] / step
+    curvature = float(np.sqrt(bend[kept[1:-1]].mean())) / step**2
+    place = say(float(trace.x[sharpest[-1] + 1]))
+    return (
+        f"{count} of {trace.z.size} heights, the sharpest at x = {place}, make up "
+        f"{100 * power:.3g} % of the mean square curvature, as dust does; without them rms_slope "
+        f"is {float(np.sqrt(np.mean(slope**2))):.4g} and rms_curvature {plain(curvature, 4)} 1/m; "
+        "if they are dust, use these values or remove the dust from the trace",
+    )
 
 
-def _moments(trace: Profile, every: int) -> Moments:
-    z, step = trace.z[::every], every * trace.length / (trace.z.size - 1)
-    if z.size < FEWEST:
-        raise PatchfemError(f"{trace.source}: {z.size} samples give no curvature; at least {FEWEST} are needed")
-    return Moments(*(float(np.sqrt(np.mean(np.diff(z, order)**2)) / step**order) for order in range(3)))
+def _describe_skew(z, moments: Moments, length: float) -> str:
+    """State the skewness and kurtosis of heights z (n,) [m] that are not Gaussian, "" if they are.
 
-
-def _uneven(z, moments: Moments, length: float) -> str:
-    """The skewness and kurtosis of heights z (n,) [m] that Gaussian ones would not have, in words; "" of Gaussian ones.
-
-    A Gaussian trace has slope length/(pi height) crossings of its mean line, each taken as one independent height.
+    A Gaussian trace has slope length/(pi height) crossings of its mean line, each taken as one
+    independent height.
     """
     unit = (z - z.mean()) / z.std()
-    skew, excess = float(np.mean(unit**3)), float(np.mean(unit**4)) - 3
+    skewness = float(np.mean(unit**3))
+    excess = float(np.mean(unit**4)) - 3
     count = max(moments.slope * length / (np.pi * moments.height), 1.0)
-    if abs(skew) <= max(SKEWED, SURE * np.sqrt(6 / count)) and abs(excess) <= max(PEAKED, SURE * np.sqrt(24 / count)):
+    max_skewness = max(MAX_SKEWNESS, MAX_DEVIATIONS * np.sqrt(6 / count))
+    max_excess = max(MAX_EXCESS, MAX_DEVIATIONS * np.sqrt(24 / count))
+    if abs(skewness) <= max_skewness and abs(excess) <= max_excess:
         return ""
-    return (f"the heights have skewness {skew:.2g} and kurtosis {excess + 3:.2g}, but the theory assumes Gaussian "
-            "heights (0 and 3): " + ("tops that were cut off by wear are stiffer than the theory "
-                                     "predicts" if skew < -SKEWED else
-                          "single high peaks are softer than the theory predicts" if skew > SKEWED else
-                          "the stiffness from the theory is only a guess"))
+    effect = "the stiffness from the theory is only a guess"
+    if skewness < -MAX_SKEWNESS:
+        effect = "tops that were cut off by wear are stiffer than the theory predicts"
+    elif skewness > MAX_SKEWNESS:
+        effect = "single high peaks are softer than the theory predicts"
+    return (
+        f"the heights have skewness {skewness:.2g} and kurtosis {excess + 3:.2g}, but the theory "
+        f"assumes Gaussian heights (0 and 3): {effect}"
+    )
 
 
-def peaks_of(moments: Moments) -> Peaks:
-    """The Peaks of a surface whose traces have some Moments; PatchfemError where no surface alike in all directions has
-    them."""
-    if not moments.alpha >= NARROWEST * (1 - 1e-9):
-        raise PatchfemError(f"rms_height x rms_curvature/rms_slope^2 is {np.sqrt(moments.alpha):.3g}, but on an "
-                            f"isotropic surface of Gaussian heights this number is at least {np.sqrt(NARROWEST):.3g}; "
-                            "take all three from one trace across the lay, or give radius, density and "
-                            "height_deviation of the peaks")
-    m0, m2, m4 = (one**2 for one in moments)
-    return Peaks(3 / 8 * float(np.sqrt(np.pi / m4)), float(m4 / (6 * np.pi * np.sqrt(3) * m2)),
-                 float(np.sqrt(m0 * (1 - SUMMITS / moments.alpha))))
+def gaussian_peaks(moments: Moments) -> Peaks:
+    """Compute the peaks of the isotropic Gaussian surface whose traces have these moments.
 
-
-def persson_stiffness(pressure: float, height: float) -> tuple:
-    """Least and largest stiffness [Pa/m] of a rough contact under a pressure [Pa] by a theory of waves of all lengths.
-
-    p ~ exp(-u/u_0), u_0 = 0.4 to 0.5 of the rms height [m] (PERSSON), so that the stiffness is p/u_0: it does not hang
-    on the shortest waves. It holds where little of the area touches.
+    Raises PatchfemError if no isotropic surface of Gaussian heights has them.
     """
-    return tuple(pressure / (share * height) for share in reversed(PERSSON))
+    if not moments.alpha >= MIN_ALPHA * (1 - 1e-9):
+        raise PatchfemError(
+            f"rms_height x rms_curvature/rms_slope^2 is {np.sqrt(moments.alpha):.3g}, but on an "
+            "isotropic surface of Gaussian heights this number is at least "
+            f"{np.sqrt(MIN_ALPHA):.3g}; take all three from one trace across the lay, or give "
+            "radius, density and height_deviation of the peaks"
+        )
+    m0, m2, m4 = (moment**2 for moment in moments)
+    return Peaks(
+        radius=3 / 8 * float(np.sqrt(np.pi / m4)),
+        density=float(m4 / (6 * np.pi * np.sqrt(3) * m2)),
+        deviation=float(np.sqrt(m0 * (1 - SUMMIT_FACTOR / moments.alpha))),
+    )
+
+
+def persson_stiffness(pressure: float, height: float) -> tuple[float, float]:
+    """Compute the least and the largest stiffness [Pa/m] of a rough contact by Persson's theory.
+
+    The pressure is proportional to exp(-u/u_0) with u_0 = 0.4 to 0.5 of the rms height [m], so the
+    stiffness p/u_0 does not depend on the shortest waves. The theory holds while little of the area
+    touches.
+    """
+    low, high = PERSSON
+    return pressure / (high * height), pressure / (low * height)

@@ -1,4 +1,4 @@
-"""Everything that a trace or an areal scan tells about its roughness, in one frozen record."""
+"""Roughness report: all parameters of a trace or of an areal scan, with their intervals."""
 
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -11,288 +11,366 @@ from ..profile import Profile, even, spikes
 from ..quantity import Quantity, refused
 from ..spikes import spikes_of
 from . import rows
-from .areal import Surface, lacking
-from .areal_intervals import areal_intervals
-from .filter import filtered, filtered_scan
-from .form import degree_of, without_form
+from .areal import Surface, missing_reason
+from .filter import filter_scan, filter_trace
+from .form import form_degree, subtract_form
 from .intervals import LATERAL, SIZES, Intervals
-from .parameters import Heights, abbott
-from .spectrum import BAND, amplitude_of, refuse_band, spectrum_of
-from .tip import Tip, tip_check
+from .parameters import Heights
+from .rows import Parameter
+from .scan_intervals import scan_intervals
+from .spectrum import BAND, Spectrum, amplitude_of, refuse_band
 
-FEWEST = 16  # samples of a trace with a report
-UNTOLD = "a single trace gives no interval for this parameter"
-UNEVEN = ("an interval from a single trace assumes Gaussian heights, but these heights are not Gaussian; use the "
-          "scatter of several traces")
-UNDETERMINED = "the heights of the trace do not determine this parameter"
-CUTOFFS = (25e-6, 80e-6, 250e-6, 800e-6, 2.5e-3, 8e-3, 25e-3)  # [m] of ISO 21920-3, and one more at each end
-SECTIONS = 6  # cut-offs in a trace: five that count and one that the filter takes
-ROUND = 1e-14  # of the largest height: what levelling leaves of a straight line
-LONG = ("the trace is shorter than four wavelengths of its strongest wave, so a longer trace would give a different "
-        "value")
-class Settings(NamedTuple):
-    """What is taken off a surface before its parameters are read, and where two of them are read.
+MIN_SAMPLES = 16  # samples of a trace; fewer give no spectrum
+ROUND_OFF = 1e-14  # fraction of the largest height that levelling leaves of a straight line
+STANDARD_CUTOFFS = (
+    25e-6,
+    80e-6,
+    250e-6,
+    800e-6,
+    2.5e-3,
+    8e-3,
+    25e-3,
+)  # [m] those of ISO 21920-3 and one at each end
+SECTIONS_PER_TRACE = 6  # cut-offs in a trace: five that are evaluated and one that the filter trims
+NO_INTERVAL = "a single trace gives no interval for this parameter"
+NOT_GAUSSIAN = (
+    "an interval from a single trace assumes Gaussian heights, but these heights are not Gaussian; "
+    "use the scatter of several traces"
+)
+TOO_SHORT = (
+    "the trace is shorter than four wavelengths of its strongest wave, so a longer trace would "
+    "give a different value"
+)
 
-    form: degree of a polynomial or "cylinder" (`without_form`); short [m]: nesting index of the S-filter, None for
-    none; level [m] and ratios [1] of the material ratio and of the height between two (`Heights`).
+
+class Sampling(NamedTuple):
+    """Length and step [m], samples (along y first), and samples before resampling."""
+
+    length: float
+    step: float
+    shape: tuple
+    measured: int | None = None
+
+
+class Treatment(NamedTuple):
+    """What was subtracted from a surface before its parameters were computed.
+
+    Lengths in [m], None for no filter.
+
+    form: name of the least-squares form; short: nesting index of the S-filter; cutoff: between
+    waviness and roughness, of a scan the nesting index of its L-filter; window: first and last
+    position, of a scan in x, then in y.
     """
 
-    form: int | str = 1
-    short: float | None = None
-    level: float = 0.0
-    ratios: tuple = (0.1, 0.9)
+    form: str
+    short: float | None
+    cutoff: float | None
+    window: tuple | None
 
 
-NOTHING = Settings()
+class TraceParts(NamedTuple):
+    """Trace without form, its waviness and roughness (None without cut-off), its spectrum."""
+
+    primary: Profile
+    waviness: Profile | None
+    roughness: Profile | None
+    spectrum: Spectrum
 
 
 @dataclass(frozen=True, eq=False)
 class RoughnessReport:
-    """What `report_of` found.
+    """Parameters of a surface.
 
-    values: tuple of Quantity, each with its name; length [m]; shape: samples, along y first; step [m] between samples;
-    form: the name of what was subtracted first; cutoff, window [m] or None; band: wavelengths [m] of band_amplitude;
-    notes: sentences about the file and what was done to it; tip: the stylus against the valleys, or None;
-    abbott: (ratio, height) of the roughness, of the primary without one, of the scan, and its core. Of
-    traces only: primary, the trace without form; waviness, roughness, None without a cut-off; spectrum of the primary.
-    scan: the areal scan that the parameters are read from. measured: heights of a trace before it was resampled.
+    values: Quantity of each parameter, with its name; notes: sentences about the file and its
+    treatment; surface: what the parameters are read from, `TraceParts` or the filtered scan;
+    heights: those of the Abbott curve, of the roughness if there is a cut-off.
     """
 
     source: str
-    kind: str
-    length: float
-    shape: tuple
-    step: float
+    sampling: Sampling
+    treatment: Treatment
     values: tuple
     notes: tuple
-    form: str
-    settings: Settings
-    cutoff: float | None = None
-    window: tuple | None = None
-    band: tuple = BAND
-    tip: Tip | None = None
-    primary: Profile | None = None
-    waviness: Profile | None = None
-    roughness: Profile | None = None
-    abbott: tuple | None = None
-    core: tuple | None = None
-    spectrum: object | None = None
-    scan: Areal | None = None
-    measured: int | None = None
+    surface: TraceParts | Areal
+    heights: Heights
+
+    @property
+    def kind(self) -> str:
+        """Kind of the surface, "profile" or "areal"."""
+        return "areal" if isinstance(self.surface, Areal) else "profile"
 
     def __getitem__(self, name: str) -> Quantity:
-        """The parameter of this name."""
-        return next(one for one in self.values if one.name == name)
+        """Return the parameter of this name."""
+        return next(value for value in self.values if value.name == name)
 
 
-def report_of(surface: Profile | Areal, cutoff: float | None = None, window: tuple | None = None,
-              tip: float | None = None, band: tuple = BAND, settings: Settings = NOTHING) -> RoughnessReport:
-    """Parameters of a trace or of an areal scan with the intervals that one measurement of its size allows.
+def report_of(
+    surface: Profile | Areal,
+    cutoff: float | None = None,
+    window: tuple | None = None,
+    form: int | str = 1,
+    short: float | None = None,
+) -> RoughnessReport:
+    """Compute the parameters of a trace or of a scan, with intervals of a single measurement.
 
-    cutoff [m]: between waviness and roughness, of a scan the nesting index of its L-filter; without it there is the
-    primary profile or the S-F surface alone. window: (first, last) [m] on the x axis of the file, as cursors, of a scan
-    (first, last, first, last) on x and y (`windowed`). tip [m]: radius of the stylus, by default that of the file. band
-    [m]: wavelengths of band_amplitude. A trace of a million samples: 1.2 s. PatchfemError for fewer than 16 samples, a
-    window beyond the trace, a cut-off that does not fit, or a window of a scan with less than four places.
+    Parameters
+    ----------
+    surface : Profile or Areal
+        Of at least 16 samples.
+    cutoff : float, optional
+        Cut-off or nesting index [m]; without it there is the primary profile or the S-F surface
+        alone.
+    window : tuple, optional
+        Positions [m] of the first and the last sample, of a scan in x, then in y (`crop`).
+    form : int or str
+        Form to subtract (`subtract_form`).
+    short : float, optional
+        Nesting index [m] of the S-filter.
+
+    Returns
+    -------
+    RoughnessReport
+        A trace of a million samples takes 1.2 s.
     """
+    part = surface if window is None else crop(surface, *window)
     if isinstance(surface, Areal):
-        return _of_scan(surface if window is None else windowed(surface, *window), cutoff, settings, window)
-    cut = surface if window is None else windowed(surface, *window)
-    trace = _enough(even(_enough(cut)))
-    primary, form, found = _primary(trace, band, settings)
-    heights, spectrum = found.heights, found.spectrum
-    values = [_value(row, row.of(heights), found) for row in rows.PRIMARY]
-    values += [_waves(row, trace.source, found) for row in rows.WAVES]
-    waviness = roughness = rough = None
+        return _report_scan(part, cutoff, window, form, short)
+    return _report_trace(part, cutoff, window, form, short)
+
+
+def _report_trace(
+    part: Profile, cutoff: float | None, window: tuple | None, form: int | str, short: float | None
+) -> RoughnessReport:
+    trace = _require_samples(even(_require_samples(part)))
+    primary, form_name = subtract_form(trace, form)
+    if (
+        short is not None
+    ):  # the filter keeps a polynomial one of its degree, so that the form may go before and after
+        primary = subtract_form(filter_trace(primary, short)[0], form)[0]
+    if np.ptp(primary.z) <= ROUND_OFF * np.abs(trace.z).max():
+        primary = replace(primary, z=frozen_array(np.zeros(primary.z.size)))
+    heights = Heights(primary.z, trace.length / (trace.x.size - 1))
+    intervals = Intervals(heights, form_degree(form))
+    values = [_quantity(row, row.compute(heights), intervals) for row in rows.PRIMARY]
+    dominant, band = rows.WAVES
+    values += [
+        _quantity(dominant, intervals.spectrum.dominant, intervals),
+        _band_quantity(band, trace, intervals),
+    ]
+    waviness = None
+    roughness = None
+    evaluated = heights
     if cutoff is not None:
-        waviness, roughness = filtered(primary, cutoff)
-        rough = replace(heights, z=roughness.z, section=cutoff)
-        inner = Intervals(rough, None)
-        values += [_value(row, row.of(rough), inner) for row in rows.ROUGH]
+        waviness, roughness = filter_trace(primary, cutoff)
+        evaluated = replace(heights, z=roughness.z, section=cutoff)
+        rough_intervals = Intervals(evaluated, None)
+        values += [_quantity(row, row.compute(evaluated), rough_intervals) for row in rows.ROUGH]
     if window is not None:
-        values += [_value(row, _ends(trace) if row.of is None else row.of(heights), found) for row in rows.WINDOW]
-    shown, radius = rough or heights, surface.tip_radius if tip is None else tip
-    stylus = None if radius is None else tip_check(heights, radius)
-    notes = trace.notes + _resampled(cut, trace, primary, settings) + _spiky(cut)
-    notes += () if roughness is None else _short(roughness, cutoff)
+        for row in rows.WINDOW:
+            value = float(trace.z[-1] - trace.z[0]) if row.compute is None else row.compute(heights)
+            values.append(_quantity(row, value, intervals))
+    notes = trace.notes + _spike_note(part)
+    if trace.x.size != part.x.size and short is None:
+        notes += _resampling_note(part, trace, primary)
+    if roughness is not None:
+        notes += _short_trace_note(roughness, cutoff)
     return RoughnessReport(
-        trace.source, "profile", trace.length, (trace.x.size,), heights.step, tuple(values), notes, form, settings,
-        cutoff, window, band, stylus, primary, waviness, roughness, abbott(shown), shown.core,
-        spectrum, measured=cut.x.size)
+        source=trace.source,
+        sampling=Sampling(trace.length, heights.step, (trace.x.size,), part.x.size),
+        treatment=Treatment(form_name, short, cutoff, window),
+        values=tuple(values),
+        notes=notes,
+        surface=TraceParts(primary, waviness, roughness, intervals.spectrum),
+        heights=evaluated,
+    )
+
+
+def _report_scan(
+    scan: Areal, cutoff: float | None, window: tuple | None, form: int | str, short: float | None
+) -> RoughnessReport:
+    flat, form_name = subtract_form(scan, form)
+    if short is not None:
+        flat = subtract_form(filter_scan(flat, short)[0], form)[0]
+    if cutoff is not None:
+        flat = filter_scan(flat, cutoff)[1]
+    if np.isnan(flat.z).all():
+        raise PatchfemError(
+            f"{scan.source}: no measured height is left within half a cut-off of the borders"
+        )
+    if np.nanmax(flat.z) - np.nanmin(flat.z) <= ROUND_OFF * np.nanmax(np.abs(scan.z)):
+        flat = replace(flat, z=frozen_array(flat.z * 0.0))
+    steps = tuple(float(axis[-1] - axis[0]) / (axis.size - 1) for axis in (flat.y, flat.x))
+    surface = Surface(flat.z, steps)
+    values = {row.name: row.compute(surface) for row in rows.AREAL}
+    intervals = scan_intervals(flat.z, values)
+    no_interval = (NOT_GAUSSIAN if intervals.is_uneven else NO_INTERVAL).replace("trace", "scan")
+    quantities = []
+    for row in rows.AREAL:
+        value = values[row.name]
+        low, high = intervals.bounds.get(row.name, (None, None))
+        reason = no_interval if low is None and surface.heights.power else ""
+        if value is None:
+            reason = missing_reason(surface, row.name)
+        quantities.append(Quantity(value, low, high, row.unit, row.text, reason, row.name))
+    notes = scan.notes + _spike_note(scan)
+    missing = int(np.isnan(flat.z).sum())
+    if missing:
+        notes += (
+            f"{scan.source}: {missing} of {flat.z.size} heights are missing and are left out",
+        )
+    return RoughnessReport(
+        source=scan.source,
+        sampling=Sampling(float(scan.x[-1] - scan.x[0]), steps[1], scan.z.shape),
+        treatment=Treatment(form_name, short, cutoff, window),
+        values=tuple(quantities),
+        notes=notes,
+        surface=flat,
+        heights=surface.heights,
+    )
 
 
 def fitting_cutoff(length: float, step: float) -> float | None:
-    """The longest standard cut-off [m] with five sections in a trace of this length [m] and step [m], or None."""
-    return max((one for one in CUTOFFS if SECTIONS * one <= length * (1 + 1e-9) and one >= 4 * step), default=None)
+    """Return the longest standard cut-off [m] that a trace of this length and step [m] allows."""
+    fitting = [
+        cutoff
+        for cutoff in STANDARD_CUTOFFS
+        if SECTIONS_PER_TRACE * cutoff <= length * (1 + 1e-9) and cutoff >= 4 * step
+    ]
+    return max(fitting, default=None)
 
 
-def windowed(surface: Profile | Areal, *ends: float) -> Profile | Areal:
-    """The part of a trace between two cursors [m], of a scan between two along x and two along y, as an instrument
-    takes it: from the last sample at or before the one to the last at or before the other, both included.
+def crop(surface: Profile | Areal, *ends: float) -> Profile | Areal:
+    """Cut out the part of a surface between positions [m], of a scan in x and in y.
 
-    PatchfemError for a window that turns back or does not lie within the trace or scan.
+    As between the cursors of an instrument, it runs from the last sample at or before the first
+    position to the last at or before the second. Raises PatchfemError for a window that is reversed
+    or not within the surface.
     """
-    scan = isinstance(surface, Areal)
-    if len(ends) != (4 if scan else 2):
-        raise PatchfemError(f"{surface.source}: a window of " + (
-            "an areal scan needs four "
-            "positions: from and to in x, from and to in y" if scan else "a trace needs two positions: from and to"))
-    parts = [_between(surface.source, axis, *ends[2 * k:2 * k + 2], "xy"[k] if scan else "")
-             for k, axis in enumerate((surface.x, surface.y) if scan else (surface.x,))]
-    axes = {name: getattr(surface, name)[one] for name, one in zip("xy", parts)}
-    return replace(surface, z=surface.z[tuple(parts[::-1])], **axes)
+    source = surface.source
+    if isinstance(surface, Profile):
+        if len(ends) != 2:
+            raise PatchfemError(f"{source}: a window of a trace needs two positions: from and to")
+        part = _find_part(f"{source}: the window", "the trace runs", surface.x, ends)
+        return replace(surface, x=surface.x[part], z=surface.z[part])
+    if len(ends) != 4:
+        raise PatchfemError(
+            f"{source}: a window of an areal scan needs four positions: from and to in x, from and "
+            "to in y"
+        )
+    columns = _find_part(f"{source}: the window", "the scan runs in x", surface.x, ends[:2])
+    lines = _find_part(f"{source}: the window", "the scan runs in y", surface.y, ends[2:])
+    return replace(surface, x=surface.x[columns], y=surface.y[lines], z=surface.z[lines, columns])
 
 
-def _between(source: str, axis, first: float, last: float, name: str) -> slice:
+def _find_part(window: str, extent: str, axis: np.ndarray, ends: tuple) -> slice:
+    first, last = ends
     near = 1e-6 * float(axis[-1] - axis[0]) / (axis.size - 1)
     if not first < last or first < axis[0] - near or last > axis[-1] + near:
-        what = f"scan runs in {name}" if name else "trace runs"
-        raise PatchfemError(f"{source}: the window runs from {say(first)} to {say(last)}, but the {what} from "
-                            f"{say(axis[0])} to {say(axis[-1])}")
-    low, high = (max(int(np.searchsorted(axis, at + near, "right")) - 1, 0) for at in (first, last))
+        raise PatchfemError(
+            f"{window} runs from {say(first)} to {say(last)}, but {extent} from {say(axis[0])} to "
+            f"{say(axis[-1])}"
+        )
+    low, high = (max(int(np.searchsorted(axis, end + near, "right")) - 1, 0) for end in ends)
     return slice(low, high + 1)
 
 
-def interval_of(name: str, profile: Profile, cutoff: float | None = None, band: tuple = BAND) -> Quantity:
-    """One parameter of a trace with its interval; names as in `rows`, those of the roughness need a cut-off [m]."""
-    row = rows.TABLE.get(name)
-    if row is None or row in rows.AREAL or row in rows.WINDOW:
-        known = ", ".join(each.name for each in (*rows.PRIMARY, *rows.WAVES, *rows.ROUGH))
-        raise PatchfemError(f"'{name}' is not a parameter of a trace; use one of {known}")
-    trace = _enough(even(_enough(profile)))
-    if row not in rows.ROUGH:
-        found = _primary(trace, band)[2]
-        return _waves(row, trace.source, found) if row in rows.WAVES else _value(row, row.of(found.heights), found)
-    if cutoff is None:
-        raise PatchfemError(f"{profile.source}: {name} belongs to the roughness profile and needs a cut-off")
-    heights = Heights(filtered(_primary(trace, band)[0], cutoff)[1].z, trace.length / (trace.x.size - 1), cutoff)
-    return _value(row, row.of(heights), Intervals(heights, None))
-
-
-def _enough(trace: Profile) -> Profile:
-    if trace.x.size < FEWEST:
-        count = f"{trace.x.size} sample{'s' * (trace.x.size != 1)}"
-        raise PatchfemError(f"{trace.source}: {count}; the parameters need at least {FEWEST}")
+def _require_samples(trace: Profile) -> Profile:
+    if trace.x.size < MIN_SAMPLES:
+        plural = "s" * (trace.x.size != 1)
+        raise PatchfemError(
+            f"{trace.source}: {trace.x.size} sample{plural}; the parameters need at least "
+            f"{MIN_SAMPLES}"
+        )
     return trace
 
 
-def _primary(trace: Profile, band: tuple, settings: Settings = NOTHING) -> tuple:
-    """The trace without form and without the waves of the S-filter, the name of the form, and its `Intervals`.
-
-    A Gaussian filter keeps a polynomial one of its degree, so that the form may go first and again behind it.
-    """
-    flat, form = without_form(trace, settings.form)
-    if settings.short is not None:
-        flat = without_form(filtered(flat, settings.short)[0], settings.form)[0]
-    if np.ptp(flat.z) <= ROUND * np.abs(trace.z).max():
-        flat = replace(flat, z=frozen_array(np.zeros(flat.z.size)))
-    heights = Heights(flat.z, trace.length / (trace.x.size - 1), None, settings.level, settings.ratios)
-    spectrum = spectrum_of(heights.z, heights.step)
-    return flat, form, Intervals(heights, degree_of(settings.form), spectrum, band)
-
-
-def _value(row, value, found: Intervals) -> Quantity:
-    low, high = found.of(row, value)
-    reason = ""
+def _quantity(row: Parameter, value: float | None, intervals: Intervals) -> Quantity:
+    """Combine a value with its interval, or with the reason why there is none."""
+    heights = intervals.heights
     if value is None:
-        flat = found.heights.power == 0
-        reason = "the trace is flat" if flat else "the trace is shorter than one cut-off" \
-            if found.heights.section is not None and not len(found.heights.sections) else UNDETERMINED
-    elif row.kind == "wave" and low is not None and not (
-            found.heights.step <= low <= value <= high <= found.heights.length):
-        low, high, reason = None, None, UNTOLD
-    if value is not None and low is None and not reason and found.heights.power:
-        reason = UNEVEN if found.uneven and row.kind not in ("", *LATERAL) else \
-            LONG if found.long and row.kind in SIZES else UNTOLD
-    return Quantity(value, low, high, row.unit, _text(row, found.heights), reason, row.name)
+        reason = "the heights of the trace do not determine this parameter"
+        if heights.power == 0:
+            reason = "the trace is flat"
+        elif not len(heights.sections):
+            reason = "the trace is shorter than one cut-off"
+        return refused(row.unit, row.text, reason)._replace(name=row.name)
+    low, high = intervals.interval(row, value)
+    if (
+        row.kind == "wave"
+        and low is not None
+        and not (heights.step <= low <= value <= high <= heights.length)
+    ):
+        low, high = None, None
+    reason = ""
+    if low is None and heights.power:
+        reason = NO_INTERVAL
+        if intervals.is_uneven and row.kind not in ("", *LATERAL):
+            reason = NOT_GAUSSIAN
+        elif row.kind in SIZES and intervals.is_short:
+            reason = TOO_SHORT
+    return Quantity(value, low, high, row.unit, row.text, reason, row.name)
 
 
-def _text(row, heights: Heights | Surface) -> str:
-    first, second = (f"{100 * one:g} %" for one in heights.ratios)
-    return row.text.format(level=say(heights.level), first=first, second=second)
-
-
-def _waves(row, source: str, found: Intervals) -> Quantity:
-    if row.name == "dominant_wavelength":
-        return _value(row, found.spectrum.dominant, found)
-    low, high = found.band
+def _band_quantity(row: Parameter, trace: Profile, intervals: Intervals) -> Quantity:
+    low, high = BAND
+    heights = intervals.heights
     text = row.text.replace("the band", f"{say(low)} to {say(high)}")
     try:
-        refuse_band(source, low, high, found.heights.length - found.heights.step, found.heights.step)
+        refuse_band(trace.source, low, high, heights.length - heights.step, heights.step)
     except PatchfemError as error:
         return refused(row.unit, text, str(error))._replace(name=row.name)
-    return _value(row._replace(text=text), amplitude_of(found.spectrum, low, high), found)
+    return _quantity(
+        row._replace(text=text), amplitude_of(intervals.spectrum, low, high), intervals
+    )
 
 
-def _ends(trace: Profile) -> float:
-    return float(trace.z[-1] - trace.z[0])
-
-
-def _spiky(surface: Profile | Areal) -> tuple:
-    """What is to be said of the spikes of a trace or of a scan, () for nothing."""
-    found = spikes_of(surface) if isinstance(surface, Areal) else spikes(surface)
-    if not found.any():
+def _spike_note(surface: Profile | Areal) -> tuple:
+    """Describe the spikes of a surface in a sentence, () without any."""
+    is_spike = spikes_of(surface) if isinstance(surface, Areal) else spikes(surface)
+    count = int(is_spike.sum())
+    if not count:
         return ()
-    *row, column = np.argwhere(found)[0]
+    *row, column = np.argwhere(is_spike)[0]
     place = f"x = {say(surface.x[column])}" + "".join(f", y = {say(surface.y[k])}" for k in row)
-    what, counts = (f"is a spike (at {place}),", "which counts") if found.sum() == 1 else \
-        (f"are spikes (the first at {place}),", "which count")
-    return (f"{surface.source}: {found.sum()} of {found.size} heights {what} {counts} in every parameter",)
+    if count == 1:
+        clause = f"is a spike (at {place}), which counts"
+    else:
+        clause = f"are spikes (the first at {place}), which count"
+    return (f"{surface.source}: {count} of {is_spike.size} heights {clause} in every parameter",)
 
 
-def _resampled(cut: Profile, trace: Profile, primary: Profile, settings: Settings) -> tuple:
-    """By how much the mean heights hang on the resampling of an uneven trace, () of an even or S-filtered one.
+def _resampling_note(part: Profile, trace: Profile, primary: Profile) -> tuple:
+    """State by how much resampling changes Pa and Pq of an uneven trace.
 
-    Straight lines between samples cut tops and valleys off: beside them stand the file's own heights, each weighted by
-    the length that it stands for, about the same form.
+    Straight lines between samples cut peaks and valleys off. The reference are the heights of the
+    file about the same form, each weighted by the length that it represents.
     """
-    if trace.x.size == cut.x.size or settings.short is not None:
+    known = ~part.missing
+    x = part.x[known]
+    weight = np.gradient(x) / np.gradient(x).sum()
+    z = part.z[known] - np.interp(x, trace.x, trace.z - primary.z)
+    z = z - weight @ z
+    weighted = {"Pa": weight @ np.abs(z), "Pq": np.sqrt(weight @ z**2)}
+    resampled = {"Pa": np.abs(primary.z).mean(), "Pq": np.sqrt(np.mean(primary.z**2))}
+    if min(weighted.values()) <= 0:
         return ()
-    there = ~cut.missing
-    x, z = cut.x[there], cut.z[there]
-    weight, z = np.gradient(x), z - np.interp(x, trace.x, trace.z - primary.z)
-    weight, z = weight / weight.sum(), z - weight @ z / weight.sum()
-    own = {"Pa": float(weight @ np.abs(z)), "Pq": float(np.sqrt(weight @ z**2))}
-    here = {"Pa": float(np.abs(primary.z).mean()), "Pq": float(np.sqrt(np.mean(primary.z**2)))}
-    if min(own.values()) <= 0:
-        return ()
-    told = " and ".join(f"{name} by {100 * abs(here[name] / own[name] - 1):.2g} %" for name in own)
-    return (f"{trace.source}: resampling changes {told}, compared with the heights of the file weighted by the length "
-            "that each stands for; no interval includes this error",)
+    changes = [
+        f"{name} by {100 * abs(resampled[name] / value - 1):.2g} %"
+        for name, value in weighted.items()
+    ]
+    return (
+        f"{trace.source}: resampling changes {' and '.join(changes)}, compared with the heights of "
+        "the file weighted by the length that each stands for; no interval includes this error",
+    )
 
 
-def _short(roughness: Profile, cutoff: float) -> tuple:
-    """What is to be said of a roughness profile that is shorter than one section, () where it is not."""
+def _short_trace_note(roughness: Profile, cutoff: float) -> tuple:
+    """State that a roughness profile is shorter than one section, () if it is not."""
     if roughness.length >= cutoff * (1 - 1e-9):
         return ()
-    return (f"{roughness.source}: half a cut-off is trimmed at each end, and the {say(roughness.length)} that remain "
-            f"are shorter than one section of {say(cutoff)}, the least that ISO 21920 needs; do not use these "
-            "roughness parameters: evaluate a longer part, or take a shorter cut-off",)
-
-
-def _of_scan(scan: Areal, cutoff: float | None, settings: Settings, window=None) -> RoughnessReport:
-    flat, form = without_form(scan, settings.form)
-    if settings.short is not None:
-        flat = without_form(filtered_scan(flat, settings.short)[0], settings.form)[0]
-    if cutoff is not None:
-        flat = filtered_scan(flat, cutoff)[1]
-    if np.isnan(flat.z).all():
-        raise PatchfemError(f"{scan.source}: no measured height is left within half a cut-off of the borders")
-    if np.nanmax(flat.z) - np.nanmin(flat.z) <= ROUND * np.nanmax(np.abs(scan.z)):
-        flat = replace(flat, z=frozen_array(flat.z * 0.0))
-    steps = tuple(float(axis[-1] - axis[0]) / (axis.size - 1) for axis in (flat.y, flat.x))
-    surface = Surface(flat.z, steps, settings.level, settings.ratios)
-    found = {row.name: row.of(surface) for row in rows.AREAL}
-    bounds, uneven = areal_intervals(flat.z, found)
-    values = tuple(Quantity(found[name], *bounds[name], row.unit, _text(row, surface),
-                            lacking(surface, name) if found[name] is None else
-                            "" if bounds[name][0] is not None or not surface.heights.power else
-                            (UNEVEN if uneven else UNTOLD).replace("trace", "scan"), name)
-                   for row in rows.AREAL for name in (row.name,))
-    lost = int(np.isnan(flat.z).sum())
-    notes = scan.notes + _spiky(scan)
-    if lost:
-        notes += (f"{scan.source}: {lost} of {flat.z.size} heights are missing and are left out",)
-    return RoughnessReport(scan.source, "areal", float(scan.x[-1] - scan.x[0]), scan.z.shape, steps[1], values, notes,
-                           form, settings, cutoff, window, abbott=abbott(surface.heights), core=surface.heights.core,
-                           scan=flat)
+    return (
+        f"{roughness.source}: half a cut-off is trimmed at each end, and the "
+        f"{say(roughness.length)} that remain are shorter than one section of {say(cutoff)}, the "
+        "least that ISO 21920 needs; do not use these roughness parameters: evaluate a longer "
+        "part, or take a shorter cut-off",
+    )

@@ -1,4 +1,4 @@
-"""Power spectral density of an even trace with its 95 % band, dominant wavelength, height of a band of wavelengths."""
+"""Power spectral density of evenly spaced heights and its dominant wavelength."""
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -6,21 +6,21 @@ from functools import cached_property
 import numpy as np
 
 from ...core import PatchfemError, frozen_array, say
-from ..profile import Profile, even, level
 
-TAPERS = 3  # of the first look, and the fewest
-MOST = 16
-WHOLE = 1 << 16  # samples up to which none is left out for a fast transform
-BLUR = 0.15  # half-width of the smoothing over the frequency of the dominant wave
-BAND = (60e-6, 110e-6)  # [m] the waves of 80 um of the report
+MIN_TAPERS = 3  # averaged spectra of the first estimate; fewer miss the dominant wave
+MAX_TAPERS = 16  # more blur the dominant wave of a long trace without making the intervals narrower
+MAX_UNTRIMMED = 1 << 16  # samples; longer traces lose a few at the end, for a fast transform
+BLUR_FRACTION = 0.15  # half-width of the smoothing / frequency of the dominant wave
+BAND = (60e-6, 110e-6)  # wavelengths [m] of the waves of 80 um in the 1985 report
 
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """One-sided power spectral density (k,) [m3] at frequencies (k,) [1/m], from one step above zero to two samples.
+    """One-sided power spectral density (k,) [m3] at frequencies (k,) [1/m].
 
-    Its integral over a range of frequencies is the mean square of those waves. tapers: spectra of independent error
-    that are averaged, so that each value has 2 tapers degrees of freedom; length [m] of the trace.
+    Its integral over a range of frequencies is the mean square of those waves. tapers: independent
+    spectra that are averaged, so that each value has 2 tapers degrees of freedom; length [m] of the
+    trace.
     """
 
     frequency: np.ndarray
@@ -33,109 +33,150 @@ class Spectrum:
         """Distance of two frequencies [1/m]."""
         return float(self.frequency[1] - self.frequency[0])
 
-    def band(self, share: float = 0.95) -> tuple:
-        """Lower and upper bound (k,) [m3] between which the true density lies with this probability, by chi-square."""
-        from scipy.special import chdtri
-
+    def band(self, probability: float = 0.95) -> tuple[np.ndarray, np.ndarray]:
+        """Return bounds (k,) [m3] of the true density with a probability (chi-square)."""
         freedom = 2 * self.tapers
-        low, high = (freedom / chdtri(freedom, 1 - p) for p in ((1 + share) / 2, (1 - share) / 2))
+        low, high = (chi_square_factor(freedom, (1 + side * probability) / 2) for side in (1, -1))
         return self.density * low, self.density * high
 
     @cached_property
     def dominant(self) -> float | None:
-        """Wavelength [m] at which an octave of frequencies holds most height, None for a flat trace.
+        """Wavelength [m] whose octave holds most height, None for a flat trace.
 
-        It starts at the largest frequency times density, among waves of which the trace holds two at least, and moves
-        to the middle of the density within the width of the tapers around it, so that a sine is found at its own wave.
+        It starts at the largest frequency times density, among waves of which the trace holds at
+        least two, and moves to the centroid of the density within the width of the tapers around
+        it.
         """
         inside = self.frequency * self.length >= 2
-        f, density = self.frequency[inside], self.density[inside]
+        frequency = self.frequency[inside]
+        density = self.density[inside]
         if not density.size or density.max() <= 0:
             return None
-        start = at = f[int(np.argmax(f * density))]
+        start = frequency[int(np.argmax(frequency * density))]
         width = (self.tapers + 1) / 2 / self.length
+        centre = start
         for _ in range(5):
-            part = slice(*np.searchsorted(f, [at - 1.001 * width, at + 1.001 * width]))
-            moved = float(f[part] @ density[part] / density[part].sum())
-            at = float(np.clip(moved, start - width, start + width))
-        return float(1 / at)
+            ends = [centre - 1.001 * width, centre + 1.001 * width]
+            part = slice(*np.searchsorted(frequency, ends))
+            centroid = float(frequency[part] @ density[part] / density[part].sum())
+            centre = float(np.clip(centroid, start - width, start + width))
+        return float(1 / centre)
 
     def power(self, low: float, high: float) -> float:
-        """Mean square [m2] of the waves from `low` to `high` [m] long, the density straight between frequencies."""
-        total = np.concatenate([[0.0], np.cumsum((self.density[1:] + self.density[:-1]) / 2 * self.step)])
+        """Integrate the mean square [m2] of the waves from `low` to `high` [m] long."""
+        means = (self.density[1:] + self.density[:-1]) / 2
+        total = np.concatenate([[0.0], np.cumsum(means * self.step)])
         ends = np.interp([1 / high, 1 / low], self.frequency, total)
         return float(ends[1] - ends[0])
 
     def within(self, low: float, high: float) -> np.ndarray:
-        """Density (k,) [m3] of the waves from `low` to `high` [m] alone."""
-        return np.where((self.frequency >= 1 / high) & (self.frequency <= 1 / low), self.density, 0.0)
+        """Return the density (k,) [m3] of the waves from `low` to `high` [m] alone, 0 elsewhere."""
+        return np.where(
+            (self.frequency >= 1 / high) & (self.frequency <= 1 / low), self.density, 0.0
+        )
+
+
+def chi_square_factor(freedom: float, probability: float) -> float:
+    """Return freedom / chi-square quantile: bound of a mean square relative to its estimate."""
+    from scipy.special import chdtri
+
+    return float(freedom / chdtri(freedom, 1 - probability))
 
 
 def spectrum_of(z: np.ndarray, step: float, tapers: int | None = None) -> Spectrum:
-    """Density of even heights z (n,) [m] about their mean, by sine tapers (Riedel and Sidorenko, IEEE 1995).
+    """Estimate the spectral density of heights by sine tapers.
 
-    tapers: how many spectra are averaged. None: as many as smooth over 15 % of the frequency of the dominant wave to
-    either side, found in a first look, between 3 and 16. All tapers come from one transform: that of taper k at a
-    frequency is half the difference of the transforms k half-steps below and above it. A trace of more than 65536
-    samples loses up to 0.1 % of them at its end, to a length with a fast transform. A million samples: 0.3 s.
+    Method: Riedel and Sidorenko, IEEE Trans. Signal Process. 43, 188, 1995.
+
+    Parameters
+    ----------
+    z : (n,) array [m]
+        Evenly spaced heights; their mean is subtracted. Beyond 65536 samples up to 0.1 % are left
+        out at the end.
+    step : float [m]
+    tapers : int, optional
+        Spectra that are averaged; by default as many as smooth over 15 % of the dominant frequency
+        to either side.
+
+    Returns
+    -------
+    Spectrum
+        A million samples take 0.3 s.
     """
     from scipy.fft import prev_fast_len, rfft
 
-    n = z.size if z.size <= WHOLE else prev_fast_len(z.size + 1, real=True) - 1
+    n = z.size if z.size <= MAX_UNTRIMMED else prev_fast_len(z.size + 1, real=True) - 1
     z = z[:n]
-    length, half = n * step, (n + 1) * step
+    length = n * step
     transform = rfft(np.concatenate([[0.0], z - z.mean()]), 2 * (n + 1))
-    found = _averaged(transform, n, step, min(TAPERS, max(n // 4, 1)))
-    look = Spectrum(np.arange(1, found.size + 1) / half / 2, found, TAPERS, length)
+    density = _average_tapers(transform, n, step, min(MIN_TAPERS, max(n // 4, 1)))
+    frequency = np.arange(1, density.size + 1) / ((n + 1) * step) / 2
+    first = Spectrum(frozen_array(frequency), frozen_array(density), MIN_TAPERS, length)
     if tapers is None:
-        wave = look.dominant
-        tapers = TAPERS if wave is None else int(np.clip(np.floor(2 * BLUR * length / wave) - 1, TAPERS, MOST))
-    if tapers != TAPERS:
-        found = _averaged(transform, n, step, tapers)
-    return Spectrum(frozen_array(look.frequency), frozen_array(found), tapers, length)
+        wave = first.dominant
+        wanted = MIN_TAPERS if wave is None else np.floor(2 * BLUR_FRACTION * length / wave) - 1
+        tapers = int(np.clip(wanted, MIN_TAPERS, MAX_TAPERS))
+    if tapers == MIN_TAPERS:
+        return first
+    return Spectrum(
+        first.frequency, frozen_array(_average_tapers(transform, n, step, tapers)), tapers, length
+    )
 
 
-def _averaged(transform, n: int, step: float, tapers: int) -> np.ndarray:
-    """Mean density at j = 1, 2, ... half-steps 1/(2 (n + 1) step) up to the last."""
+def _average_tapers(transform, n: int, step: float, tapers: int) -> np.ndarray:
+    """Average the densities of sine tapers at j = 1, 2, ... half-steps 1 / (2 (n + 1) step).
+
+    The transform under taper k is half the difference of the transforms k half-steps below and
+    above.
+    """
     size = transform.size
-    wide = np.concatenate([np.conj(transform[tapers:0:-1]), transform, np.conj(transform[-2:-2 - tapers:-1])])
-    part, total = np.empty(size - 1, complex), np.zeros(2 * (size - 1))
-    squares = part.view(float)
+    below = np.conj(transform[tapers:0:-1])
+    above = np.conj(transform[-2 : -2 - tapers : -1])
+    extended = np.concatenate([below, transform, above])
+    total = np.zeros(2 * (size - 1))
     for k in range(1, tapers + 1):
-        first = 1 + tapers
-        np.subtract(wide[first - k:first - k + size - 1], wide[first + k:first + k + size - 1], out=part)
-        np.multiply(squares, squares, out=squares)
-        total += squares
+        start = 1 + tapers
+        part = (
+            extended[start - k : start - k + size - 1] - extended[start + k : start + k + size - 1]
+        )
+        total += part.view(float) ** 2
     return (total[::2] + total[1::2]) * (step / (n + 1) / tapers)
 
 
-def spectrum(profile: Profile, tapers: int | None = None) -> Spectrum:
-    """Spectrum of a trace on an even step, less its least-squares line (`spectrum_of`)."""
-    flat = level(even(profile))
-    return spectrum_of(flat.z, flat.length / (flat.x.size - 1), tapers)
+def amplitude_of(spectrum: Spectrum, low: float, high: float) -> float:
+    """Return the amplitude [m] of a sine with the mean square of a band of waves.
 
+    Parameters
+    ----------
+    spectrum : Spectrum
+    low, high : float [m]
 
-def band_amplitude(profile: Profile, low: float = BAND[0], high: float = BAND[1]) -> float:
-    """Amplitude [m] of the sine that has the mean square of the waves from `low` to `high` [m] long: sqrt(2 power).
-
-    PatchfemError for a band that is empty, or that the trace or its step is too coarse for.
+    Returns
+    -------
+    float
     """
-    flat = level(even(profile))
-    step = flat.length / (flat.x.size - 1)
-    refuse_band(flat.source, low, high, flat.length, step)
-    return amplitude_of(spectrum_of(flat.z, step), low, high)
-
-
-def amplitude_of(found: Spectrum, low: float, high: float) -> float:
-    """Amplitude [m] of the sine with the mean square of a band of a spectrum."""
-    return float(np.sqrt(2 * found.power(low, high)))
+    return float(np.sqrt(2 * spectrum.power(low, high)))
 
 
 def refuse_band(source: str, low: float, high: float, length: float, step: float) -> None:
-    """PatchfemError where a trace cannot show waves from `low` to `high` [m]."""
+    """Raise PatchfemError if a trace cannot show the waves from `low` to `high`.
+
+    Parameters
+    ----------
+    source : str
+        Name of the trace in the message.
+    low, high : float [m]
+    length, step : float [m]
+        Of the trace and between its samples.
+    """
     if not 0 < low < high:
-        raise PatchfemError(f"{source}: a band from {say(low)} to {say(high)}; a band must be given from the shorter "
-                            "to the longer wavelength")
+        raise PatchfemError(
+            f"{source}: a band from {say(low)} to {say(high)}; a band must be given from the "
+            "shorter to the longer wavelength"
+        )
     if 2 * high > length or low < 2 * step:
-        raise PatchfemError(f"{source}: the trace, {say(length)} long with a step of {say(step)}, can show waves of "
-                            f"{say(2 * step)} to {say(length / 2)}, but not the whole band {say(low)} to {say(high)}")
+        raise PatchfemError(
+            f"{source}: the trace, {say(length)} long with a step of {say(step)}, can show waves "
+            f"of {say(2 * step)} to {say(length / 2)}, but not the whole band {say(low)} to "
+            f"{say(high)}"
+        )

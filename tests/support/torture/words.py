@@ -74,7 +74,7 @@ def over(trial: Trial) -> list:
 
 def profile(t: Trial) -> list:
     """Words of the verb profile."""
-    options = (["b.csv"], ["--cutoff", t.draw(*LENGTHS)], ["--tip", t.draw(*LENGTHS)], ["--json"], ["-v"],
+    options = (["b.csv"], ["--cutoff", t.draw(*LENGTHS)], ["--json"], ["-v"],
                ["--window", t.draw("1 um,5 um", "5 um,1 um", "x", "1 um", ",")],
                ["--units", t.draw("um,um", "um", "x,y", ",")])
     return [t.draw("a.csv", "rows.csv", "nowhere", "."), *(one for each in options if t.chance(0.3) for one in each)]

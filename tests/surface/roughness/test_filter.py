@@ -8,7 +8,7 @@ from synthetic import sine
 
 from patchfem.core import PatchfemError
 from patchfem.surface.profile import Profile, even, level
-from patchfem.surface.roughness.filter import ALPHA, filtered, mean_line
+from patchfem.surface.roughness.filter import ALPHA, filter_trace, mean_line
 from patchfem.surface.roughness.parameters import Heights, root_mean_square
 
 UM = 1e-6
@@ -25,7 +25,7 @@ def test_exact_a_sine_through_the_filter(cutoff, known):
     """Whole waves away from the ends to 1e-9, the whole trimmed trace of 1000 waves to 1e-5."""
     assert passed(cutoff * UM) == pytest.approx(known, rel=3e-6)
     trace = sine(np.arange(400_001) * UM, 1e-6, WAVE)
-    rough = filtered(trace, cutoff * UM)[1].z / 1e-6
+    rough = filter_trace(trace, cutoff * UM)[1].z / 1e-6
     assert abs(rough[2000:2000 + 400 * 900].std() - passed(cutoff * UM)) < 1e-9
     assert abs(np.sqrt((rough**2).mean()) - passed(cutoff * UM)) < 1e-5
 
@@ -51,26 +51,22 @@ def test_exact_the_tilted_ends_are_weighted_lines():
 
 def test_exact_half_a_cutoff_is_trimmed_at_each_end():
     trace = sine(np.arange(10_001) * UM, 1e-6, 80 * UM)
-    waviness, rough = filtered(trace, 800 * UM)
+    waviness, rough = filter_trace(trace, 800 * UM)
     assert rough.x[0] == pytest.approx(400 * UM) and rough.x[-1] == pytest.approx(9600 * UM)
     assert np.array_equal(waviness.x, rough.x)
-    whole = filtered(trace, 800 * UM, "whole")[1]
-    assert whole.x.size == 10_001
-    assert whole.z[400:9601] == pytest.approx(rough.z, abs=2e-9)
 
 
 def test_exact_waviness_and_roughness_add_up_to_the_levelled_trace():
     x = np.arange(3000) * UM
     z = np.random.default_rng(0).normal(0, UM, 3000) + 0.01 * x
 
-    waviness, rough = filtered(Profile(x, z, "t"), 250 * UM)
+    waviness, rough = filter_trace(Profile(x, z, "t"), 250 * UM)
     assert waviness.z + rough.z == pytest.approx(level(Profile(x, z, "t")).z[125:-125], abs=1e-18)
 
 
 def test_always_a_tilt_is_no_roughness():
     x = np.arange(2000) * UM
-    for ends in ("trimmed", "whole"):
-        assert abs(filtered(Profile(x, 3 * x + 1e-3, "tilted"), 250 * UM, ends)[1].z).max() < 1e-15
+    assert abs(filter_trace(Profile(x, 3 * x + 1e-3, "tilted"), 250 * UM)[1].z).max() < 1e-15
 
 
 def test_exact_an_even_whole_trace_stays_itself():
@@ -94,7 +90,7 @@ def test_exact_uneven_and_missing_samples_of_a_straight_flank():
 def test_always_a_finer_reading_of_an_uneven_sine_gives_its_roughness():
     rng = np.random.default_rng(5)
     x = np.concatenate([[0.0], np.cumsum(rng.uniform(0.5, 1.5, 60_000))]) * UM
-    rough = filtered(Profile(x, 1e-6 * np.sin(2 * np.pi * x / WAVE), "s"), 250 * UM)[1]
+    rough = filter_trace(Profile(x, 1e-6 * np.sin(2 * np.pi * x / WAVE), "s"), 250 * UM)[1]
     assert root_mean_square(Heights(rough.z, 1.0)) / 1e-6 == pytest.approx(passed(250 * UM), rel=2e-3)
 
 
@@ -107,9 +103,5 @@ def test_always_a_finer_reading_of_an_uneven_sine_gives_its_roughness():
 ])
 def test_refuses_a_cutoff_that_does_not_fit(cutoff, says):
     with pytest.raises(PatchfemError, match=says.replace("(", r"\(")):
-        filtered(sine(np.arange(1000) * UM, UM, 80 * UM, 0.3), cutoff)
+        filter_trace(sine(np.arange(1000) * UM, UM, 80 * UM, 0.3), cutoff)
 
-
-def test_refuses_ends_that_are_not_known():
-    with pytest.raises(PatchfemError, match="no treatment of its ends called 'padded'; use trimmed or whole"):
-        filtered(sine(np.arange(1000) * UM, UM, 80 * UM), 80 * UM, "padded")

@@ -8,7 +8,7 @@ import pytest
 from patchfem.core import PatchfemError
 from patchfem.surface.areal import Areal, level
 from patchfem.surface.profile import Profile
-from patchfem.surface.roughness.form import form_of, without_form
+from patchfem.surface.roughness.form import parse_form, subtract_form
 
 UM, MM = 1e-6, 1e-3
 
@@ -28,8 +28,8 @@ def test_exact_a_polynomial_is_taken_off_and_nothing_else(form):
     bent = np.polynomial.polynomial.polyval(x, rng.normal(size=form + 1)) * 1e-5
     z = rng.normal(size=500) * UM
     z[40:60] = np.nan
-    alone, name = without_form(trace(z), form)
-    again = without_form(trace(z + bent), form)[0]
+    alone, name = subtract_form(trace(z), form)
+    again = subtract_form(trace(z + bent), form)[0]
     assert name == f"polynomial of degree {form}" and np.nanmax(np.abs(again.z - alone.z)) < 1e-17
     there = ~np.isnan(z)
     dense = np.polynomial.legendre.legvander(x[there], form)
@@ -53,7 +53,7 @@ def test_exact_the_polynomial_of_a_scan_of_a_dense_least_squares_solve(degree):
 def test_exact_a_circle_under_a_trace(sign):
     """A ball of 5 mm seen over 4 mm, off its middle: 0.1 nm is left, and the radius is told to 1e-6."""
     x = np.arange(4001) * UM
-    flat, name = without_form(trace(sign * circle(x, 5 * MM, 1.6 * MM, -4 * MM)), "cylinder")
+    flat, name = subtract_form(trace(sign * circle(x, 5 * MM, 1.6 * MM, -4 * MM)), "cylinder")
     assert np.abs(flat.z).max() < 1e-10
     assert name == f"circle of radius 5 mm (90 % confidence), a {'crest' if sign > 0 else 'trough'}"
 
@@ -70,7 +70,7 @@ def test_exact_a_cylinder_under_a_scan(degrees, tilt):
     rough = rng.normal(size=z.shape) * 0.1 * UM
     z = z + rough
     z[rng.random(z.shape) < 0.05] = np.nan
-    flat, name = without_form(Areal(x[0], y[:, 0], z, "scan"), "cylinder")
+    flat, name = subtract_form(Areal(x[0], y[:, 0], z, "scan"), "cylinder")
     assert np.sqrt(np.nanmean((flat.z - rough) ** 2)) < 0.005 * UM
     radius, error, axis = re.fullmatch(r"cylinder of radius ([\d.]+) ± ([\d.]+) mm \(90 % confidence\), a crest whose "
                                        r"axis lies ([\d.]+) deg from x", name).groups()
@@ -84,7 +84,7 @@ def test_always_the_error_of_a_radius_holds(count):
     x, held = np.arange(1500) * UM, 0
     for seed in range(count):
         noise = np.convolve(np.random.default_rng(seed).normal(size=x.size + 60), np.ones(61) / 61, "valid") * UM
-        name = without_form(trace(circle(x, 20 * MM, 0.7 * MM, 0) + noise), "cylinder")[1]
+        name = subtract_form(trace(circle(x, 20 * MM, 0.7 * MM, 0) + noise), "cylinder")[1]
         value, error = re.search(r"radius ([\d.]+) ± ([\d.]+) mm", name).groups()
         held += abs(float(value) - 20) <= float(error)
     assert held >= 0.9 * count - 3 * np.sqrt(0.09 * count) - count / 20
@@ -92,21 +92,21 @@ def test_always_the_error_of_a_radius_holds(count):
 
 def test_exact_a_flat_trace_tells_a_least_radius():
     z = np.random.default_rng(0).normal(size=2000) * UM
-    assert re.fullmatch(r"circle, of a radius above [\d.]+ m+ \(90 % conf.*\)", without_form(trace(z), "cylinder")[1])
+    assert re.fullmatch(r"circle, of a radius above [\d.]+ m+ \(90 % conf.*\)", subtract_form(trace(z), "cylinder")[1])
 
 
 @pytest.mark.parametrize("text", ["0", "10", "-1", "ball", "2.5", ""])
 def test_refuses_a_form(text):
     with pytest.raises(PatchfemError, match="use a degree from 1"):
-        form_of(text)
+        parse_form(text)
 
 
 def test_refuses_too_few_heights():
     with pytest.raises(PatchfemError, match="do not determine a polynomial of degree 5"):
-        without_form(trace(np.where(np.arange(40) < 6, 1.0, np.nan)), 5)
+        subtract_form(trace(np.where(np.arange(40) < 6, 1.0, np.nan)), 5)
     with pytest.raises(PatchfemError, match="a cylinder needs at least ten"):
-        without_form(trace(np.where(np.arange(40) < 6, 1.0, np.nan)), "cylinder")
+        subtract_form(trace(np.where(np.arange(40) < 6, 1.0, np.nan)), "cylinder")
     line = np.full((20, 20), np.nan)
     line[4] = 1.0
     with pytest.raises(PatchfemError, match="do not determine a polynomial of degree 2"):
-        without_form(Areal(np.arange(20.0), np.arange(20.0), line, "scan"), 2)
+        subtract_form(Areal(np.arange(20.0), np.arange(20.0), line, "scan"), 2)

@@ -1,16 +1,15 @@
-"""Intervals of a single trace: how many of them hold the mean over all traces; the stylus's reach."""
+"""Intervals of a single trace: how many of them hold the mean over all traces."""
 
 import numpy as np
 import pytest
 from ring_traces import traces
 
 from patchfem.surface.profile import Profile, level
-from patchfem.surface.roughness.filter import filtered
-from patchfem.surface.roughness.intervals import COUNT, Intervals, made_traces
+from patchfem.surface.roughness.filter import filter_trace
+from patchfem.surface.roughness.intervals import N_TRACES, Intervals, made_traces
 from patchfem.surface.roughness.parameters import Heights, root_mean_square
 from patchfem.surface.roughness.rows import PRIMARY, ROUGH, TABLE, WAVES
 from patchfem.surface.roughness.spectrum import amplitude_of, spectrum_of
-from patchfem.surface.roughness.tip import tip_check
 
 UM = 1e-6
 LENGTH, CUTOFF = 1e-3, 250e-6
@@ -21,11 +20,11 @@ def read(z, names=None) -> list:
     those named."""
     trace = Profile(np.arange(z.size) * UM, z, "made")
     primary = Heights(level(trace).z, UM)
-    rough = Heights(filtered(trace, CUTOFF)[1].z, UM, CUTOFF)
+    rough = Heights(filter_trace(trace, CUTOFF)[1].z, UM, CUTOFF)
     found = spectrum_of(primary.z, UM)
-    out = [(primary, row, amplitude_of(found, 60e-6, 110e-6) if row.of is None else row.of(primary))
+    out = [(primary, row, amplitude_of(found, 60e-6, 110e-6) if row.compute is None else row.compute(primary))
            for row in (*PRIMARY, *WAVES) if names is None or row.name in names]
-    return out + [(rough, row, row.of(rough)) for row in ROUGH if names is None or row.name in names]
+    return out + [(rough, row, row.compute(rough)) for row in ROUGH if names is None or row.name in names]
 
 
 def coverage(count: int, seed: int, names=None, others: int = 2000) -> dict:
@@ -42,7 +41,7 @@ def coverage(count: int, seed: int, names=None, others: int = 2000) -> dict:
             if value is None:
                 continue
             one = made.setdefault(id(heights), Intervals(heights, 1 if heights.section is None else None))
-            low, high = one.of(row, value)
+            low, high = one.interval(row, value)
             if low is not None:
                 held[row.name].append(low <= truth[row.name] <= high)
     assert all(len(values) >= 0.9 * count for values in held.values() if values)  # the others seem not Gaussian
@@ -80,7 +79,7 @@ def test_exact_degrees_of_freedom_of_white_noise():
     heights = Heights(np.random.default_rng(0).normal(size=n), UM)
     found = Intervals(heights, None)
     assert found.freedom("power") == pytest.approx(n, rel=0.05)
-    low, high = found.of(TABLE["Rq"], 1.0)
+    low, high = found.interval(TABLE["Rq"], 1.0)
     assert high - low == pytest.approx(2 * 1.645 / np.sqrt(2 * n), rel=0.05)
 
 
@@ -99,7 +98,7 @@ def test_always_a_longer_trace_tells_more():
         row, widths = TABLE[name], []
         for size in (16_000, 64_000):
             heights = Heights(z[:size], UM)
-            low, high = Intervals(heights, None).of(row, row.of(heights))
+            low, high = Intervals(heights, None).interval(row, row.compute(heights))
             widths.append(high - low)
         assert widths[0] / widths[1] == pytest.approx(2, rel=0.2), name
 
@@ -109,7 +108,7 @@ def test_exact_made_traces_have_the_spectrum_and_are_the_same_each_time():
     heights = Heights(z - z.mean(), UM)
     found = spectrum_of(heights.z, UM)
     made = made_traces(found, heights, None)
-    assert len(made) == COUNT and made[0].z.size <= heights.z.size
+    assert len(made) == N_TRACES and made[0].z.size <= heights.z.size
     power = np.mean([root_mean_square(one) ** 2 for one in made])
     assert power == pytest.approx(found.density.sum() * found.step, rel=0.1)
     assert np.array_equal(made[7].z, made_traces(found, heights, None)[7].z)
@@ -119,26 +118,10 @@ def test_exact_a_share_stays_a_share():
     z = traces(1, 0.3e-3, UM, 6e-6, 2)[0]
     heights = Heights(z - z.mean(), UM)
     for name in ("PMr1", "PMr2"):
-        low, high = Intervals(heights, 1).of(TABLE[name], TABLE[name].of(heights))
+        low, high = Intervals(heights, 1).interval(TABLE[name], TABLE[name].compute(heights))
         assert 0 <= low <= high <= 1
 
 
 def test_exact_a_flat_trace_has_no_interval():
-    assert Intervals(Heights(np.zeros(100), UM), 1).of(TABLE["Pa"], 0.0) == (None, None)
+    assert Intervals(Heights(np.zeros(100), UM), 1).interval(TABLE["Pa"], 0.0) == (None, None)
 
-
-@pytest.mark.parametrize("radius", [5.0, 12.5, 40.0, 100.0])
-def test_exact_the_valleys_of_a_sine(radius):
-    """Amplitude 5 um, wavelength 80 um: the radius at the bottom is lambda^2 / (4 pi^2 A) = 32.4 um."""
-    z = 5e-6 * np.sin(2 * np.pi * np.arange(4000) * 0.25 / 80)
-    found = tip_check(Heights(z, 0.25e-6), radius * UM)
-    if radius < 20:
-        assert found.valleys == pytest.approx(32.4e-6, rel=0.1)
-    assert found.reaches == (radius < 32) and found.share == (radius > 32)
-    assert f"the tip of radius {radius:g} um" in found.sentence
-    assert ("does not reach" in found.sentence) == (radius > 32)
-
-
-def test_exact_no_valley_no_check():
-    assert tip_check(Heights(np.zeros(10), UM), 1e-3) is None
-    assert tip_check(Heights(np.linspace(-1, 1, 200) * UM, UM), 5e-6) is None

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from patchfem.surface.areal import Areal
-from patchfem.surface.profile import Profile
-from patchfem.surface.roughness.filter import filtered
-from patchfem.surface.roughness.parameters import Heights, core
-from patchfem.surface.roughness.report import interval_of, report_of
-from patchfem.surface.roughness.spectrum import spectrum
+from patchfem.surface.profile import Profile, level
+from patchfem.surface.roughness.filter import filter_trace
+from patchfem.surface.roughness.parameters import Heights, fit_core
+from patchfem.surface.roughness.report import report_of
+from patchfem.surface.roughness.spectrum import spectrum_of
 
 pytestmark = pytest.mark.skipif("PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans")
 UM = 1e-6
@@ -46,7 +46,7 @@ def test_exact_the_instruments_own_results_between_its_cursors(traces, truth):
     """Ra, Rq, skewness, Rz(DIN) and deviation to the last printed digit, the step height to one of it."""
     report = report_of(traces["dektak-1.csv"], window=(468 * UM, 733 * UM))
     printed = truth["dektak-1.csv"]["instrument_printed_results"]
-    assert report.shape == (1697,)
+    assert report.sampling.shape == (1697,)
     for name, key, digits in (("Pa", "Ra", 5), ("Pq", "Rq", 5), ("RzDin", "RzDin", 5), ("MaxDev", "WMaxDev", 5)):
         assert round(report[name].value / UM, digits) == printed[key]
     assert round(report["Psk"].value, 2) == printed["Skew"]
@@ -60,7 +60,7 @@ def test_exact_the_instruments_own_results_between_its_cursors(traces, truth):
 @pytest.mark.parametrize("name", TRACES)
 def test_exact_the_primary_profile_of_three_codes(traces, truth, name):
     report, known = report_of(traces[name]), truth[name]
-    assert report.cutoff is None and report.roughness is None
+    assert report.treatment.cutoff is None and report.surface.roughness is None
     for key, unit in (("Pa", UM), ("Pq", UM), ("Pt", UM), ("Psk", 1), ("Pku", 1)):
         assert report[key].value == pytest.approx(known[key] * unit, rel=1e-6)
     assert report["Pdq"].value == pytest.approx(known["Pdq_2pt"], rel=1e-6)
@@ -72,8 +72,8 @@ def test_exact_the_primary_profile_of_three_codes(traces, truth, name):
 def test_exact_the_roughness_profile_of_another_code(traces, truth, name, cutoff):
     known = truth[name][f"own_gauss_lc{cutoff}"]
     report = report_of(traces[name], cutoff * UM)
-    heights = Heights(report.roughness.z, report.step, cutoff * UM)
-    trimmed = report.roughness.x[0] - traces[name].x[0]
+    heights = Heights(report.surface.roughness.z, report.sampling.step, cutoff * UM)
+    trimmed = report.surface.roughness.x[0] - traces[name].x[0]
     assert len(heights.sections) == known["sections"]
     assert trimmed == pytest.approx(known["trimmed_each_end_um"] * UM, rel=1e-6)
     assert report["Ra"].value == pytest.approx(known["Ra"] * UM, rel=1e-3)
@@ -109,14 +109,11 @@ def test_exact_a_digitised_uneven_trace(data):
     assert report["Pq"].value == pytest.approx(np.sqrt((flat**2).mean()), rel=0.01)
 
 
-def test_exact_one_parameter_is_that_of_the_report(traces):
-    report = report_of(traces["mitutoyo-2.csv.gz"], 800 * UM)
-    for name in ("Pq", "Rz", "RSm", "band_amplitude", "dominant_wavelength"):
-        assert interval_of(name, traces["mitutoyo-2.csv.gz"], 800 * UM) == report[name]
-
-
 def test_exact_the_core_of_the_report_is_that_of_the_roughness(traces):
     report = report_of(traces["mitutoyo-2.csv.gz"], 800 * UM)
-    assert report.core == pytest.approx(core(Heights(filtered(traces["mitutoyo-2.csv.gz"], 800 * UM)[1].z, 1.0)))
-    assert report["Rk"].value == report.core.core
-    assert report.spectrum.dominant == spectrum(traces["mitutoyo-2.csv.gz"]).dominant
+    roughness = filter_trace(traces["mitutoyo-2.csv.gz"], 800 * UM)[1]
+    assert report.heights.core == pytest.approx(fit_core(Heights(roughness.z, 1.0)))
+    assert report["Rk"].value == report.heights.core.height
+    trace = traces["mitutoyo-2.csv.gz"]
+    step = trace.length / (trace.x.size - 1)
+    assert report.surface.spectrum.dominant == spectrum_of(level(trace).z, step).dominant

@@ -14,8 +14,14 @@ import patchfem as pf
 from patchfem.core import PatchfemError
 from patchfem.model.model import build
 from patchfem.scene.scene import loads
-from patchfem.surface.profile import Profile
-from patchfem.surface.roughness.peaks import Moments, moments_of, peaks_of, persson_stiffness, told_by
+from patchfem.surface.profile import Profile, level
+from patchfem.surface.roughness.peaks import (
+    Moments,
+    gaussian_peaks,
+    persson_stiffness,
+    rms_moments,
+    trace_moments,
+)
 
 PATCH = PIECE + 'load = "26 lbf"\nelement_size = "1 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\n' \
     '[contact.asperities]\nlaw = "hertz"\n'
@@ -52,7 +58,7 @@ def summits(alpha: float) -> tuple:
 
 @pytest.mark.parametrize("alpha", [1.6, 4.0, 50.0])
 def test_exact_peaks_by_quadrature_of_the_law_of_curvatures(alpha):
-    one, (density, curvature, variance) = peaks_of(Moments(np.sqrt(alpha), 1.0, 1.0)), summits(alpha)
+    one, (density, curvature, variance) = gaussian_peaks(Moments(np.sqrt(alpha), 1.0, 1.0)), summits(alpha)
     assert one.density == pytest.approx(density, rel=1e-10)
     assert 1 / one.radius == pytest.approx(curvature, rel=1e-10)
     assert one.deviation**2 / alpha == pytest.approx(variance, abs=1e-4 / alpha)  # of the four digits of the source
@@ -60,7 +66,7 @@ def test_exact_peaks_by_quadrature_of_the_law_of_curvatures(alpha):
 
 def test_exact_units_scale():
     """Heights in other units, lengths along in others: radius, density and deviation follow."""
-    one, other = peaks_of(Moments(2.0, 0.3, 0.2)), peaks_of(Moments(2.0 * 3, 0.3 * 3 / 7, 0.2 * 3 / 49))
+    one, other = gaussian_peaks(Moments(2.0, 0.3, 0.2)), gaussian_peaks(Moments(2.0 * 3, 0.3 * 3 / 7, 0.2 * 3 / 49))
     assert other == pytest.approx((one.radius * 49 / 3, one.density / 49, one.deviation * 3), rel=1e-12)
 
 
@@ -71,7 +77,7 @@ def test_exact_moments_of_known_sines():
     waves = [(64, 0.3e-6, 0.4), (410, 0.05e-6, 1.1)]
     z = sum(a * np.cos(2 * np.pi * k * x / (n * step) + p) for k, a, p in waves)
     for every in (1, 2):
-        found, h = moments_of(trace_of(z, step), every), every * step
+        found, h = rms_moments(level(trace_of(z, step)), every), every * step
         k = np.array([2 * np.pi * k / (n * step) for k, _, _ in waves])
         a = np.array([a for _, a, _ in waves])
         for order, value in enumerate(found):
@@ -84,12 +90,12 @@ def test_a_made_surface_has_the_peaks_of_its_traces():
     n, step = 768, 1.0
     z = gaussian(n, step, (12.0, 60.0))
     z /= z.std()
-    found = Moments(*np.sqrt(np.mean([np.square(moments_of(trace_of(row, step))) for row in z[::8]], axis=0)))
+    found = Moments(*np.sqrt(np.mean([np.square(trace_moments(trace_of(row, step)).fine) for row in z[::8]], axis=0)))
     power = np.abs(np.fft.fft2(z))**2 / n**4
     k = 2 * np.pi * np.fft.fftfreq(n, step)
     truth = [np.sqrt(np.sum(power * (2 * np.sin(k / 2))**(2 * order))) for order in range(3)]
     assert found == pytest.approx(truth, rel=0.05)
-    one, around = peaks_of(Moments(*truth)), [np.roll(z, shift, axis=(0, 1)) for shift in
+    one, around = gaussian_peaks(Moments(*truth)), [np.roll(z, shift, axis=(0, 1)) for shift in
                                               ((1, 0), (-1, 0), (0, 1), (0, -1), (1, 1), (-1, -1), (1, -1), (-1, 1))]
     top = (z > around).all(axis=0)
     count = top.sum()
@@ -107,9 +113,9 @@ def test_exact_what_dust_is_left_out_of_a_table_and_what_dust_is_in_it_is_said()
     grains = np.zeros(z.size)
     for k in range(6):
         grains[1500 * (k + 1):1500 * (k + 1) + 8] = 6e-6 if k else 2.6e-6
-    clean, dusty = told_by(trace_of(z, step)), told_by(trace_of(z + grains, step))
-    assert clean.walls == () and "are left out" in dusty.walls[0]
-    said = re.search(r"make up ([\d.]+) % .* rms_slope is (\S+) and rms_curvature (\S+) 1/m", dusty.walls[-1])
+    clean, dusty = trace_moments(trace_of(z, step)), trace_moments(trace_of(z + grains, step))
+    assert clean.dust == () and "are left out" in dusty.dust[0]
+    said = re.search(r"make up ([\d.]+) % .* rms_slope is (\S+) and rms_curvature (\S+) 1/m", dusty.dust[-1])
     assert dusty.fine.curvature > 5 * clean.fine.curvature and float(said[1]) > 90
     assert float(said[2]) == pytest.approx(clean.fine.slope, rel=0.02)
     assert float(said[3]) == pytest.approx(clean.fine.curvature, rel=0.05)
@@ -118,13 +124,13 @@ def test_exact_what_dust_is_left_out_of_a_table_and_what_dust_is_in_it_is_said()
 def test_refuses_what_no_surface_has():
     x = np.arange(256) * 1e-6
     with pytest.raises(PatchfemError, match=r"at least 1\.22"):
-        peaks_of(moments_of(trace_of(np.sin(2 * np.pi * x / 2e-5), 1e-6)))  # one wave: alpha = 1
+        gaussian_peaks(trace_moments(trace_of(np.sin(2 * np.pi * x / 2e-5), 1e-6)).fine)  # one wave: alpha = 1
     with pytest.raises(PatchfemError, match=r"at least 1\.22"):
-        peaks_of(moments_of(trace_of(1e-6 * (np.arange(64) % 2), 1e-6)))  # no spikes, though each is off its neighbours
+        gaussian_peaks(trace_moments(trace_of(1e-6 * (np.arange(64) % 2), 1e-6)).fine)  # each is off its neighbours
     with pytest.raises(PatchfemError, match="is flat"):
-        moments_of(trace_of(0.1 * x, 1e-6))
+        trace_moments(trace_of(0.1 * x, 1e-6))
     with pytest.raises(PatchfemError, match="at least 16"):
-        moments_of(trace_of(np.sin(x[:20] * 1e6), 1e-6), 2)
+        rms_moments(trace_of(np.sin(x[:20] * 1e6), 1e-6), 2)
 
 
 def written(folder, seed=1) -> str:
@@ -142,7 +148,7 @@ def test_exact_the_three_ways_to_tell_peaks_are_one(tmp_path, monkeypatch):
     found = tomllib.loads("\n".join(line.strip() for line in block.splitlines()))["contact"]["asperities"]
     rms = Moments(float(found["rms_height"].split()[0]) * 1e-6, found["rms_slope"],
                   float(found["rms_curvature"].split()[0]))
-    peaks = peaks_of(rms)
+    peaks = gaussian_peaks(rms)
     pasted = PATCH + "".join(f"{key} = {value!r}\n" for key, value in found.items() if key != "law")
     ways = [PATCH + 'from = "trace1.csv"\n', pasted, PATCH + f'radius = "{peaks.radius!r} m"\ndensity = '
             f'"{peaks.density!r} 1/m^2"\nheight_deviation = "{peaks.deviation!r} m"\n']
@@ -239,8 +245,8 @@ def test_exact_one_cutoff_splits_a_trace_between_the_gap_and_its_asperities(tmp_
     for name, order in (("height", 0), ("slope", 1), ("curvature", 2)):
         truth = np.sqrt(sum((a * k**order)**2 / 2 for a, k in left))
         assert getattr(skin, f"rms_{name}") == pytest.approx(truth, rel=5e-3), name
-    whole = moments_of(Profile(np.arange(25401) * 0.5e-6, sum(
-        a * np.cos(2 * np.pi * np.arange(25401) * 0.5e-6 / wave) for a, wave in waves), "whole"))
+    whole = trace_moments(Profile(np.arange(25401) * 0.5e-6, sum(
+        a * np.cos(2 * np.pi * np.arange(25401) * 0.5e-6 / wave) for a, wave in waves), "whole")).fine
     assert whole.height > 4 * skin.rms_height  # what counted twice
 
 
@@ -272,11 +278,11 @@ def test_heights_that_are_not_gaussian_are_told():
     step = 1e-6
     for seed in range(40):
         row = gaussian(256, step, (8e-6, 6e-5), seed)[seed]
-        assert told_by(trace_of(row, step)).doubt == "", seed
+        assert trace_moments(trace_of(row, step)).not_gaussian == "", seed
     rows = gaussian(512, step, (8e-6, 6e-5), 3)[::128].ravel() * 1e-7
     rows /= rows.std() / 1e-7
     for z, word in ((np.minimum(rows, 0.3e-7), "stiffer"), (np.maximum(rows, -0.3e-7), "softer")):
-        doubt = told_by(trace_of(z, step)).doubt
+        doubt = trace_moments(trace_of(z, step)).not_gaussian
         assert word in doubt and "(0 and 3)" in doubt
 
 

@@ -13,7 +13,7 @@ from patchfem.core import PatchfemError
 from patchfem.export.surfaces.roughness import heading
 from patchfem.surface.areal import Areal
 from patchfem.surface.profile import Profile
-from patchfem.surface.roughness.report import NOTHING, fitting_cutoff, interval_of, report_of, windowed
+from patchfem.surface.roughness.report import crop, fitting_cutoff, report_of
 
 UM = 1e-6
 
@@ -26,7 +26,7 @@ def made(count=4001, source="made.csv", **more) -> Profile:
 
 @pytest.mark.parametrize("first, last, low, high", [(10.2, 20.9, 10, 20), (10.0, 20.0, 10, 20), (0, 4000, 0, 4000)])
 def test_exact_a_window_from_the_samples_at_or_before_its_cursors(first, last, low, high):
-    part = windowed(made(), first * UM, last * UM)
+    part = crop(made(), first * UM, last * UM)
     assert part.x == pytest.approx(np.arange(low, high + 1) * UM)
 
 
@@ -43,7 +43,7 @@ def test_exact_a_window_of_a_scan_and_its_spikes():
     ends = tuple(np.array([20, 60, 10, 70.5]) * UM)
     part = report_of(one, window=ends)
     alone = Areal(one.x[20:61], one.y[10:71], one.z[10:71, 20:61], "scan.txt")
-    assert part.shape == (61, 41)
+    assert part.sampling.shape == (61, 41)
     assert [row.value for row in part.values] == [row.value for row in report_of(alone).values]
     z = np.array(one.z)
     z[[30, 50], [40, 70]] += 40 * UM
@@ -59,7 +59,7 @@ def test_exact_a_sine_with_a_little_noise():
     assert report["band_amplitude"].value == pytest.approx(2 * UM, rel=0.01)
     assert report["dominant_wavelength"].value == pytest.approx(80 * UM, rel=0.01)
     assert [one.low <= one.value <= one.high for one in report.values if one.low is not None].count(False) == 0
-    assert len({one.name for one in report.values}) == len(report.values) == 37
+    assert len({one.name for one in report.values}) == len(report.values) == 33
 
 
 def test_exact_a_flat_trace_says_so():
@@ -117,12 +117,6 @@ def test_exact_a_trace_as_long_as_its_waves_has_no_interval_of_heights():
     assert report["Pdq"].low is not None and report["Psk"].low is not None
 
 
-def test_exact_the_tip_of_the_file_or_of_the_call():
-    assert report_of(made()).tip is None
-    assert report_of(made(tip_radius=5 * UM)).tip.radius == 5 * UM
-    assert report_of(made(tip_radius=5 * UM), tip=12.5 * UM).tip.radius == 12.5 * UM
-
-
 def scan(lost=False) -> Areal:
     x, y = np.arange(120) * UM, np.arange(80) * UM
     z = np.random.default_rng(2).normal(0, UM, (80, 120)) + 0.02 * x + 0.03 * y[:, None]
@@ -158,13 +152,6 @@ def test_refuses(surface, more, says):
         report_of(surface, **more)
 
 
-@pytest.mark.parametrize("name, says", [("Rx", "'Rx' is not a parameter of a trace; use one of Pa, "),
-                                        ("Rq", "Rq belongs to the roughness profile and needs a cut-off")])
-def test_refuses_a_parameter(name, says):
-    with pytest.raises(PatchfemError, match=says):
-        interval_of(name, made())
-
-
 @pytest.mark.slow
 def test_always_a_million_samples_take_two_seconds():
     trace = sine(np.arange(1_000_000) * 0.1 * UM, UM, 80 * UM)
@@ -180,10 +167,10 @@ def test_exact_a_form_and_a_short_wave_of_a_trace():
     z = 2 * UM * np.sin(2 * np.pi * x / 80e-6) + 50 * UM * (x / 2e-3 - 1) ** 2 + UM * np.sin(2 * np.pi * x / 5e-6)
     trace = Profile(x, z, "bent.csv")
     assert report_of(trace)["Pq"].value > 10 * UM
-    report = report_of(trace, settings=NOTHING._replace(form=2, short=20 * UM))
+    report = report_of(trace, form=2, short=20 * UM)
     kept = 2 ** -((20 / 80) ** 2)
     assert report["Pq"].value == pytest.approx(2 * UM / np.sqrt(2) * kept, rel=2e-3)
-    assert report.form == "polynomial of degree 2" and report.primary.x[0] == 10 * UM
+    assert report.treatment.form == "polynomial of degree 2" and report.surface.primary.x[0] == 10 * UM
 
 
 @pytest.mark.parametrize("length, fits", [(4e-3, 250 * UM), (1.5e-3, 250 * UM), (1.49e-3, 80 * UM), (60e-3, 8e-3),
@@ -205,12 +192,13 @@ def test_exact_a_resampled_trace_says_how_many_heights_were_measured_and_what_re
     z = np.sin(2 * np.pi * x / (9 * UM)) * UM
     found = report_of(Profile(x, z, "uneven.csv"))
     weight = np.gradient(x) / np.gradient(x).sum()
-    off = np.interp(x, found.primary.x, np.interp(found.primary.x, x, z) - found.primary.z)
+    off = np.interp(x, found.surface.primary.x, np.interp(found.surface.primary.x, x, z) - found.surface.primary.z)
     own = np.sqrt(weight @ (z - off)**2)
     note = next(text for text in found.notes if "resampling changes" in text)
     said = float(re.search(r"Pq by ([\d.]+) %", note).group(1))
     assert said == pytest.approx(100 * abs(found["Pq"].value / own - 1), rel=0.1) and said > 1
-    assert heading(found).startswith(f"132 heights, resampled to {found.shape[0]}, ") and found.shape[0] > 140
+    count = found.sampling.shape[0]
+    assert heading(found).startswith(f"132 heights, resampled to {count}, ") and count > 140
     assert not any("resampling" in text for text in report_of(made()).notes)
 
 
@@ -219,4 +207,4 @@ def test_exact_a_trace_of_six_cutoffs_but_for_round_off_is_told_of_the_longest()
     one = made(1500)
     told = heading(report_of(one))
     assert '--cutoff "250 um" is the longest standard cut-off of which five fit into the trace once half a' in told
-    assert report_of(one, cutoff=250 * UM).roughness.x.size == 1250
+    assert report_of(one, cutoff=250 * UM).surface.roughness.x.size == 1250

@@ -1,0 +1,144 @@
+"""Quantities as text, and tables of quantities for the screen and for a page."""
+
+from html import escape
+from typing import NamedTuple
+
+import numpy as np
+
+from ...scales import LADDERS, plain, step_of
+from ...surface.compare.reference import NO_LIMIT
+from ...surface.quantity import Quantity
+from ..pages.document import prose, table
+
+MAX_PLAIN = 1e6  # larger numbers are written with a power of ten
+MIN_DIGITS = 3  # digits of a value with a wide interval
+MAX_DIGITS = 6  # digits of a value with a narrow interval
+DIGITS_ALONE = 5  # digits of a value without an interval
+MISSING = "-"  # stands for a quantity without a value
+UNITS = {**LADDERS, "m2": (("um^2", 1e12),), "1": (("", 1.0),)}
+
+
+class QuantityText(NamedTuple):
+    """Value, interval ("" for none) and unit of a quantity as texts."""
+
+    value: str
+    interval: str
+    unit: str
+
+    @property
+    def short(self) -> str:
+        """The value with its unit."""
+        return f"{self.value} {self.unit}".rstrip()
+
+    @property
+    def long(self) -> str:
+        """The value with its unit, and the interval in brackets."""
+        return f"{self.short} ({self.interval})" if self.interval else self.short
+
+
+def format_quantity(quantity: Quantity, unit: tuple | None = None) -> QuantityText:
+    """Format a quantity so that its interval shows two digits of its own.
+
+    unit: (name, scale) such as ("um", 1e6); by default the unit that suits the largest of value and
+    bounds.
+    """
+    value, low, high = quantity[:3]
+    if value is None:
+        return QuantityText(MISSING, "", "")
+    bounds = [bound for bound in (low, high) if bound is not None]
+    if unit is None:
+        unit = step_of(
+            UNITS[quantity.unit], max(map(abs, bounds if high is not None else (value, *bounds)))
+        )
+    name, scale = unit
+    if low is None:
+        return QuantityText(plain(value * scale, DIGITS_ALONE), "", name)
+    if high is None:
+        interval = f"{format_number(low * scale, MIN_DIGITS)} .. {NO_LIMIT}"
+        return QuantityText(format_number(value * scale, MIN_DIGITS), interval, name)
+    digits = _count_digits(low, high)
+    text, *ends = (format_number(number * scale, digits) for number in (value, low, high))
+    return QuantityText(text, " .. ".join(ends), name)
+
+
+def format_number(value: float, digits: int) -> str:
+    """Write a number with so many digits, without a power of ten below a million."""
+    if value == 0 or not 1 <= abs(value) < MAX_PLAIN:
+        return plain(value, digits)
+    return f"{value:.{max(digits - 1 - int(np.floor(np.log10(abs(value)))), 0)}f}"
+
+
+def _count_digits(low: float, high: float) -> int:
+    """Count the digits of a number that show two digits of the width of its interval."""
+    width = high - low
+    size = max(abs(low), abs(high))
+    if not width > 0 or not size > 0:
+        return 4
+    return int(np.clip(np.ceil(np.log10(size / width)) + 2, MIN_DIGITS, MAX_DIGITS))
+
+
+def quantity_data(quantity: Quantity) -> dict:
+    """Return a quantity as plain data in SI, with the reason if it has no value."""
+    data = {
+        "value": quantity.value,
+        "low": quantity.low,
+        "high": quantity.high,
+        "unit": quantity.unit,
+    }
+    return data if quantity.value is not None else {**data, "reason": quantity.reason}
+
+
+class Row(NamedTuple):
+    """Row of a table of quantities.
+
+    unit: (name, scale), by default the one that suits the quantity; more: cells between interval
+    and unit; remark: text behind the row on the screen; meaning: last cell on a page.
+    """
+
+    words: str
+    quantity: Quantity
+    unit: tuple | None = None
+    more: tuple = ()
+    remark: str = ""
+    meaning: str = ""
+
+
+class QuantityTable(NamedTuple):
+    """Rows of quantities, and the heads of the columns words, value, interval, more, unit."""
+
+    heads: tuple
+    rows: list
+
+    def _cells(self) -> list:
+        texts = [format_quantity(row.quantity, row.unit) for row in self.rows]
+        return [
+            (row.words, text.value, text.interval, *row.more, text.unit)
+            for row, text in zip(self.rows, texts)
+        ]
+
+    def lines(self) -> list:
+        """Return the table as lines of text, indented by two."""
+        cells = [("", *self.heads[1:]), *self._cells()]
+        widths = [max(map(len, column)) for column in zip(*cells)]
+        remarks = ["", *(row.remark for row in self.rows)]
+        lines = []
+        for (words, value, *others), remark in zip(cells, remarks):
+            line = f"  {words:<{widths[0]}}  {value:>{widths[1]}}"
+            line += "".join(f"  {text:<{width}}" for text, width in zip(others, widths[2:]))
+            lines.append(f"{line}  {remark}".rstrip())
+        return lines
+
+    def html(self) -> str:
+        """Return the table as HTML, with a column of meanings if the rows have any."""
+        has_meaning = any(row.meaning for row in self.rows)
+        rows = []
+        for row, cells in zip(self.rows, self._cells()):
+            line = [escape(cell) for cell in cells]
+            if row.quantity.value is None:
+                line[1] = "&ndash;"
+            if has_meaning:
+                line.append(f"<td class=soft>{prose(row.meaning)}</td>")
+            rows.append(line)
+        numbers = [f">{head}" for head in self.heads[1:-1]]
+        heads = (self.heads[0], *numbers, self.heads[-1], *(("meaning",) if has_meaning else ()))
+        return table(heads, rows)
