@@ -10,7 +10,7 @@ Read the package in this order. A module imports its own entry of the list and t
 6. `effects`      which key of a scene needs which module and equation
 7. `disk`         files written whole, folders with one writer
 8. `compiled`     where compiled code is kept
-9. `closed_forms` exact answers that tests, studies and users share
+9. `closed_forms` exact answers to small problems of contact
 10. `scene`       a TOML file becomes SI values, every mistake named at once
 11. `inputs`      files of measurements: columns, slide paths, signals, loops
 12. `mesh`        two coated pieces as tagged meshes

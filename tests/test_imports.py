@@ -36,7 +36,7 @@ def run_of(text: str) -> set:
 
 PHYSICS = {"closed_forms", "contact", "dynamics", "elasticity", "friction", "identify", "inputs", "mesh", "response",
            "slip", "structure", "surface", "wear", "runs.bench", "runs.many", "runs.patch", "runs.rig", "runs.wear"}
-PIECES = "closed_forms contact elasticity mesh runs.patch "  # folders that press a patch
+PIECES = "contact elasticity mesh runs.patch "  # folders that press a patch
 MOTION = "dynamics response runs.rig structure "  # folders that move a rig
 PAGE = "response structure "  # folders that a page takes words from
 WEAR = '[wear]\ncoefficient = "1e-15 1/Pa"\ncycles = 100\n'

@@ -3,7 +3,7 @@
 Lengths [m], pressures and moduli [Pa], loads per metre of width [N/m]; compression > 0, x = 0 in the middle. `modulus`
 is E* of `combined_modulus`; a rigid partner is one of infinite Young's modulus. Bodies are half planes in plane
 strain unless a foundation is named. Signs of the project: a rotation > 0 opens the gap at +x, so a load line at
-+x (offset > 0) belongs to a rotation < 0. Public names are read from `closed_forms.friction`.
++x (offset > 0) belongs to a rotation < 0.
 """
 
 import numpy as np

@@ -2,5 +2,6 @@
 
 In: increments of slide and pressure. Out: path-mean traction, dissipated energy, the state after the step
 (`protocol`). `laws/` has one law per file, `bonds/` the sum over bonds of eq. 2.17 and its engines. Files named
-*kernels are compiled and have their NumPy form beside them. Read `protocol` first, then `laws/elastic_plastic`.
+*kernels are compiled and have their NumPy form beside them. `path_work` is the friction work
+of given samples. Read `protocol` first, then `laws/elastic_plastic`.
 """

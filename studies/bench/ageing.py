@@ -18,8 +18,8 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
+from friction_forms import steady_bond_length
 
-from patchfem.closed_forms.friction import steady_bond_length
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.model.model import build
 from patchfem.runs.bench import bench as law_bench

@@ -14,8 +14,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
 from drift_laws import LENGTH, PERIOD, SHARES, ladder
 from force_control import OutOfReach, drift
+from friction_forms import dither_drift, stretch_loop
 
-from patchfem.closed_forms.friction import dither_drift, stretch_loop
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.friction.bonds.recursion import Recursion
 

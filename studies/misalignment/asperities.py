@@ -17,7 +17,7 @@ from scipy.stats import norm
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from halfspace import press_periodic, wave_numbers
 
-from patchfem import closed_forms as exact
+from patchfem.closed_forms import contact as exact
 from patchfem.contact.skin_laws import HertzSkin
 from patchfem.contact.unilateral import solve_forces
 

@@ -36,7 +36,7 @@ import asperities
 import tilted
 from asperities import MEAN
 
-from patchfem import closed_forms as exact
+from patchfem.closed_forms import contact as exact
 from patchfem.contact.unilateral import press
 from patchfem.core import frozen_array
 from patchfem.runs.patch.press import with_linear_skin

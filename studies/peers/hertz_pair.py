@@ -9,7 +9,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from peer import timed
 
-from patchfem import closed_forms as exact
+from patchfem.closed_forms import contact as exact
 from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface, frozen_array

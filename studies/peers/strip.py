@@ -11,7 +11,7 @@ import numpy as np
 from scipy.sparse import diags
 from stiffness import stencil_of, stiffness_of
 
-from patchfem import closed_forms as exact
+from patchfem.closed_forms import contact as exact
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface, Pressure, frozen_array
 from patchfem.elasticity.elasticity import Layers, Piece, assemble, displacement, interface_compliance

@@ -12,7 +12,7 @@ from halfspace import press_periodic, wave_numbers
 from peer import timed
 from strip import wavy_pair, wavy_press
 
-from patchfem import closed_forms as exact
+from patchfem.closed_forms import contact as exact
 
 WAVE, HIGH, SHARE = 80e-6, 1.5e-6, 0.5
 MATERIAL = (250e9, 0.24)  # of one body; the other is rigid

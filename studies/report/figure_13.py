@@ -19,9 +19,9 @@ from scipy.special import gammaincinv
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "common"))
 from drawing import drawing
+from friction_forms import weight_along
 from told import told
 
-from patchfem.closed_forms.friction import weight_along
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 
 HERE = Path(__file__).parent

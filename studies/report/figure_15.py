@@ -29,9 +29,9 @@ from problems import PLAIN
 from report_methods import duhamel
 from report_methods.point_laws import Coulomb
 from told import told
+from vibration_forms import decay
 
 import patchfem as pf
-from patchfem.closed_forms.dynamics import decay
 from patchfem.core import Segment, Start
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.structure.drives import Piecewise

@@ -12,7 +12,7 @@ import hertz_pair as hertz
 import strip
 from halfspace import press_periodic, wave_numbers
 
-from patchfem import closed_forms as exact
+from patchfem.closed_forms import contact as exact
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface, frozen_array
 from patchfem.elasticity.elasticity import Layers, assemble, interface_compliance

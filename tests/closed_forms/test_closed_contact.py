@@ -2,6 +2,7 @@
 
 from itertools import pairwise
 
+import friction_forms
 import mpmath
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from patchfem import closed_forms as exact
+from patchfem.closed_forms import contact as exact
 
 MODULUS = 6.74e10
 TITANIUM, CARBIDE, THICKNESS = (121e9, 0.32), (250e9, 0.24), 152.4e-6
@@ -328,7 +329,7 @@ def test_exact_wedge_loop_is_the_sum_of_its_strips(tilt, ratio):
     amplitude = ratio * mu * PAD["load"] / (kt * area)
 
     def strip(p):
-        return exact.jenkins_loop(amplitude, mu * p / kt, mu * p)[0]
+        return friction_forms.jenkins_loop(amplitude, mu * p / kt, mu * p)[0]
 
     kink = min(max(amplitude * kt / mu, least), largest)
     want = sum(quad(strip, a, b, epsabs=0)[0] for a, b in ((least, kink), (kink, largest)) if b > a)
@@ -345,7 +346,7 @@ def test_exact_wedge_loop_closed_form_above_and_below_its_last_slip():
     assert above == pytest.approx(4 * mu * PAD["load"] * (2 - 2 / 3) * last, rel=1e-12)
     assert below == pytest.approx(4 * kt * fraction * area * last**2 / 48, rel=1e-12)
     level = exact.wedge_loop(np.array([0.5, 3]) * 1e-6, mu, kt, area, 1e6, 1e6)
-    assert np.allclose(level, area * exact.jenkins_loop(np.array([0.5, 3]) * 1e-6, mu * 1e6 / kt, mu * 1e6)[0])
+    assert np.allclose(level, area * friction_forms.jenkins_loop(np.array([0.5, 3]) * 1e-6, mu * 1e6 / kt, mu * 1e6)[0])
 
 
 @pytest.mark.parametrize("tilt, linear, at3, at30, skin, centre", [
@@ -358,7 +359,7 @@ def test_exact_tilt_of_the_assumed_pad(tilt, linear, at3, at30, skin, centre):
     mu, kt = 0.4, 8e12
     slip = mu * PAD["load"] / (kt * 1e-4)
     loops = [exact.wedge_loop(n * slip, mu, kt, fraction * 1e-4, least, largest)
-             / exact.jenkins_loop(n * slip, slip, mu * PAD["load"])[0] for n in (3, 30)]
+             / friction_forms.jenkins_loop(n * slip, slip, mu * PAD["load"])[0] for n in (3, 30)]
     assert (fraction, *loops) == pytest.approx((linear, at3, at30), abs=3e-3)
     share, shift = exact.wedge_skin(tilt, PAD["length"], DECAY)
     assert (share, -shift / PAD["length"]) == pytest.approx((skin, centre), abs=3e-3)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from pieces import TITANIUM, bare, refined_middle
 
-from patchfem.closed_forms import hertz_half_width
+from patchfem.closed_forms.contact import hertz_half_width
 from patchfem.contact import edges
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface, frozen_array

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from pieces import CARBIDE, COATED, COATING, HEIGHT, LENGTH, TITANIUM, pair_of
 from study_module import study
 
-from patchfem import closed_forms as exact
+from patchfem.closed_forms import contact as exact
 from patchfem.contact.gaps import crown
 from patchfem.contact.unilateral import press, solve_forces
 from patchfem.core import NotConverged, PatchfemError

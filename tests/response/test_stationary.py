@@ -6,8 +6,8 @@ import pytest
 from random_shaking import CASES, NAMES, held, shaken
 from scipy.integrate import quad
 from scipy.signal import csd, welch
+from vibration_forms import shaken_rms
 
-from patchfem.closed_forms.dynamics import shaken_rms
 from patchfem.response import stationary
 from patchfem.structure.noise import noise
 

@@ -5,12 +5,12 @@ import math
 import numpy as np
 import pytest
 from command_line import cli
+from friction_forms import steady_bond_length
 from hypothesis import given
 from hypothesis import strategies as st
 from scene_texts import COULOMB, PLASTIC, POINT, SHEAR, SLIDE, SMALL_PATCH
 from scipy.integrate import quad, solve_ivp
 
-from patchfem.closed_forms.friction import steady_bond_length
 from patchfem.core import Missing, PatchfemError
 from patchfem.inputs.paths import read_path
 from patchfem.model.model import build

@@ -12,7 +12,7 @@ from command_line import cli
 from scene_texts import COATED, COULOMB, PIECE, SLIDE
 from scipy.optimize import nnls
 
-from patchfem import closed_forms
+from patchfem.closed_forms import contact as exact
 from patchfem.core import Outcome, PatchfemError, frozen_array, say
 from patchfem.mesh.files import write_mesh
 from patchfem.mesh.pairs import as_piece
@@ -66,13 +66,13 @@ def solved(*args, **kwargs) -> tuple:
 @pytest.mark.parametrize("angle", [1e-5, 1e-4, 1e-3])
 def test_exact_rigid_pieces_on_skins_are_the_wedges_in_closed_form(angle):
     _, found = solved(TILT.format(angle) + SKINS["exponential"], material=RIGID)
-    fraction, centre = closed_forms.wedge_skin(angle, LENGTH, 2.5e-6)
+    fraction, centre = exact.wedge_skin(angle, LENGTH, 2.5e-6)
     assert found["loaded_fraction"] == pytest.approx(fraction, rel=1e-8 + (angle * 0.127e-3 / 2.5e-6)**2 / 11)
     assert found["pressure_centre"] == pytest.approx(centre, rel=3e-4)
     assert found["tangential_stiffness"] == pytest.approx(0.8 * LOAD / 2.5e-6, rel=1e-5)  # k_t follows the pressure
     assert found["normal_stiffness"] == pytest.approx(LOAD / 2.5e-6, rel=1e-5)
     _, found = solved(TILT.format(angle) + SKINS["linear"], material=RIGID)
-    fraction, centre, _, most = closed_forms.wedge_linear(angle, LOAD, LENGTH, WIDTH, 1e13)
+    fraction, centre, _, most = exact.wedge_linear(angle, LOAD, LENGTH, WIDTH, 1e13)
     cell = 0.127e-3 / LENGTH
     assert found["contact_fraction"] == pytest.approx(fraction, abs=0.55 * cell)
     assert found["pressure_centre"] == pytest.approx(centre, rel=6e-4)
@@ -116,10 +116,10 @@ def test_exact_asperities_give_way_in_shear_without_the_pieces(law):
 @pytest.mark.parametrize("count", [2, 8])
 def test_exact_strips_of_a_rigid_pad_on_a_linear_skin(count):
     """Below the opening roll the pressure is linear over the width: the wedge's centre times 1 - 1/count^2."""
-    roll = 0.5 * closed_forms.wedge_opening(LOAD, WIDTH, LENGTH, 1e13)
+    roll = 0.5 * exact.wedge_opening(LOAD, WIDTH, LENGTH, 1e13)
     tables = SKINS["linear"] + f'[contact.strips]\ncount = {count}\nroll = "{roll!r} rad"\n'
     patch, found = solved(tables, material=RIGID)
-    centre = closed_forms.wedge_linear(roll, LOAD, WIDTH, LENGTH, 1e13)[1]
+    centre = exact.wedge_linear(roll, LOAD, WIDTH, LENGTH, 1e13)[1]
     assert found["pressure_centre_lateral"] == pytest.approx(centre * (1 - 1 / count**2), rel=1e-5)
     assert found["roll_moment"] == pytest.approx(LOAD * found["pressure_centre_lateral"], rel=1e-12)
     assert found["contact_fraction"] == pytest.approx(1.0, rel=1e-12)
@@ -360,9 +360,9 @@ def test_exact_the_chosen_mesh_meets_hertz_within_its_error():
     found = asked('[contact.crown]\nradius = "0.2 m"\n', 'load = "40 N"')
     series = solve_all(found, 1e-2)
     mine = measures(*series)
-    modulus = closed_forms.combined_modulus(210e9, 0.3, 210e9, 0.3)
-    half = closed_forms.hertz_half_width(40 / WIDTH, 0.2, modulus)
-    peak = closed_forms.hertz_peak(40 / WIDTH, 0.2, modulus)
+    modulus = exact.combined_modulus(210e9, 0.3, 210e9, 0.3)
+    half = exact.hertz_half_width(40 / WIDTH, 0.2, modulus)
+    peak = exact.hertz_peak(40 / WIDTH, 0.2, modulus)
     assert series[0].x.size < 420 and half < 0.01 * LENGTH
     assert mine["pressure_peak"].value == pytest.approx(peak, rel=2e-3)
     assert mine["contact_half_width"].value == pytest.approx(half, rel=5e-3)

@@ -14,7 +14,7 @@ from pieces import bare, refined_middle
 from scene_texts import COATED, COULOMB, MODE, NONLOCAL, POINT, SHEAR, STRUCTURE, mistakes, only
 
 import patchfem as pf
-from patchfem.closed_forms import hertz_half_width, hertz_peak
+from patchfem.closed_forms.contact import hertz_half_width, hertz_peak
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity.elasticity import assemble, interface_compliance

@@ -1,12 +1,12 @@
 """What the friction ladder says, from its cheap share, beside closed forms and an integrated equation."""
 
+import friction_forms
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from study_module import study
 
-from patchfem import closed_forms as exact
 from patchfem.friction.bonds.recursion import Recursion
 from patchfem.friction.laws.stretch import growth_numbers
 
@@ -29,15 +29,15 @@ def today(ladder):
 @pytest.mark.parametrize("amplitude", [0.3, 3.0])
 def test_exact_areas_without_growth(ladder, amplitude):
     dahl, sharp = ladder.followed(ladder.points(ladder.bonds()), amplitude), ladder.elastic_plastic(amplitude)
-    assert dahl.area == pytest.approx(exact.stretch_loop(amplitude, 1.0)[0], rel=2e-6)
-    assert sharp.area == pytest.approx(exact.jenkins_loop(amplitude, 1.0)[0], abs=1e-12)
+    assert dahl.area == pytest.approx(friction_forms.stretch_loop(amplitude, 1.0)[0], rel=2e-6)
+    assert sharp.area == pytest.approx(friction_forms.jenkins_loop(amplitude, 1.0)[0], abs=1e-12)
     miss = ladder.error(ladder.coulomb(dahl), dahl)[0]
     assert miss == pytest.approx(np.tanh(amplitude) / amplitude, rel=2e-6)
 
 
 def test_exact_amplitudes_where_a_rung_is_within_a_hundredth():
     def sharp(a):
-        return (exact.jenkins_loop(a, 1.0)[0] - exact.stretch_loop(a, 1.0)[0]) / (4 * a) + 0.01
+        return (friction_forms.jenkins_loop(a, 1.0)[0] - friction_forms.stretch_loop(a, 1.0)[0]) / (4 * a) + 0.01
 
     assert brentq(lambda a: np.tanh(a) / a - 0.01, 1, 1e3) == pytest.approx(100, rel=1e-3)
     assert brentq(sharp, 1.2, 9) == pytest.approx(2.24, abs=0.005)
@@ -55,7 +55,7 @@ def test_exact_lugre_is_the_law_that_grows_at_once(ladder):
 
     def rate(t, z):
         v = amplitude * length * omega * np.cos(omega * t)
-        return v - abs(v) * z / exact.steady_bond_length(v, length, ratio, rest, slip)
+        return v - abs(v) * z / friction_forms.steady_bond_length(v, length, ratio, rest, slip)
 
     time = np.arange(4 * steps, 5 * steps + 1) / steps / ladder.HERTZ
     z = solve_ivp(rate, (0, time[-1]), [0.0], "LSODA", time, rtol=1e-10, atol=1e-17, max_step=1e-4).y[0] / length
@@ -97,7 +97,7 @@ def test_order_elements_meet_the_virgin_curve_to_half_over_their_number_squared(
 @pytest.mark.parametrize("amplitude", [0.3, 3.0])
 def test_exact_iwan_by_masing_is_a_bond_length_short(ladder, today, amplitude):
     assert ladder.iwan(amplitude, 400).area == pytest.approx(today.iwan_loop(amplitude), rel=3e-3)
-    dahl = exact.stretch_loop(12.5, 1.0)[0]
+    dahl = friction_forms.stretch_loop(12.5, 1.0)[0]
     assert today.iwan_loop(12.5) - dahl == pytest.approx(-4, abs=1e-3)
     assert today.iwan_loop(12.5, 0.5) == pytest.approx(dahl, abs=1e-8)
 

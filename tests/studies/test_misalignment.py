@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from study_module import study
 
-from patchfem import closed_forms as exact
+from patchfem.closed_forms import contact as exact
 from patchfem.runs.patch.press import pressed
 from patchfem.runs.patch.values import values
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from study_module import study
 
-from patchfem import closed_forms as exact
+from patchfem.closed_forms import contact as exact
 from patchfem.core import Missing
 
 GETFEM, TAMAAS = "PATCHFEM_GETFEM_PYTHON", "PATCHFEM_TAMAAS_PYTHON"

@@ -7,8 +7,7 @@ import pytest
 from command_line import cli
 from scipy.integrate import solve_ivp
 from study_module import study
-
-from patchfem.closed_forms.dynamics import bounded_input, decay_rest, sliding_amplitude
+from vibration_forms import bounded_input, decay_rest, sliding_amplitude
 
 
 def inside(text, *parts):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from study_module import study
 
-from patchfem import closed_forms as exact
+from patchfem.closed_forms import contact as exact
 
 
 @pytest.fixture(scope="module")

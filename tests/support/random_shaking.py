@@ -12,8 +12,8 @@ from time import process_time
 from types import SimpleNamespace
 
 import numpy as np
+from vibration_forms import shaken_rms
 
-from patchfem.closed_forms.dynamics import shaken_rms
 from patchfem.response import stationary
 from patchfem.structure.noise import noise
 

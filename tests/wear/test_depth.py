@@ -6,14 +6,9 @@ import numpy as np
 import pytest
 from pieces import bare, bare_pair, coated_pair, refined_middle
 from scipy.linalg import expm
+from wear_forms import even_wear_pressure, worn_crown_half_width, worn_pad_fraction, worn_volume
 
-from patchfem.closed_forms import (
-    even_wear_pressure,
-    hertz_half_width,
-    worn_crown_half_width,
-    worn_pad_fraction,
-    worn_volume,
-)
+from patchfem.closed_forms.contact import hertz_half_width
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import PatchfemError
 from patchfem.elasticity.elasticity import assemble, interface_compliance

@@ -9,8 +9,8 @@ import pytest
 from event_run import combine, run, simulate, starts
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from vibration_forms import sliding_amplitude, two_stop_amplitude
 
-from patchfem.closed_forms.dynamics import sliding_amplitude, two_stop_amplitude
 from patchfem.core import G_N, BaseSine, ModalBasis, Outcome, PatchfemError
 from patchfem.response.measures import energy_balance
 

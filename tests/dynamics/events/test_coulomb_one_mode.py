@@ -6,12 +6,12 @@ from math import pi, sqrt
 import mpmath
 import numpy as np
 import pytest
+import vibration_forms
 from event_reference import run_reference
 from event_run import groups_of, run, simulate
 from scipy.integrate import solve_ivp
+from vibration_forms import sliding_amplitude, two_stop_amplitude
 
-from patchfem import closed_forms
-from patchfem.closed_forms.dynamics import sliding_amplitude, two_stop_amplitude
 from patchfem.core import BaseSine, ModalBasis, Segment, Start
 from patchfem.dynamics.events import histories
 from patchfem.response.measures import energy_balance
@@ -41,7 +41,7 @@ def test_exact_free_decay(start, rest, time):
     assert result.window.slide[-1] == pytest.approx(rest, abs=2e-14)
     assert np.ptp(result.window.slide[result.window.time > time + 1e-9]) == 0.0
     late = result.window.time
-    np.testing.assert_allclose(result.window.slide, closed_forms.decay(late, start, 1.0, 1.0), atol=1e-13 * start)
+    np.testing.assert_allclose(result.window.slide, vibration_forms.decay(late, start, 1.0, 1.0), atol=1e-13 * start)
     assert energy_balance(result.ledger) < 1e-13
 
 
@@ -63,7 +63,7 @@ def test_exact_rest_after_the_drive_is_switched_off():
     size, lead = np.hypot(z + way * f, v), np.arctan2(v, z + way * f)
     first = t + (lead if lead > 0 else lead + pi)  # z + way f = size cos(t - lead'), at its next extreme
     after = done.window.time > first
-    expected = closed_forms.decay(done.window.time[after] - first, way * (size - f), f, 1.0)
+    expected = vibration_forms.decay(done.window.time[after] - first, way * (size - f), f, 1.0)
     np.testing.assert_allclose(done.window.slide[after], expected, atol=1e-11)
     assert energy_balance(done.ledger) < 1e-12
 

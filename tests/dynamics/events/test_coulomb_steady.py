@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from event_reference import basis_of, random_basis
 from event_run import period_map, simulate, steady
+from vibration_forms import sliding_amplitude, two_stop_amplitude
 
-from patchfem.closed_forms.dynamics import sliding_amplitude, two_stop_amplitude
 from patchfem.core import BaseSine, PatchfemError, Start
 from patchfem.structure import drives
 

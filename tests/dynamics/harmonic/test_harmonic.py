@@ -4,11 +4,11 @@ import itertools
 
 import numpy as np
 import pytest
+from friction_forms import jenkins_loop, stretch_loop
 from harmonic_cases import bonds, five, many, march, of_speed, plain_jenkins, sdof
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patchfem.closed_forms.friction import jenkins_loop, stretch_loop
 from patchfem.core import BaseSine, ModalBasis, NotConverged, PatchfemError
 from patchfem.dynamics.harmonic.balance import cycle_energy, periodic_response
 from patchfem.dynamics.harmonic.forces import Group

@@ -7,11 +7,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from friction_forms import report_loop, reversal_force, stretch_loop, virgin_force
 from friction_paths import pulled, triangle, upper_pressure, walk
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.closed_forms.friction import report_loop, reversal_force, stretch_loop, virgin_force
 from patchfem.friction.bonds.parameters import Bonds, grow, growth_exponents
 from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.friction.bonds.recursion import BondState, Recursion

@@ -1,12 +1,12 @@
 """Breakaway: bonds that stretch over a share of their length without damage."""
 
+import friction_forms
 import numpy as np
 import pytest
 from friction_paths import random_walk, slides, triangle, upper_pressure, walk
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem import closed_forms
 from patchfem.dynamics.march.models import load_kernels, points_model
 from patchfem.friction.bonds.parameters import Bonds, elastic_part
 from patchfem.friction.bonds.point_kernels import loose_mean, loose_step
@@ -29,7 +29,7 @@ def test_exact_loop_with_breakaway(share, amplitude):
     path = triangle(amplitude, 80, 7)
     run = walk(Recursion(bonds(share)), path, ONE)
     work = run.mean[-14:, 0] @ np.diff(path)[-14:]
-    area, end = closed_forms.stretch_loop(amplitude, 1.0, 1.0, share)
+    area, end = friction_forms.stretch_loop(amplitude, 1.0, 1.0, share)
     if amplitude > share:  # below it the loop is a line about the first stroke's mean
         assert (work, -run.traction[-1, 0]) == pytest.approx((area, end), abs=1e-11)
     else:
@@ -105,7 +105,7 @@ def test_always_the_play_splits_the_slide(steps, share):
 def test_exact_drift_per_cycle_under_a_force_dither(share, low, high):
     """0 from the second cycle on where the dither stays within the elastic range, the closed form elsewhere."""
     ends = slides(Recursion(bonds(share)), (high, low), (1.0, 1.0), 8)
-    wanted = closed_forms.dither_drift(low, high, share)
+    wanted = friction_forms.dither_drift(low, high, share)
     assert np.diff(ends) == pytest.approx(wanted, abs=1e-9)
     assert (wanted == 0) == (high - low <= 2 * share + 1e-15 or low == -high)
 

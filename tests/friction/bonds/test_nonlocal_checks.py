@@ -6,6 +6,7 @@ printed, closed forms, or an integrated equation; none of them calls the code un
 
 from itertools import pairwise
 
+import friction_forms
 import mpmath
 import numpy as np
 import pytest
@@ -14,9 +15,8 @@ from list_paths import follow_list
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.special import gammainc
+from vibration_forms import sliding_amplitude
 
-from patchfem import closed_forms
-from patchfem.closed_forms.dynamics import sliding_amplitude
 from patchfem.core import BaseSine, ModalBasis
 from patchfem.dynamics.contacts.arrays import Single, Steady
 from patchfem.dynamics.march.march import GOAL, march, modal_arrays
@@ -47,11 +47,11 @@ OMEGA = 2 * np.pi * 143
 def test_exact_c1_steady_friction_with_every_bond_grown_from_zero(speed, printed, want):
     """mu_s = 0.6, a_s = 10, l_k = 0.2 um, eps_0 = 2 um, eps_k = 1.4 um: 2.18 times G(ell/eps; p), p = -0.5, 0, 1, 2."""
     numbers = {"length": 2e-6, "ratio": 0.7, "rest_growth": 10.0, "slip_growth": 0.2e-6}
-    eps = closed_forms.steady_bond_length(speed, **numbers)
+    eps = friction_forms.steady_bond_length(speed, **numbers)
     assert 0.6 * eps / 2e-6 == pytest.approx(printed, abs=1e-6)
     ell = 1 / (10.0 / speed**2 + 1 / 0.2e-6)
     for p, mu in zip((-0.5, 0.0, 1.0, 2.0), want):
-        truth = 0.6 * eps / 2e-6 * closed_forms.growth_factor(ell / eps, p)
+        truth = 0.6 * eps / 2e-6 * friction_forms.growth_factor(ell / eps, p)
         assert truth == pytest.approx(mu, abs=1e-6)
         law = Bonds(0.6, 2e-6, p, "report", 0.7, 10.0, 0.2e-6, 1e-9, 0.0)
         assert settled_at(law, speed, ell) == pytest.approx(truth, abs=1e-12)
@@ -73,7 +73,7 @@ def settled_at(law, speed, ell):
                                         (0.5, 1, 1.07542363), (1, 2, 1.14354323)])
 def test_exact_c2_growth_factor(a, p, want):
     """Bonds that grow from zero to eps_0 over the path a eps_0 carry G(a; p) of the full friction; G(p; p) = 1."""
-    truth = closed_forms.growth_factor(a, p)
+    truth = friction_forms.growth_factor(a, p)
     assert truth == pytest.approx(want, abs=1e-8)
     law = Bonds(1.0, 1.0, float(p), "report", 1.0, 1e-300, float(a), 1e-3, 0.0)
     assert settled_at(law, 1.0, a) == pytest.approx(truth, abs=1e-12)
@@ -607,5 +607,5 @@ def test_exact_a_reversal_of_the_stretch_reading_of_any_order(order, bound):
         state = engine.carried(state, 0.25, one, one, 1.0)
     for back in np.full(12, 0.171).cumsum():
         state = engine.carried(state, -0.171, one, one, 1.0)
-        wanted = closed_forms.reversal_force(back, 1.0, order, "stretch", 1.0)
+        wanted = friction_forms.reversal_force(back, 1.0, order, "stretch", 1.0)
         assert abs(float(engine.traction(state)[0]) - wanted) <= bound

@@ -4,10 +4,10 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+from friction_forms import virgin_force
 from friction_paths import lower_pressure, pulled, sum_by_hand, triangle, upper_pressure, walk
 from scipy.special import gammaincc
 
-from patchfem.closed_forms.friction import virgin_force
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature, cutoff
 from patchfem.friction.bonds.strips import Strips

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import friction_forms
 import numpy as np
 import pytest
 from command_line import FROM_PYTHON, loaded
@@ -10,7 +11,6 @@ from hypothesis import strategies as st
 from scene_texts import BENCH, GROWING, POINT, SHORT, SMALL_PATCH, TRIANGLE
 from scipy.special import erfc
 
-from patchfem import closed_forms
 from patchfem.core import PatchfemError
 from patchfem.friction.bonds.parameters import Bonds, grow
 from patchfem.friction.bonds.recursion import Recursion
@@ -118,9 +118,9 @@ def test_exact_steady_friction_of_a_warm_bench():
     rest, slip = 10 * np.exp(2500 * (1 / 293.15 - 1 / 393.15)), 2e-7 * np.exp(1500 * (1 / 393.15 - 1 / 293.15))
     scene = loads(POINT + GROWING + WARM + SLIDE)
     found = bench.run(build(scene), None, 2000).values["friction_ratio_end"]
-    truth = 0.6 * closed_forms.steady_bond_length(5e-3, 2e-6, 0.7, rest, slip) / 2e-6
+    truth = 0.6 * friction_forms.steady_bond_length(5e-3, 2e-6, 0.7, rest, slip) / 2e-6
     assert found == pytest.approx(truth, rel=1e-6)
-    cold = 0.6 * closed_forms.steady_bond_length(5e-3, 2e-6, 0.7, 10.0, 2e-7) / 2e-6
+    cold = 0.6 * friction_forms.steady_bond_length(5e-3, 2e-6, 0.7, 10.0, 2e-7) / 2e-6
     assert abs(truth - cold) > 1e-3
 
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from friction_forms import coulomb_loop_area, jenkins_loop
 from friction_paths import triangle, upper_pressure, walk
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.closed_forms.friction import coulomb_loop_area, jenkins_loop
 from patchfem.friction.laws.coulomb import Coulomb
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.friction.laws.tanh import Rate

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.special import gamma, gammainc, gammaincc, gammaln, hyp1f1, xlogy
 
-from .contact import positive
+from patchfem.closed_forms.contact import positive
 
 
 def _reading(reading):
@@ -67,17 +67,6 @@ def steady_bond_length(speed, length, ratio, rest_growth, slip_growth):
     positive(length=length, ratio=ratio, rest_growth=rest_growth, slip_growth=slip_growth)
     slow = 1 / np.hypot(1.0, np.asarray(speed, float) / np.sqrt(rest_growth * slip_growth))
     return length * (ratio + (1 - ratio) * slow * slow)
-
-
-def steady_shear(direction, pressure, static, ratio=1.0):
-    """Shear [Pa] in steady rigid sliding (eq. 2.18), direction * mu_s (eps/eps_0) sigma, stretch reading.
-
-    pressure (m,) [Pa]; static mu_s; ratio = eps/eps_0 with eps of `steady_bond_length`. ValueError unless direction is
-    +1 or -1. In the report reading a bond grows from zero and 2.18 holds only where it ripens within its own length.
-    """
-    if direction not in (1, -1):
-        raise ValueError(f"direction must be +1 or -1, got {direction}")
-    return direction * static * ratio * np.asarray(pressure, float)
 
 
 def virgin_force(slide, length, order=1.0, initial=1.0, limit=1.0):

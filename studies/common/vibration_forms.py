@@ -7,7 +7,7 @@ and input a in the same unit (an acceleration, or a force over the same mass), m
 import numpy as np
 from scipy.optimize import brentq
 
-from .contact import positive
+from patchfem.closed_forms.contact import positive
 
 COULOMB_RESONANCE = np.pi / 4  # least f/a that bounds an undamped mode driven at its own frequency
 

@@ -1,12 +1,12 @@
 """Exact answers to small problems of Archard's wear under a steady slip.
 
 Lengths [m], loads per metre of width [N/m]. `coefficient` kappa [m2/N]: volume worn off both pieces together per load
-and slip path; `path` [m]: slip path so far. Public names are read from the package.
+and slip path; `path` [m]: slip path so far.
 """
 
 import numpy as np
 
-from .contact import positive
+from patchfem.closed_forms.contact import positive
 
 
 def worn_volume(coefficient, load, path):
