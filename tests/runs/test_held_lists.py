@@ -1,5 +1,7 @@
 """A block that the printed law holds: its list of bonds grows by a strip per step, which plan and run both know."""
 
+import re
+from time import process_time
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,6 +11,7 @@ from patchfem.core import Missing
 from patchfem.dynamics.march import march
 from patchfem.response.levels import Level
 from patchfem.runs.plan import plan
+from patchfem.runs.rig import lists
 from patchfem.runs.rig.levels import level_measures, onset
 from patchfem.runs.rig.lists import chatters, force_that_holds, lists_grow, stalls
 from patchfem.runs.run import run
@@ -168,11 +171,27 @@ def test_always_the_list_of_levels_that_growing_bonds_just_hold_is_foreseen():
     assert foreseen.unknowns["bond_list_about"] == pytest.approx(book["strips"] - book["substeps"], rel=0.05)
 
 
-def test_refuses_a_held_block_whose_list_the_plan_counts_too_long():
-    scene = loads(RIG.format(reading="report", push=5.739).replace("cycles = 6", "cycles = 6000"))
-    assert "`run` will refuse this scene: the sum over the list of bonds would need" in str(plan(scene))
-    with pytest.raises(Missing, match=r"the list of bonds .* would need a computing time"):
-        run(scene)
+def test_refuses_a_held_block_whose_list_grows_too_long(monkeypatch):
+    """Its seconds grow with the square of its cycles: the run is stopped after a sixtieth of the limit or more."""
+    scene = loads(RIG.format(reading="report", push=5.739).replace("cycles = 6", "cycles = 600"))
+    begin = process_time()
+    assert "each reversal makes the list of bonds longer" in str(plan(scene))
+    monkeypatch.setattr(lists, "LONGEST", 3.0)
+    with pytest.raises(Missing, match=r"the list of bonds would need a computing time of about \d+ s, more than the "
+                                      r"limit of 3 s; lower drive.cycles") as told:
+        run(scene, estimate=False)
+    assert float(re.search(r"about (\d+) s", str(told.value))[1]) >= 3 and process_time() - begin < 30
+
+
+def test_exact_a_list_is_stopped_where_its_steps_so_far_foresee_more_than_the_limit(monkeypatch):
+    clock, seen = iter([5.0, 12.0, 19.0, 40.0]), []
+    monkeypatch.setattr(lists, "thread_time", lambda: next(clock))
+    guard = lists.ListGuard(seen.append)
+    guard(0.01)  # what compiles before it does not count
+    guard(0.02)  # 7 s of a hundredth are 700 s, but 10 s are too few to judge by
+    with pytest.raises(Missing, match="computing time of about 700 s, more than the limit of 600 s"):
+        guard(0.03)
+    assert seen == [0.01, 0.02]
 
 
 def test_always_a_search_from_nought_ends_where_no_level_is_before_the_onset():

@@ -6,13 +6,14 @@ each turn leaves a strip in the list: its cost grows with the square of the step
 
 from functools import lru_cache
 from math import ceil, inf, log2, pi, sqrt
+from time import thread_time
 
 import numpy as np
 
 from ...core import Missing
 from ...effects import has
 from ...friction.bonds import engines
-from ...friction.bonds.list_numbers import AGED, SHARES, form_of
+from ...friction.bonds.list_numbers import AGED, form_of
 from ...friction.bonds.parameters import LONGEST
 from ...model.model import Model
 from ...structure.drive_sizes import fastest, largest, omega_of
@@ -21,12 +22,7 @@ from .numerics import Numerics
 
 DECAYED = 1e-2  # share of the first stroke of a motion that is released, by which its bonds are summed
 HELD = 1e-4  # share of the drive's stroke that a block makes which the printed law holds (measured: 1e-2 to 1e-4)
-# seconds of a step of a held block per step before it, each of which left a strip: of the printed law half of them, in
-# 4 to 30 trial increments, by the form of the list (measured: 3e-8 to 4e-7, 1e-6 to 1e-5); of constant length with an
-# order other than 0, 1, 2; of a released block, 10 to 50 increments; of order 0, 50; and of growing bonds that hold the
-# block, but not fast, so that it turns back with its drive alone, in 2 or 3
-HELD_STEP = {SHARES: 8e-8, AGED: 1.5e-6}
-ANY_ORDER_STEP, STALLED_STEP, LIMP_STEP, LEANING_STEP = 2e-6, 4e-6, 2.7e-6, 2e-7
+GROWING_STEP = 1e-6  # s per step and strip of a list that grows with every step (measured: 8e-8 to 4e-6)
 FAST = 2.0  # D from which a block is held fast: 0.6 and more strips per step, against 0.06 at 1.06 and 0.28 at 1.4
 TURNING = 0.1  # strokes per step from which they are those of the steps
 MOST_CROWDED = 500  # strips of its list, about one per step, from which steps are not halved again: four times the cost
@@ -45,6 +41,12 @@ def quadrature_of(model: Model, numerics: Numerics):
     holds is HELD times what the drive would give.
     """
     return numerics.choice or _summed_by(model, numerics, _stretch(model), bench_engine.engine_named(model))
+
+
+def has_list(model: Model, numerics: Numerics) -> bool:
+    """Return whether the bonds of a model are summed in a list."""
+    f = model.friction
+    return f is not None and has(f.law, "bonds") and quadrature_of(model, numerics).engine != "recursion"
 
 
 def _summed_by(model: Model, numerics: Numerics, stretch: float, engine: str):
@@ -189,61 +191,51 @@ def in_vain(book: dict, bars: list) -> bool:
     return book.get("strips", 0.0) > 0 and len(bars) > 2 and bars[-1] >= bars[-3]
 
 
-def held_cost(model: Model, numerics: Numerics) -> tuple:
-    """Strips at the end of the list of a block that the printed law holds, and the seconds of the run with it: of one
-    that was released the most of both."""
+def list_cost(model: Model, numerics: Numerics) -> tuple[float, float]:
+    """Return the expected strips of a list of bonds and the CPU seconds of a run with it.
+
+    A list that grows with every step is expected to take all strips; its seconds hold within a factor of about 12,
+    because the increments that a step tries depend on the motion. `ListGuard` stops a run that takes too long.
+    """
     steps = numerics.cycles * numerics.steps
-    if stalls(model):
-        return steps, STALLED_STEP * steps**2 / 2
-    moving = list_cost(model, numerics)[1] / steps
-    if not model.rig.levels:
-        return steps, _held_seconds(model, largest(model.rig.drive), 0.0, steps, moving)
-    sizes, size = model.rig.levels, model.rig.level_cycles * numerics.steps
-    seconds = sum(_held_seconds(model, push, k * size, (k + 1) * size, moving) for k, push in enumerate(sizes))
-    # the search of the onset begins from nought, with a list of its own
-    return steps, seconds + sum(_held_seconds(model, sizes[0] / 2**k, 0.0, size, moving)
-                                for k in range(1, 1 + _probes(model)))
-
-
-def _held_seconds(model: Model, push: float, first: float, last: float, moving: float) -> float:
-    """Seconds of the steps from number `first` to `last` under a sine of this push [m s-2], each of which counts the
-    strips that those before it have left; moving: seconds of a step of a block that moves, which leaves none."""
-    ratio = held_by_bonds(model, push)
-    if ratio < least_held(model):
-        return moving * (last - first)
-    return _held_step(model, ratio) * (last**2 - first**2) / 2
-
-
-def _held_step(model: Model, ratio: float) -> float:
-    """Seconds of a step of a held block per strip of its list; ratio: of `held_by_bonds`."""
-    law = model.bonds
-    if model.friction.reading != "report":
-        return LIMP_STEP
-    if ratio < FAST:
-        return LEANING_STEP
-    return ANY_ORDER_STEP if form_of(law) == SHARES and law.order not in (0, 1, 2) else HELD_STEP[form_of(law)]
-
-
-def bonds_cost(model: Model, numerics: Numerics) -> tuple:
-    """Strips of a shared list of bonds and the seconds of the run with it, of a block that is held or moves."""
-    return (held_cost if lists_grow(model) else list_cost)(model, numerics)
-
-
-def _probes(model: Model) -> int:
-    """Runs of a level that halve the bracket of the onset from nought down to the tolerance."""
-    return max(0, ceil(log2(1 / model.accuracy.tolerance)))
-
-
-def list_cost(model: Model, numerics: Numerics) -> tuple:
-    """Expected strips of a shared list of bonds and the seconds of the run with it; a block that its bonds just hold
-    leaves a list as long as one that they hold fast."""
+    if lists_grow(model):
+        return steps, GROWING_STEP * steps**2 / 2
     found = quadrature_of(model, numerics)
     if found.engine != "recursion" and numerics.choice is None:
         found = _summed_by(model, numerics, _stretch(model, 1.0), found.engine)
-    steps = numerics.cycles * numerics.steps
     strips = min(found.strips, 2 * steps * max(1.0, found.strips)) if found.tail else min(found.strips, 8 * steps)
     lists = SHEARED if model.soft else 1.0
     return strips, lists * steps * found.seconds * (strips / found.strips if found.strips else 1.0)
+
+
+class ListGuard:
+    """Progress of a march with a list of bonds, which is stopped if it would take too long.
+
+    A list grows or keeps its length. So all steps take at least as long as those so far over their fraction of all.
+    """
+
+    def __init__(self, progress=None):
+        self.progress = progress
+        self.start = None  # CPU seconds and fraction at the first call, so that compiling does not count
+
+    def __call__(self, fraction: float) -> None:
+        """Pass the fraction of the steps on that is done; Missing if all of them would take more than LONGEST."""
+        now = thread_time()
+        if self.start is None:
+            self.start = now, fraction
+        spent, done = now - self.start[0], fraction - self.start[1]
+        if done > 0 and spent > LONGEST / 60 and spent > LONGEST * done:
+            raise Missing(_too_long(spent / done), "")
+        if self.progress is not None:
+            self.progress(fraction)
+
+
+def _too_long(seconds: float, entries: float | None = None) -> str:
+    """Return the refusal of a run whose list of bonds takes too long."""
+    length = "" if entries is None else f" (about {entries:.0f} entries)"
+    return (f"the sum over the list of bonds{length} would need a computing time of about {seconds:.0f} s, more than "
+            f"the limit of {LONGEST:.0f} s; lower drive.cycles or accuracy.steps_per_cycle, raise accuracy.tail or "
+            'accuracy.merge, or use reading = "stretch" with order = 1')
 
 
 def refuse_unresolved(model: Model, numerics: Numerics) -> None:
@@ -262,16 +254,15 @@ def refuse_unresolved(model: Model, numerics: Numerics) -> None:
                       "order = 1", "")
 
 
-def refuse_long_list(model: Model, numerics: Numerics, limit: float = LONGEST) -> None:
-    """Raise Missing when the shared bond list of a coupled run would take longer than `limit` seconds."""
-    f = model.friction
-    if f is None or not has(f.law, "bonds") or quadrature_of(model, numerics).engine == "recursion":
+def refuse_long_list(model: Model, numerics: Numerics) -> None:
+    """Raise Missing if the list of bonds of a coupled run would take too long.
+
+    The seconds of a list that grows are uncertain: its run is stopped when it turns out to be too long.
+    """
+    if not has_list(model, numerics):
         return
     if not model.soft:
         refuse_unresolved(model, numerics)
-    entries, seconds = bonds_cost(model, numerics)
-    if seconds > limit:
-        raise Missing(f"the sum over the list of bonds (about {entries:.0f} entries) would need a computing time of "
-                      f"about {seconds:.0f} s, more than the limit of {limit:.0f} s; lower drive.cycles or "
-                      "accuracy.steps_per_cycle, raise accuracy.tail or accuracy.merge, or use reading = \"stretch\" "
-                      "with order = 1", "")
+    entries, seconds = list_cost(model, numerics)
+    if seconds > LONGEST and not lists_grow(model):
+        raise Missing(_too_long(seconds, entries), "")

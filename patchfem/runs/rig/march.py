@@ -17,7 +17,7 @@ from ...structure.drive_sizes import omega_of, peak_speed, sinusoidal, whole
 from . import levels as rig_levels
 from . import strips
 from .interface import contact_of
-from .lists import quadrature_of
+from .lists import ListGuard, has_list, quadrature_of
 from .reading import Reader
 from .solution import Solution, borne, sampled_loop
 
@@ -40,6 +40,7 @@ def marched(model, numerics, patch, frames: int = 0, say=None, progress=None) ->
     loaded = perf_counter() - begin - reduced
     begin = perf_counter()
     frames = 0 if rig.strips_slide_apart else frames  # strips have no common field of shear
+    progress = ListGuard(progress) if has_list(model, numerics) else progress
     folds = model.patch is not None and model.patch.gathers  # nobody sees its histories
     done = engine.march(rig.modes, rig.drive, contact, numerics.cycles, numerics.steps, numerics.window, rig.travel,
                      frames, say, progress, rig.start, rig_levels.level_ends(rig),

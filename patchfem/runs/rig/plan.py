@@ -115,8 +115,8 @@ def march_cost(model: Model, numerics, points: int) -> Cost:
     steps = int(numerics.cycles * numerics.steps)
     is_bonds = model.grooves is None and f is not None and has(f.law, "bonds")
     sizes, parts, modes = {}, [], 0
-    if is_bonds and lists.quadrature_of(model, numerics).engine != "recursion":
-        entries, seconds = lists.bonds_cost(model, numerics)
+    if is_bonds and lists.has_list(model, numerics):
+        entries, seconds = lists.list_cost(model, numerics)
         each, sizes["bond_list_about"] = seconds / steps, int(entries)
         parts.append(MemoryPart(capacity.most_bytes(int(entries)), "the list of bonds", "accuracy.tail"))
     elif soft and (is_bonds or model.grooves is not None or rig.load_varies):
@@ -247,26 +247,24 @@ def summed_words(model: Model, numerics) -> list:
     if lists.lists_grow(model):
         stiff = "set friction.order above 0 to give the block a stiffness" if lists.limp(model) else \
             "set friction.reading = \"stretch\" to give the block a finite stiffness"
-        out.append(f"{_held_words(model)}; {stiff}")
-    if (seconds := lists.bonds_cost(model, numerics)[1]) > parameters.LONGEST:
+        out.append(f"{_held_words(model)}, so that the computing time is known within a factor of about 12 only; "
+                   f"{stiff}")
+    elif (seconds := lists.list_cost(model, numerics)[1]) > parameters.LONGEST:
         out.append("`run` will refuse this scene: the sum over the list of bonds would need a computing time of about "
                    f"{seconds:.0f} s, more than the limit of {parameters.LONGEST:.0f} s")
     return out
 
 
 def _held_words(model: Model) -> str:
-    """How bonds hold the block whose list of them grows."""
-    turns = "the block reverses its motion in almost every time step, and each reversal makes the list of bonds longer"
-    if lists.stalls(model):
-        return ("with the law as printed in the report the block does not slide after its release: it vibrates on its "
-                "bonds or reverses its motion in almost every time step; the estimated computing time is that of the "
-                "slowest case")
+    """Return how bonds hold the block whose list of them grows."""
     if lists.limp(model):
-        return f"bonds of order 0 keep the block from sliding, but they have no stiffness: {turns}"
-    if lists.chatters(model):
-        return f"with the law as printed in the report the block does not slide at all: {turns}"
-    return ("with the law as printed in the report the block hardly slides at one or more of the drive levels: the "
-            "list of bonds becomes longer in every time step")
+        held = "bonds of order 0 keep the block from sliding, but they have no stiffness"
+    elif lists.stalls(model):
+        held = "with the law as printed in the report the block does not slide after its release"
+    else:
+        held = "with the law as printed in the report the block hardly slides or does not slide at all"
+    return (f"{held}: it reverses its motion in almost every time step, and each reversal makes the list of bonds "
+            "longer")
 
 
 def steady_cost(model: Model, numerics, points: int) -> Cost:
