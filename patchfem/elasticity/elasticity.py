@@ -9,6 +9,7 @@ import numpy as np
 
 from ..core import NotConverged, frozen_array, say
 from .condense import Condensed, condense
+from .lapack import one_thread
 from .tensor_stiffness import tensor_stencil
 
 
@@ -79,6 +80,13 @@ class Piece:
                 raise NotConverged(f"{error}; {_remedy(self)}") from None
         return self.made["factor"]
 
+    def displaced(self, load) -> np.ndarray:
+        """Return displacements (frames, nx * ny, 2) [m] under interface loads (nx, 2, frames) [N/m]."""
+        nx, frames = self.x.size, load.shape[-1]
+        out = np.zeros((frames, nx, self.depth.size, 2))
+        out[:, :, :-1] = np.moveaxis(self.factor.displacement(load), 3, 0)
+        return out.reshape(frames, -1, 2)
+
 
 def _remedy(piece: Piece) -> str:
     least = min(np.diff(piece.x).min(), np.diff(piece.depth).min())
@@ -120,35 +128,23 @@ def grid_cells(columns: int, rows: int, coating_rows: int) -> tuple:
     return np.stack([first, first + rows, first + rows + 1, first + 1], axis=1), first % rows < coating_rows
 
 
-def displacement(piece: Piece, shear: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Displacements of a piece under nodal interface forces per unit width [N/m].
+def displacement(piece, shear: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """Return displacements (frames, nodes, 2) [m] of a piece, along x and inward, under forces on its interface.
 
-    Returns (frames, nx*ny, 2) [m], along x and inward. shear, normal: (frames, nx) acting on the piece along +x and
-    inward. The factors of the piece are used again. NotConverged as `Piece.factor`.
+    The factors of the piece are used again.
+
+    Parameters
+    ----------
+    piece : Piece or substructure.Substructure
+    shear, normal : (frames, m) ndarray
+        Nodal forces per unit width [N/m] that act on the piece along +x and inward.
+
+    Raises
+    ------
+    NotConverged
+        If the stiffness of the piece cannot be factorised.
     """
-    nx, ny = piece.x.size, piece.depth.size
-    load = np.stack([np.atleast_2d(shear).T, np.atleast_2d(normal).T], axis=1).astype(float)
-    out = np.zeros((load.shape[-1], nx, ny, 2))
-    out[:, :, :-1] = np.moveaxis(piece.factor.displacement(load), 3, 0)
-    return out.reshape(-1, nx * ny, 2)
-
-
-def middle_stress(piece: Piece, u: np.ndarray) -> np.ndarray:
-    """Stress (frames, t, 4) at the middles of the cells as xx, yy, zz, xy [Pa], tension > 0.
-
-    u: (frames, nodes, 2) [m]. The inward axis is kept, so xy changes sign for the piece drawn at y < 0. The middle of a
-    bilinear quad is its superconvergent point.
-    """
-    place = piece.nodes[piece.cells]
-    grid = u.reshape(len(u), piece.x.size, -1, 2)
-    rise, fall = grid[:, 1:, 1:] - grid[:, :-1, :-1], grid[:, 1:, :-1] - grid[:, :-1, 1:]
-    along, inward = ((rise + way * fall).reshape(len(u), -1, 2) for way in (1, -1))
-    a, b = place[:, 1] + place[:, 2] - place[:, 0] - place[:, 3], place[:, 3] + place[:, 2] - place[:, 0] - place[:, 1]
-    area = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])[:, None]  # four times that of the cell
-    by_x = (along * b[:, 1, None] - inward * a[:, 1, None]) / area
-    by_y = (inward * a[:, 0, None] - along * b[:, 0, None]) / area
-    exx, eyy, exy = by_x[..., 0], by_y[..., 1], (by_x[..., 1] + by_y[..., 0]) / 2
-    return hooke(exx, eyy, exy, piece.is_coating, piece.layers)
+    return piece.displaced(np.stack([np.atleast_2d(shear).T, np.atleast_2d(normal).T], axis=1).astype(float))
 
 
 def hooke(exx, eyy, exy, is_coating, layers: Layers) -> np.ndarray:
@@ -172,11 +168,22 @@ def von_mises(stress: np.ndarray) -> np.ndarray:
     return np.sqrt(((xx - yy)**2 + (yy - zz)**2 + (zz - xx)**2) / 2 + 3 * xy**2)
 
 
-def interface_compliance(piece: Piece) -> tuple:
-    """Compliance of one piece at its interface per unit width: (nn, tt, nt), each (nx, nx) [m2/N], read-only.
+def interface_compliance(piece) -> tuple:
+    """Return the compliances (nn, tt, nt) of a piece at its interface per unit width, each (m, m) [m2/N], read-only.
 
     nn: inward motion per inward force; tt: motion along x per force along x; nt: inward motion per force along x. A
-    piece that is its own mirror image costs half. NotConverged as `Piece.factor`.
+    piece on a grid that is its own mirror image costs half.
+
+    Parameters
+    ----------
+    piece : Piece or substructure.Substructure
+
+    Raises
+    ------
+    NotConverged
+        If the stiffness of the piece cannot be factorised.
     """
-    both = piece.factor.compliance()
+    with one_thread():
+        both = piece.factor.compliance()
+    both = (both + both.T) / 2
     return tuple(frozen_array(part) for part in (both[1::2, 1::2], both[0::2, 0::2], both[1::2, 0::2]))

@@ -9,7 +9,7 @@ so uniform pressure, force and moment pass exactly from any nodes to any other; 
 The grid is that of the coarser piece, or of the much softer one: pressure with more freedom than the softer body has
 nodes makes a stiff body follow the kinks of the other one. Where the pieces take turns, so does the grid.
 
-A caller condenses each piece as before, calls `mortar` instead of `substructure.joined`, solves contact and shear on
+A caller condenses each piece as before, calls `mortar` instead of adding the compliances, solves contact and shear on
 `x` with the weights `tributary` and the matrices nn, tt, nt (sigma_n = f / tributary; gaps are taken at `x`), and asks
 `forces` for the nodal forces of each piece before it recovers the fields inside.
 """
@@ -34,7 +34,7 @@ class Mortar:
 
     side: "lower" or "upper" where x are that piece's nodes (both, where they match: "lower"), else "both"; x and
     tributary: (m,) [m]; to_lower (m, m_l), to_upper (m, m_u): the sparse T of each piece; nn, tt, nt: (m, m) [m2/N]
-    with the signs of substructure.joined; ripple: largest of `ripples`; reason: why the pressure lies there, in words.
+    with the signs of runs.patch.condensed; ripple: largest of `ripples`; reason: why the pressure lies there, in words.
     """
 
     side: str

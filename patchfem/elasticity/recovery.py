@@ -55,6 +55,44 @@ def cells_of(piece) -> Cells:
     return Cells(piece.nodes, (piece.cells,), piece.is_coating, piece.layers)
 
 
+def middle_stress(piece, u: np.ndarray) -> np.ndarray:
+    """Return the stress (frames, t, 4) at the middles of cells as xx, yy, zz, xy [Pa], tension > 0.
+
+    The inward axis is kept, so xy changes sign for the piece drawn at y < 0. The middle of a bilinear quad is its
+    superconvergent point.
+
+    Parameters
+    ----------
+    piece : elasticity.Piece or substructure.Substructure
+    u : (frames, nodes, 2) ndarray
+        Displacements [m] along x and inward.
+    """
+    cells = cells_of(piece)
+    strains = []
+    for block in cells.blocks:
+        a, b = _spans(cells.points, block)
+        along, inward = _spans(u, block)
+        area = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+        exx = (along[..., 0] * b[:, 1] - inward[..., 0] * a[:, 1]) / area
+        eyy = (inward[..., 1] * a[:, 0] - along[..., 1] * b[:, 0]) / area
+        by_depth = inward[..., 0] * a[:, 0] - along[..., 0] * b[:, 0]
+        by_x = along[..., 1] * b[:, 1] - inward[..., 1] * a[:, 1]
+        strains.append((exx, eyy, (by_depth + by_x) / (2 * area)))
+    return hooke(*(np.concatenate(parts, axis=1) for parts in zip(*strains)), cells.is_coating, cells.layers)
+
+
+def _spans(values, block) -> tuple:
+    """Return the changes (..., c, 2) of nodal values (..., N, 2) along both local axes of cells (c, 3 or 4).
+
+    Of a quad they are twice the changes between the middles of opposite sides.
+    """
+    corners = [values.take(nodes, axis=-2) for nodes in block.T]
+    if len(corners) == 3:
+        return corners[1] - corners[0], corners[2] - corners[0]
+    rise, fall = corners[2] - corners[0], corners[1] - corners[3]
+    return rise + fall, rise - fall
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Recovery:
     """A linear map from cell middles to places; a node has one place in each material that it touches.

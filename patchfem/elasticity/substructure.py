@@ -11,11 +11,11 @@ import numpy as np
 from scipy.sparse import coo_matrix, csc_matrix
 from skfem import Basis, BilinearForm, ElementQuad1, ElementTriP1, ElementVector, MeshQuad, MeshTri
 
-from ..core import NotConverged, frozen_array
+from ..core import NotConverged
 from ..mesh.anymesh import cell_edges
 from .condense import CORRECTION, RESIDUAL, rough
 from .dissect import dissection
-from .elasticity import Layers, hooke, lame, remedy
+from .elasticity import Layers, lame, remedy
 from .fronts import factorise
 from .lapack import one_thread
 
@@ -46,6 +46,16 @@ class Substructure:
     def rounding(self) -> float:
         """Relative error of the compliance by round-off [1], as far as it is known: 0 before anything is factorised."""
         return self.made.get("rounding", 0.0)
+
+    def displaced(self, load) -> np.ndarray:
+        """Return displacements (frames, N, 2) [m] under interface loads (m, 2, frames) [N/m]."""
+        whole = np.zeros((self.order.size, 2, load.shape[-1]))
+        whole[-len(load):] = load
+        with one_thread():
+            u = self.factor.solve(whole.reshape(-1, load.shape[-1])).reshape(whole.shape)
+        out = np.zeros((load.shape[-1], len(self.mesh.points), 2))
+        out[:, self.order] = np.moveaxis(u, 2, 0)
+        return out
 
     def _part(self, name: str):
         if not self.made:
@@ -124,60 +134,3 @@ def _stiffness(mesh, layers: Layers, order) -> csc_matrix:
         whole = whole + coo_matrix((found.data, place[found.indices]), shape=2 * (2 * len(mesh.points),)).tocsc()
     free = (2 * order[:, None] + [0, 1]).ravel()
     return whole[free][:, free].tocsc()
-
-
-def condense(piece: Substructure) -> tuple:
-    """Compliance of one piece at its interface per unit width: (nn, tt, nt), each (m, m) [m2/N], read-only.
-
-    nn: inward motion per inward force; tt: motion along x per force along x; nt: inward motion per force along x.
-    """
-    with one_thread():
-        both = piece.factor.compliance()
-    both = (both + both.T) / 2
-    return tuple(frozen_array(part) for part in (both[1::2, 1::2], both[0::2, 0::2], both[1::2, 0::2]))
-
-
-def joined(lower: tuple, upper: tuple) -> tuple:
-    """Compliance of the pair (nn, tt, nt) from those of its pieces: pressure acts inward on both, shear is opposed.
-
-    nn: closing per pressure force; tt: slide upper - lower undone per shear; nt: closing per shear force along +x on
-    the lower piece, exactly zero for mirrored pieces.
-    """
-    return tuple(frozen_array(part) for part in (lower[0] + upper[0], lower[1] + upper[1], lower[2] - upper[2]))
-
-
-def displacement(piece: Substructure, shear: np.ndarray, normal: np.ndarray) -> np.ndarray:
-    """Displacements of a piece under nodal interface forces per unit width [N/m].
-
-    Returns (frames, N, 2) [m], along x and inward. shear, normal: (frames, m) acting on the piece along +x and inward.
-    The factors of the piece are used again.
-    """
-    shear, normal = np.atleast_2d(shear), np.atleast_2d(normal)
-    frames, m = normal.shape
-    load = np.zeros((piece.order.size, 2, frames))
-    load[-m:, 0], load[-m:, 1] = shear.T, normal.T
-    with one_thread():
-        u = piece.factor.solve(load.reshape(-1, frames)).reshape(-1, 2, frames)
-    out = np.zeros((frames, len(piece.mesh.points), 2))
-    out[:, piece.order] = np.moveaxis(u, 2, 0)
-    return out
-
-
-def _gradients(corner) -> np.ndarray:
-    """Gradients (cells, n, 2) of the shape functions at the middle of triangles or quads with corners (cells, n, 2)."""
-    local = np.array([[-1, -1], [1, 0], [0, 1]]) if corner.shape[1] == 3 else \
-        np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]) / 4
-    jacobian = np.einsum("ni,cnj->cij", local, corner)
-    return np.einsum("ni,cji->cnj", local, np.linalg.inv(jacobian))
-
-
-def middle_stress(piece: Substructure, u: np.ndarray) -> np.ndarray:
-    """Stress (frames, t + q, 4) at the middles of the cells as xx, yy, zz, xy [Pa], tension > 0; triangles first.
-
-    u: (frames, N, 2) [m]. The inward axis is kept, so xy changes sign for the piece drawn at y < 0.
-    """
-    mesh = piece.mesh
-    slope = np.concatenate([np.einsum("cnj,fcni->fcij", _gradients(mesh.points[cells]), u[:, cells])
-                            for cells in (mesh.triangles, mesh.quads) if len(cells)], axis=1)
-    shear = (slope[..., 0, 1] + slope[..., 1, 0]) / 2
-    return hooke(slope[..., 0, 0], slope[..., 1, 1], shear, mesh.is_coating, piece.layers)

@@ -64,14 +64,13 @@ def once(name: str, columns: int = COLUMNS, rows: int = ROWS) -> dict:
 
     from patchfem.contact.unilateral import press
     from patchfem.core import Compliance, Interface
-    from patchfem.elasticity.elasticity import Layers
-    from patchfem.elasticity.substructure import condense, joined
+    from patchfem.elasticity.elasticity import Layers, interface_compliance
 
     bodies = [piece(seed, columns, rows) for seed in (1, 2)]
     layers, clock = Layers((250e9, 0.24), (121e9, 0.32), "strain"), [(perf_counter(), process_time())]
     pieces = [assemble(body, layers, name) for body in bodies]  # both factors are kept, as for the fields of a run
     clock.append((perf_counter(), process_time()))
-    nn, tt, _ = joined(*(condense(one) for one in pieces))
+    nn, tt, _ = map(sum, zip(*(interface_compliance(one) for one in pieces)))
     clock.append((perf_counter(), process_time()))
     x, weight = bodies[0].x, bodies[0].tributary()
     found = press(Compliance(Interface(x, weight, 1.0), nn, tt), 1e-5 * x, LOAD)  # tilted by 10 urad

@@ -17,9 +17,9 @@ from patchfem.elasticity.elasticity import (
     displacement,
     interface_compliance,
     lame,
-    middle_stress,
     von_mises,
 )
+from patchfem.elasticity.recovery import middle_stress
 from patchfem.mesh.tensor import TensorGrid, graded_grid
 
 materials = st.tuples(st.floats(1e9, 1e12), st.floats(0.0, 0.45))

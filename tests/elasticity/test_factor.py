@@ -19,7 +19,7 @@ from study_module import study
 from patchfem.core import NotConverged
 from patchfem.elasticity import fronts
 from patchfem.elasticity.dissect import LEAF, dissection, least_cover
-from patchfem.elasticity.substructure import condense
+from patchfem.elasticity.elasticity import interface_compliance as condense
 from patchfem.mesh.tensor import graded_grid
 
 factors = study("common/factors.py")

@@ -12,7 +12,8 @@ from patchfem.closed_forms.contact import rounded_punch_half_width, rounded_punc
 from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface, Missing, PatchfemError
 from patchfem.elasticity.elasticity import Layers
-from patchfem.elasticity.substructure import assemble, condense, joined
+from patchfem.elasticity.elasticity import interface_compliance as condense
+from patchfem.elasticity.substructure import assemble
 from patchfem.mesh.files import read_pieces, write_mesh
 
 try:
@@ -55,7 +56,7 @@ def test_exact_rounded_punch_within_one_percent(quads):
     load = 0.5 * flat**2 * modulus / radius
     pair = rounded_pair(12e-3, 6e-3, 0.0, radius, flat / 40, 0.6e-3, flat=flat, quads=quads)
     low = condense(assemble(pair.lower, Layers(TITANIUM, TITANIUM, "strain")))
-    nn, tt, _ = joined(low, low)
+    nn, tt = (2 * part for part in low[:2])
     x, weight = pair.lower.x, pair.lower.tributary()
     state = press(Compliance(Interface(x, weight, 1.0), nn, tt), pair.lower.rise + pair.upper.rise, load)
     half = rounded_punch_half_width(load, flat, radius / 2, modulus)

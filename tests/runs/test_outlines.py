@@ -11,9 +11,9 @@ import patchfem as pf
 from patchfem.closed_forms.contact import punch_pressure, rounded_punch_half_width, rounded_punch_pressure
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.elasticity.coating_bond import bond_line
-from patchfem.elasticity.elasticity import assemble, interface_compliance
+from patchfem.elasticity.elasticity import assemble, displacement, interface_compliance
+from patchfem.elasticity.elasticity import interface_compliance as condense
 from patchfem.elasticity.recovery import cells_of
-from patchfem.elasticity.substructure import condense, displacement
 from patchfem.mesh.files import write_mesh
 from patchfem.mesh.nested import finer
 from patchfem.mesh.tensor import TensorGrid, graded_depth, graded_rows

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...elasticity import coating_bond, elasticity, substructure
-from ...elasticity.elasticity import Piece, von_mises
+from ...elasticity import coating_bond
+from ...elasticity.elasticity import Piece, displacement, von_mises
 from ...elasticity.recovery import (
     Cells,
     Indicator,
@@ -16,6 +16,7 @@ from ...elasticity.recovery import (
     cells_of,
     harmless_step,
     indicator,
+    middle_stress,
     quadratures,
     recovery,
 )
@@ -84,19 +85,10 @@ def _loads(patch, fields: dict, side: str) -> tuple:
 def _motions(patch, loads: list) -> list:
     """Displacements (1 + f, nodes, 2) of both pieces; alike ones share one factorisation."""
     pair = patch.pair
-    how = _solver(pair.piece).displacement
     if pair.upper is pair.piece:
-        both = how(pair.piece, *(np.concatenate(parts) for parts in zip(*loads)))
+        both = displacement(pair.piece, *(np.concatenate(parts) for parts in zip(*loads)))
         return np.split(both, 2)
-    return [how(piece, *load) for piece, load in zip((pair.piece, pair.upper), loads)]
-
-
-def _solver(piece):
-    """The module that solves inside a piece, loaded where one is of its kind."""
-    if isinstance(piece, Piece):
-        return elasticity
-
-    return substructure
+    return [displacement(piece, *load) for piece, load in zip((pair.piece, pair.upper), loads)]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -121,7 +113,7 @@ def _inside(piece, grid) -> _Inside:
         points, blocks, interface = cells.points, [piece.cells], np.arange(0, len(cells.points), grid.depth.size)
     else:
         points, blocks, interface = grid.points, list(cells.blocks), grid.interface
-    return _Inside(points, blocks, interface, partial(_solver(piece).middle_stress, piece), cells, quadratures(cells),
+    return _Inside(points, blocks, interface, partial(middle_stress, piece), cells, quadratures(cells),
                    recovery(cells))
 
 

@@ -65,17 +65,16 @@ def finite_elements(body, layers: Layers):
 
 
 def compliance_of(body, piece, fresh: bool) -> tuple:
-    """Compliances (nn, tt, nt) of one piece; those of a large one come from the cache on disk unless `fresh`."""
-    condense, large = interface_compliance, body.x.size >= LEAST_CACHED
-    if not isinstance(body, TensorGrid):
-        condense, large = substructure.condense, len(body.points) >= LEAST_CACHED * LEAST_CACHED
-    if not large:
-        return condense(piece)
-    key = cache.key_of(body.x, body.depth, body.coating_rows, piece.layers) if isinstance(body, TensorGrid) else \
+    """Return the compliances (nn, tt, nt) of a piece; those of a large one come from the cache on disk unless `fresh`.
+    """
+    is_grid = isinstance(body, TensorGrid)
+    if (body.x.size if is_grid else len(body.points)**0.5) < LEAST_CACHED:
+        return interface_compliance(piece)
+    key = cache.key_of(body.x, body.depth, body.coating_rows, piece.layers) if is_grid else \
         cache.key_of_mesh(body, piece.layers)
     found = None if fresh else cache.fetch(key, body.x.size)
     if found is None:
-        found = condense(piece)
+        found = interface_compliance(piece)
         if not piece.rounding:
             cache.keep(key, found)
     return found
