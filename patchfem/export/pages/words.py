@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from html import escape
 from math import ceil, floor, inf, isfinite, log10, pi
 from types import MappingProxyType
+from typing import NamedTuple
 
 from ... import scales
 from ...core import Measure, Outcome, allowed
@@ -214,63 +215,107 @@ def _open(one: dict) -> float:
     return one["floor"] if one["error"] is None else one["error"]
 
 
+class Statement(NamedTuple):
+    """A part of the headline: a measure ("" for none), and a text with {} for its value and error."""
+
+    measure: str
+    text: str
+
+
 def headline(summary: dict, cycles: float | None, number: Callable[[str, str], str] | None = None,
              released: str = "") -> str:
-    """The measures that answer first, as one sentence; "" where there is none.
+    """State the measures that answer first in one sentence; "" where there is none.
 
-    summary: as summary.json holds it; cycles: of the drive that were run, None where it has none; number: makes of a
-    value with its error, and of the name of its measure, what stands in the text; released: how a released output
-    swung, in place of what is left of that in the last cycles.
+    Parameters
+    ----------
+    summary : dict
+        As summary.json holds it.
+    cycles : float or None
+        Cycles of the drive in the run; None for a run without cycles.
+    number : callable
+        Returns what stands in the sentence for the text of a value and the name of its measure.
+    released : str
+        How a released output swung; it replaces the measures of the last cycles.
     """
-    measures, parts = summary["measures"], []
-    whole = cycles is None or cycles >= 1 - 1e-6
-
-    def said(name: str, text: str) -> None:
-        found = measures.get(name)
-        if found and found["value"] is not None:
-            value, interval = of_records(name, measures)
-            value = value or pair(name, found)
-            parts.append(text.format(value if number is None else number(value, name))
-                         + (f" ({interval})" if interval else ""))
-
-    def of_each(name: str, text: str) -> None:
-        """`said` of every interface, of the first alone where they are many; strips are no interfaces."""
-        count = sum(of_first(one) == name for one in measures)
-        apart = count > 1 and not any(one["effect"] == "contact.strips" for one in summary["effects"])
-        for k in range(count if apart and count <= FEW else 1):
-            at = f" at interface {k + 1}" + f" of {count}" * (count > FEW)
-            said(of_number(name, k), text + at * apart)
-
+    measures = summary["measures"]
+    covers_cycle = cycles is None or cycles >= 1 - 1e-6
+    statements = []
     if summary["outcome"] != "no_contact":
-        worn = next((name for name in ("worn_depth_max", "worn_volume") if name in measures), "")
-        said(worn, "{} worn off at the deepest place" if worn == "worn_depth_max" else "{} worn off")
-        if released:
-            parts.append(released)
-            said("friction_work", "friction dissipates {} during the whole run")
-        else:
-            for name, text in SHAKEN.items():
-                said(name, text)
-            said("relative_displacement_amplitude", "half the peak-to-peak displacement of the output is {}"
-                 if next(iter(SHAKEN)) in measures else "displacement amplitude at the output {} (half peak-to-peak)")
-            said("relative_displacement_amplitude_steady", "this amplitude would settle at {}")
-            said("absolute_acceleration_peak", "peak acceleration {}")
-        if "relative_displacement_amplitude" not in measures:
-            said("friction_ratio_peak", "friction ratio peaks at {}")
-        if whole and not released:
-            opened = any(one.startswith(OPEN_LOOP) for one in summary.get("warnings", ()))
-            changes = summary["outcome"] in CHANGES and summary["kind"] in ("rig", "linear")
-            said(POWER, "friction dissipates {}")
-            each = "friction work of the last cycle {}" if opened else "{} dissipated per cycle" + \
-                " (mean of the last cycles)" * changes
-            of_each("" if POWER in measures else "loop_area", each)
-        of_each("contact_fraction", "{} of the length in contact" + placed(
-            summary.get("contact"), measures.get("contact_fraction", {}).get("value")))
-        if summary["kind"] == "patch":
-            said("pressure_peak", "peak pressure {}")
+        statements += [*_wear_statements(measures), *_motion_statements(measures, released)]
+        if covers_cycle and not released:
+            statements += _energy_statements(summary)
+        statements += _patch_statements(summary)
+    parts = [part for part in (_filled(one, measures, number) for one in statements) if part]
     text = "; ".join(parts)
-    if text and not whole and not released:
+    if text and not covers_cycle and not released:
         text = f"in {cycles:.2g} of a cycle {text}"
     return f"{text[0].upper() + text[1:]}." if text else ""
+
+
+def _filled(statement: Statement, measures: dict, number: Callable[[str, str], str] | None) -> str:
+    """Return a statement with the value of its measure; "" if the measure has no value."""
+    name, text = statement
+    if not name:
+        return text
+    measure = measures.get(name)
+    if not measure or measure["value"] is None:
+        return ""
+    value, interval = of_records(name, measures)
+    value = value or pair(name, measure)
+    text = text.format(value if number is None else number(value, name))
+    return f"{text} ({interval})" if interval else text
+
+
+def _wear_statements(measures: dict) -> list:
+    texts_by_measure = {"worn_depth_max": "{} worn off at the deepest place", "worn_volume": "{} worn off"}
+    return [Statement(*one) for one in texts_by_measure.items() if one[0] in measures][:1]
+
+
+def _motion_statements(measures: dict, released: str) -> list:
+    if released:
+        rows = [("", released), ("friction_work", "friction dissipates {} during the whole run")]
+    else:
+        is_random = "relative_displacement_rms" in measures
+        amplitude = "half the peak-to-peak displacement of the output is {}" if is_random else \
+            "displacement amplitude at the output {} (half peak-to-peak)"
+        rows = [*SHAKEN.items(),
+                ("relative_displacement_amplitude", amplitude),
+                ("relative_displacement_amplitude_steady", "this amplitude would settle at {}"),
+                ("absolute_acceleration_peak", "peak acceleration {}")]
+    if "relative_displacement_amplitude" not in measures:
+        rows.append(("friction_ratio_peak", "friction ratio peaks at {}"))
+    return [Statement(*row) for row in rows]
+
+
+def _energy_statements(summary: dict) -> list:
+    """Return what friction dissipates: as a power under a random drive, else per cycle at each interface."""
+    if POWER in summary["measures"]:
+        return [Statement(POWER, "friction dissipates {}")]
+    text = "{} dissipated per cycle"
+    if any(warning.startswith(OPEN_LOOP) for warning in summary.get("warnings", ())):
+        text = "friction work of the last cycle {}"
+    elif summary["outcome"] in CHANGES and summary["kind"] in ("rig", "linear"):
+        text += " (mean of the last cycles)"
+    return _at_each_interface(summary, "loop_area", text)
+
+
+def _patch_statements(summary: dict) -> list:
+    fraction = summary["measures"].get("contact_fraction", {}).get("value")
+    where = placed(summary.get("contact"), fraction)
+    statements = _at_each_interface(summary, "contact_fraction", "{} of the length in contact" + where)
+    if summary["kind"] == "patch":
+        statements.append(Statement("pressure_peak", "peak pressure {}"))
+    return statements
+
+
+def _at_each_interface(summary: dict, name: str, text: str) -> list:
+    """Return the statement of each interface, of the first alone where they are many; strips are no interfaces."""
+    count = sum(of_first(measure) == name for measure in summary["measures"])
+    if count < 2 or any(effect["effect"] == "contact.strips" for effect in summary["effects"]):
+        return [Statement(name, text)]
+    if count > FEW:
+        return [Statement(name, f"{text} at interface 1 of {count}")]
+    return [Statement(of_number(name, k), f"{text} at interface {k + 1}") for k in range(count)]
 
 
 def placed(contact: dict | None, fraction: float | None = None) -> str:
