@@ -24,111 +24,158 @@ MOVING = Outcome.TRANSIENT.value, Outcome.GROWS.value  # outcomes of cases that 
 FIRST = ("relative_displacement_amplitude", "loop_area", "friction_ratio_peak", "onset_level", "pressure_peak")
 
 
-class Lead(NamedTuple):
-    """Sentences and tables of a sweep; a sentence is "" where there is nothing to say.
+class Sentences(NamedTuple):
+    """What a sweep says, a sentence each; "" where there is nothing to say.
 
     Attributes
     ----------
-    missed : dict
-        Cases over the tolerance, from `missed.counted`; `misses` is the sentence.
-    limits : limits.Limits
-        How far a key may go; `limit` is the sentence.
+    limit : str
+        How far the key may go.
+    peak : str
+        Where the peak over frequency lies.
+    rank : str
+        Which keys matter most.
+    scatter : str
+        How far the results of random cases scatter.
     span : str
         Range of the main measure.
-    ranks, spread : dict
-        From `ranked.ranks_of` and `ranked.quantiles`; `rank` and `scatter` are the sentences.
-    peaks : Sequence
-        From `peaks.found`; `peak` is the sentence.
+    misses : str
+        How many cases miss the tolerance.
     left : str
         How many cases have no result yet, and whether none has settled.
-    asked : str
-        Measure of `--of`.
     ends : str
         How many curves over frequency are largest at an end.
     unsettled : str
         How far unsettled cases move, where that is farther than the settled ones.
     """
 
-    missed: dict
-    misses: str
-    limits: Limits
-    limit: str
-    span: str
-    ranks: dict = MappingProxyType({})
-    rank: str = ""
-    spread: dict = MappingProxyType({})
-    scatter: str = ""
-    peaks: Sequence = ()
+    limit: str = ""
     peak: str = ""
+    rank: str = ""
+    scatter: str = ""
+    span: str = ""
+    misses: str = ""
     left: str = ""
-    asked: str = ""
     ends: str = ""
     unsettled: str = ""
 
+
+class Lead(NamedTuple):
+    """What a sweep says first, with the tables behind it.
+
+    Attributes
+    ----------
+    said : Sentences
+    missed : dict
+        Cases over the tolerance, from `missed.counted`.
+    limits : limits.Limits
+        How far a key may go.
+    ranks, spread : dict
+        From `ranked.ranks_of` and `ranked.quantiles`.
+    peaks : Sequence
+        From `peaks.found`.
+    asked : str
+        Measure of `--of`.
+    """
+
+    said: Sentences
+    missed: dict
+    limits: Limits
+    ranks: dict
+    spread: dict
+    peaks: Sequence
+    asked: str
+
     def sentences(self) -> list:
-        """What people read, the answer first, then whether all cases meet the tolerance, then what else is known."""
-        rank = self.rank if self.scatter or not (self.limit or self.peak) else ""  # of a grid they say more
-        limits = self.limit, self.peak
-        said = (self.rank, self.scatter, self.span, *limits) if self.asked else \
-            (*limits, rank, self.scatter, self.span)
-        used = self._first()
-        return [one for one in (self.answer(), "" if self.missed or not used else self.misses,
-                                *(one for one in said if one not in used)) if one]
+        """Return the sentences that people read: the answer, whether all cases meet the tolerance, and the others."""
+        said = self.said
+        rank = said.rank if said.scatter or not (said.limit or said.peak) else ""  # the limits of a grid say more
+        others = [said.limit, said.peak, rank, said.scatter, said.span]
+        if self.asked:
+            others = [said.rank, said.scatter, said.span, said.limit, said.peak]
+        used = self._answer_parts()
+        misses = "" if self.missed or not used else said.misses
+        return [one for one in (self.answer(), misses, *(one for one in others if one not in used)) if one]
 
     def answer(self) -> str:
-        """One sentence: how far the key may go, where the peak is, what matters most and how far the answers scatter,
-        or where the main measure runs; in brackets behind it what qualifies it: cases that have no answer, have not
-        settled or miss the tolerance."""
-        text = joined(self._first())
-        notes = joined([one for one in (self.left, self.misses if self.missed else "", self.ends) if one])
-        if not text or not notes:
-            return text or notes or self.misses
-        return f"{text.rstrip('.')} ({notes[0].lower() if notes[1].islower() else notes[0]}{notes[1:].rstrip('.')})."
+        """Return the answer in one sentence.
 
-    def _first(self) -> list:
-        """The sentences that the answer is made of."""
-        drawn = [one for one in (self.rank, self.scatter) if one]
-        first = [self.peak] if self.asked == "peak_frequency" and self.peak and not drawn else \
-            (drawn or [self.span]) if self.asked and (drawn or self.span) else \
-            [self.limit or self.peak] if self.limit or self.peak else drawn or [self.span]
-        return [one for one in (self.unsettled, *first) if one]
+        How far the key may go, where the peak is, what matters most and how far the results scatter, or the range of
+        the main measure; in brackets, what qualifies it: cases without a result, unsettled or over the tolerance.
+        """
+        text = joined(self._answer_parts())
+        misses = self.said.misses if self.missed else ""
+        notes = joined([note for note in (self.said.left, misses, self.said.ends) if note])
+        if not text or not notes:
+            return text or notes or self.said.misses
+        first = notes[0].lower() if notes[1].islower() else notes[0]
+        return f"{text.rstrip('.')} ({first}{notes[1:].rstrip('.')})."
+
+    def _answer_parts(self) -> list:
+        """Return the sentences of which the answer is made."""
+        said = self.said
+        drawn = [one for one in (said.rank, said.scatter) if one]
+        over_key = said.limit or said.peak
+        if self.asked == "peak_frequency" and said.peak and not drawn:
+            first = [said.peak]
+        elif self.asked and (drawn or said.span):
+            first = drawn or [said.span]
+        elif over_key:
+            first = [over_key]
+        else:
+            first = drawn or [said.span]
+        return [one for one in (said.unsettled, *first) if one]
 
 
 def lead_of(table: dict) -> Lead:
-    """The Lead of a sweep; table: as `sweep.page` takes it."""
+    """Find what a sweep says first; table: as `sweep.page` takes it."""
     measures, tolerance = table["measures"], table.get("tolerance", np.nan)
-    keys = [one | {"words": not any(NUMBER.match(str(text)) for text in one["texts"])} for one in table["keys"]]
+    values = columns(table)
     outcome = np.asarray(table["outcome"], str)
     settled = np.isin(outcome, SETTLED)
-    trusted = {name: ~missed.over(one, tolerance) & (settled | name.endswith("_steady")
-                                                     | ~np.isfinite(one["values"])[settled].any())
-               for name, one in measures.items()}
-    found = Limits()
+    trusted = {name: _trusted(name, one, tolerance, settled) for name, one in measures.items()}
+    keys = [key | {"words": not any(NUMBER.match(str(text)) for text in key["texts"])} for key in table["keys"]]
+    key_limits = Limits()
     if not table.get("drawn"):
-        found = limits.limits_of_sweep(keys, columns(table), trusted, table["grid"], table.get("patch"))
-    if found.key is not None:
-        keys = [found.key if key["name"] == found.key["name"] else key for key in keys]
+        key_limits = limits.limits_of_sweep(keys, values, trusted, table["grid"], table.get("patch"))
+    if key_limits.key is not None:  # one unit for its values in all sentences
+        keys = [key_limits.key if key["name"] == key_limits.key["name"] else key for key in keys]
 
     def where(case: int) -> str:
-        return ", ".join(f"{one['name']} {brief(str(one['texts'][case]))}"
-                         for one in keys if varies(one) or len(keys) == 1)
+        return ", ".join(f"{key['name']} {brief(str(key['texts'][case]))}"
+                         for key in keys if varies(key) or len(keys) == 1)
 
-    tops = peaks.found(keys, columns(table), trusted, table["grid"])
-    ranks = ranked.told(table, trusted, settled)
-    held = {name: missed.by_floor(one, tolerance) for name, one in measures.items()}
-    floors = {name: (cases, missed.floor_of(measures[name], cases)) for name, cases in held.items() if cases.any()}
-    ran = span(columns(table), trusted, settled, ranked.asked_first(FIRST, table), floors)
-    far = _unsettled(columns(table), outcome)
-    return Lead(
-        missed=missed.counted(measures, tolerance),
-        misses=missed.sentence(measures, tolerance, where, table.get("first", "")),
-        limits=found, limit=limits.sentence(found),
-        span=joined([one for one in (far if table.get("drawn") else "", ran) if one]),
-        ranks=ranks[0], rank=ranks[1], spread=ranks[2], scatter=ranks[3],
-        peaks=tops, peak=peaks.sentence(tops),
-        left=_left(table, outcome, ranks[1] == ranked.too_few(table, settled)),
-        asked=table.get("first", ""), ends=_peaks_at_ends(table),
-        unsettled="" if table.get("drawn") else far)
+    found_peaks = peaks.found(keys, values, trusted, table["grid"])
+    ranks, rank, quantiles, scatter = ranked.told(table, trusted, settled)
+    span_of_measure = span(values, trusted, settled, ranked.asked_first(FIRST, table), _floors(measures, tolerance))
+    unsettled = _unsettled(values, outcome)
+    asked = table.get("first", "")
+    said = Sentences(
+        limit=limits.sentence(key_limits),
+        peak=peaks.sentence(found_peaks),
+        rank=rank,
+        scatter=scatter,
+        span=span_of_measure,
+        misses=missed.sentence(measures, tolerance, where, asked),
+        left=_left(table, outcome, rank == ranked.too_few(table, settled)),
+        ends=_peaks_at_ends(table),
+        unsettled=unsettled,
+    )
+    if table.get("drawn"):
+        said = said._replace(span=joined([one for one in (unsettled, span_of_measure) if one]), unsettled="")
+    return Lead(said, missed.counted(measures, tolerance), key_limits, ranks, quantiles, found_peaks, asked)
+
+
+def _trusted(name: str, measure: dict, tolerance, settled: np.ndarray) -> np.ndarray:
+    """Check whether each case meets the tolerance and settled, where any settled case has the measure."""
+    needs_no_settling = name.endswith("_steady") or not np.isfinite(measure["values"])[settled].any()
+    return ~missed.over(measure, tolerance) & (settled | needs_no_settling)
+
+
+def _floors(measures: dict, tolerance) -> dict:
+    """Return {measure: (cases that meet the tolerance by its floor alone, the floor as people read it)}."""
+    by_floor = {name: missed.by_floor(one, tolerance) for name, one in measures.items()}
+    return {name: (cases, missed.floor_of(measures[name], cases)) for name, cases in by_floor.items() if cases.any()}
 
 
 def _unsettled(measures: dict, outcome: np.ndarray) -> str:

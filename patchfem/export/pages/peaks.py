@@ -20,38 +20,69 @@ OPEN = "not resolved by these cases"
 KNOWN = 0.01  # of a steady estimate, up to which it tells the height of a peak
 
 
+class Estimate(NamedTuple):
+    """A value and its error, NaN where it is not known."""
+
+    value: float
+    error: float
+
+    def is_known(self) -> bool:
+        """Check whether there is a value."""
+        return bool(np.isfinite(self.value))
+
+
+UNKNOWN = Estimate(np.nan, np.nan)
+
+
+class SweptPeak(NamedTuple):
+    """The peak along one line of cases.
+
+    Attributes
+    ----------
+    frequency : Estimate
+        [Hz]; unknown if the cases next to the largest value do not count.
+    case_spacing : float
+        Distance to the next cases [Hz].
+    height : Estimate
+        In SI.
+    half_power_width : Estimate
+        [Hz]; unknown if a side stays above peak/sqrt(2), or falls too fast for these cases.
+    falls_unresolved : bool
+        Whether the curve falls to peak/sqrt(2) on both sides, but so fast that the cases do not show its width.
+    """
+
+    frequency: Estimate
+    case_spacing: float
+    height: Estimate
+    half_power_width: Estimate
+    falls_unresolved: bool
+
+
 class Peak(NamedTuple):
-    """The peak along one line of cases: name of the measure; what the other keys are; frequency [Hz], its distance to
-    the next cases [Hz], height [SI], half-power width [Hz], NaN where a side stays above it, each with its error, NaN
-    where cases beside the largest do not count; unit of the height; open: the curve falls to
-    peak/sqrt2 on both sides, but so fast that the cases do not tell its width."""
+    """A peak with the name and the SI unit of its measure, and the values of the other keys as text."""
 
     name: str
     held: str
-    frequency: tuple
-    between: float
-    height: tuple
-    width: tuple
     unit: str
-    open: bool = False
+    swept: SweptPeak
 
 
 def found(keys: list, measures: dict, trusted: dict, grid: bool) -> list:
-    """The Peak of each line of cases over a swept frequency, none without one; arguments as of `allowed.allowed`."""
+    """Find the peak of each line of cases over a swept frequency; arguments as of `limits.limits_of_sweep`."""
     key = next((one for one in keys if one["name"] in KEYS and not one["words"]), None)
     name = next((one for one in HEIGHTS if one in measures), None)
     if key is None or name is None or (len(keys) > 1 and not grid):
         return []
     others = [one for one in keys if one is not key and varies(one)]
     shown = {one["name"]: str if one["words"] else shown_of(one) for one in others}
-    out, (height, error) = [], _heights(name, measures, trusted)
+    height, error = _heights(name, measures, trusted)
+    out = []
     for line in lines_of(key, others):
-        peak = _peak(np.asarray(key["values"], float)[line], height[line], error[line])
-        if peak is not None:
+        swept = _swept_peak(np.asarray(key["values"], float)[line], height[line], error[line])
+        if swept is not None:
             held = ", ".join(f"{one['name']} {one['texts'][line[0]] if one['words'] else shown[one['name']](line[0])}"
                              for one in others)
-            *known, falls = peak
-            out.append(Peak(name, held, *known, measures[name][2], falls))
+            out.append(Peak(name, held, measures[name][2], swept))
     return out
 
 
@@ -67,40 +98,49 @@ def _heights(name: str, measures: dict, trusted: dict) -> tuple:
             np.where(trusted[name], error, np.asarray(steady[1], float)))
 
 
-def _peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) -> tuple | None:
-    """((frequency, its error), distance of the cases there, (height, its error), (half-power width, its error), whether
-    the cases fall that far on both sides, though they do not tell it) of the largest value inside the range, NaN where
-    a case beside it has none, None where it stands at an end.
+def _swept_peak(frequency: np.ndarray, height: np.ndarray, error: np.ndarray) -> SweptPeak | None:
+    """Locate the peak of a response curve; None if its largest value stands at an end of the range.
 
-    By the parabola of 1/y^2 over f^2 through it and its neighbours, which one mode has. What polynomials through more
-    cases, or those on one side, tell otherwise is its error, beside that of the cases.
+    The peak is that of the parabola of 1/y^2 over f^2, exact for a single mode, through the largest value and its
+    neighbours. Its error combines those of the cases with the differences from polynomials through more cases.
     """
-    there = np.isfinite(height) & (height > 0)
-    x, y = frequency[there], height[there]
+    known = np.isfinite(height) & (height > 0)
+    x, y = frequency[known], height[known]
     top = int(np.argmax(y)) if y.size >= LEAST else 0
     if not 0 < top < y.size - 1:
         return None
-    nowhere = (np.nan, np.nan)
-    if not there[np.flatnonzero(there)[top] + np.array([-1, 1])].all():
-        return nowhere, np.nan, nowhere, nowhere, False
-    between, off = float(x[top + 1] - x[top - 1]) / 2, float(np.nanmax(error[there][top - 1:top + 2]) / y[top])
-    square, g = x**2 - x[top]**2, (y[top] / y)**2
+    if not known[np.flatnonzero(known)[top] + np.array([-1, 1])].all():
+        return SweptPeak(UNKNOWN, np.nan, UNKNOWN, UNKNOWN, False)
+    spacing = float(x[top + 1] - x[top - 1]) / 2
+    case_error = float(np.nanmax(error[known][top - 1:top + 2]) / y[top])
+    square = x**2 - x[top]**2
+    g = (y[top] / y)**2
     at, least = _lowest(square, g, top, top - 1, top + 2) or (0.0, 1.0)
-    others = [_lowest(square, g, top, low, high) for low, high in
-              ((top - 2, top + 2), (top - 1, top + 3), (top - 2, top + 3)) if low >= 0 and high <= y.size]
-    places = np.sqrt(x[top]**2 + np.array([at, *(one[0] for one in others if one)]))
-    heights = y[top] * np.array([least, *(one[1] for one in others if one)])**-0.5
-    lost = len(places) < len(others) + 1 or not others  # one has no top here
-    place, high = float(places[0]), float(heights[0])
-    apart = SURE * float(np.ptp(heights)) + (high * (1 - (y[top - 1:top + 2] / high).min()) if lost else 0.0)
-    ends = [_crossing(square[top::step], g[top::step], x[top], (y[top] / high)**2) for step in (-1, 1)]
-    width, deep = float(ends[1][0] - ends[0][0]), frequency[height <= high / 2**0.5]
-    falls = bool(np.isnan(width) and deep.size and deep.min() < x[top] < deep.max())
-    slack = off + apart / high  # of the height: a crossing moves by as much of the width on each side
-    wide = (width, ends[0][1] + ends[1][1] + 2 * width * slack)
-    moved = SURE * float(np.ptp(places)) + (between if lost else 0.0)
-    moved += slack * (width if np.isfinite(width) else between)
-    return (place, moved), between, (high, apart + off * high), wide, falls
+    windows = ((top - 2, top + 2), (top - 1, top + 3), (top - 2, top + 3))
+    others = [_lowest(square, g, top, low, high) for low, high in windows if low >= 0 and high <= y.size]
+    agreeing = [one for one in others if one]
+    places = np.sqrt(x[top]**2 + np.array([at, *(place for place, _ in agreeing)]))
+    heights = y[top] * np.array([least, *(value for _, value in agreeing)])**-0.5
+    unchecked = len(agreeing) < len(others) or not others  # a polynomial through more cases has no peak here
+    peak = float(heights[0])
+    height_error = SURE * float(np.ptp(heights))
+    frequency_error = SURE * float(np.ptp(places))
+    if unchecked:
+        height_error += peak * (1 - (y[top - 1:top + 2] / peak).min())
+        frequency_error += spacing
+    below, above = (_crossing(square[top::step], g[top::step], x[top], (y[top] / peak)**2) for step in (-1, 1))
+    width = float(above.value - below.value)
+    fallen = frequency[height <= peak / 2**0.5]
+    falls = bool(np.isnan(width) and fallen.size and fallen.min() < x[top] < fallen.max())
+    slack = case_error + height_error / peak  # a crossing moves by this fraction of the width on each side
+    frequency_error += slack * (width if np.isfinite(width) else spacing)
+    return SweptPeak(
+        frequency=Estimate(float(places[0]), frequency_error),
+        case_spacing=spacing,
+        height=Estimate(peak, height_error + case_error * peak),
+        half_power_width=Estimate(width, below.error + above.error + 2 * width * slack),
+        falls_unresolved=falls,
+    )
 
 
 def _lowest(square: np.ndarray, g: np.ndarray, top: int, low: int, high: int) -> tuple | None:
@@ -114,12 +154,14 @@ def _lowest(square: np.ndarray, g: np.ndarray, top: int, low: int, high: int) ->
     return (at, float(line(at))) if inside else None
 
 
-def _crossing(square: np.ndarray, g: np.ndarray, top: float, least: float) -> tuple:
-    """(frequency where 1/y^2 first rises to twice its least, its error): by parabolas through the interval and a
-    case on either side of it, which differ by the error; NaN where it stays below."""
+def _crossing(square: np.ndarray, g: np.ndarray, top: float, least: float) -> Estimate:
+    """Find the frequency at which 1/y^2 first rises to twice its least; unknown where it stays below.
+
+    By parabolas through the interval and a case on either side of it, which differ by the error.
+    """
     above = np.flatnonzero(g >= 2 * least)
     if not above.size or above[0] == 0:
-        return np.nan, np.nan
+        return UNKNOWN
     k, level, found = above[0], 2 * least, []
     line = square[k - 1] + (level - g[k - 1]) / (g[k] - g[k - 1]) * (square[k] - square[k - 1])
     for part in (slice(max(k - 2, 0), k + 1), slice(k - 1, k + 2)):
@@ -129,12 +171,12 @@ def _crossing(square: np.ndarray, g: np.ndarray, top: float, least: float) -> tu
                 at -= curve(at) / curve.deriv()(at)
             found += [at] if (at - square[k - 1]) * (at - square[k]) <= 0 else []
     at = np.sqrt(np.array([*found, line] if len(found) < 2 else found) + top**2)
-    return float(at[0]), SURE * float(np.ptp(at))
+    return Estimate(float(at[0]), SURE * float(np.ptp(at)))
 
 
 def sentence(peaks: list) -> str:
     """Where the peak is, or from where to where it moves; "" without one."""
-    known, lost = ([one for one in peaks if np.isfinite(one.height[0]) == there] for there in (True, False))
+    known, lost = ([one for one in peaks if one.swept.height.is_known() == there] for there in (True, False))
     return "; ".join(said for said in (_known(known).rstrip("." if lost else ""), _lost(lost, bool(known))) if said)
 
 
@@ -161,29 +203,24 @@ def _known(peaks: list) -> str:
 
 
 def _at(one: Peak) -> str:
-    return f"{told(*one.frequency, unit='Hz')} (cases lie {plain(one.between, 2)} Hz apart)"
+    return f"{told(*one.swept.frequency, unit='Hz')} (cases lie {plain(one.swept.case_spacing, 2)} Hz apart)"
 
 
 def _high(one: Peak) -> str:
-    return told(*one.height, zero_below(one.name), one.unit)
+    return told(*one.swept.height, zero_below(one.name), one.unit)
 
 
 def _width(one: Peak) -> str:
-    if np.isfinite(one.width[0]):
-        return f", half-power width {told(*one.width, unit='Hz')}"
-    return f", half-power width {OPEN}" if one.open else ""
+    if one.swept.half_power_width.is_known():
+        return f", half-power width {told(*one.swept.half_power_width, unit='Hz')}"
+    return f", half-power width {OPEN}" if one.swept.falls_unresolved else ""
 
 
 def table(peaks: list) -> str:
     """The peaks as a table; "" without any."""
     if not peaks:
         return ""
-    cells_of = [(told(*one.frequency, unit="Hz"), _high(one)) if np.isfinite(one.height[0]) else ("not known",) * 2
-            for one in peaks]
-    rows = [[escape(one.held), *cells, told(*one.width, unit="Hz") if np.isfinite(one.width[0]) else
-             f"{OPEN}; add cases near {plain(one.frequency[0], 4)} Hz" if one.open else
-             "reaches beyond the swept frequencies" if np.isfinite(one.height[0]) else "&ndash;"]
-            for one, cells in zip(peaks, cells_of)]
+    rows = [[escape(one.held), *_cells(one)] for one in peaks]
     return (f"<p class=soft>The largest {linked(label(peaks[0].name), peaks[0].name)} of each curve is found from a "
             "parabola of 1/y&sup2; against f&sup2; through the case with the largest value and its two neighbours in "
             "frequency. The stated errors combine the errors of these cases with the differences between this parabola "
@@ -192,3 +229,17 @@ def table(peaks: list) -> str:
             "left out. A half-power width is given if the curve falls to its peak/&radic;2 on both sides within the "
             "swept range.</p>"
             + document.table(("case", ">at", ">height", ">half-power width"), rows, "wide"))
+
+
+def _cells(peak: Peak) -> list:
+    """Return the texts of frequency, height and half-power width."""
+    swept = peak.swept
+    if not swept.height.is_known():
+        return ["not known", "not known", "&ndash;"]
+    if swept.half_power_width.is_known():
+        width = told(*swept.half_power_width, unit="Hz")
+    elif swept.falls_unresolved:
+        width = f"{OPEN}; add cases near {plain(swept.frequency.value, 4)} Hz"
+    else:
+        width = "reaches beyond the swept frequencies"
+    return [told(*swept.frequency, unit="Hz"), _high(peak), width]

@@ -39,15 +39,15 @@ def test_exact_the_peak_and_width_of_a_resonance(damping):
         square = 1 - 2 * damping**2 + 2 * damping * np.sqrt(1 - damping**2) * np.array([1, -1])  # of f over the centre
         truth = centre * np.sqrt(1 - 2 * damping**2), 1e-6 / (2 * damping * np.sqrt(1 - damping**2)), \
             -np.diff(centre * np.sqrt(square))[0]
-        for (value, error), true in zip((one.frequency, one.height, one.width), truth):
+        for (value, error), true in zip((one.swept.frequency, one.swept.height, one.swept.half_power_width), truth):
             assert abs(value - true) <= error + 1e-9 * true and error < 1e-6 * true
     said = peaks.sentence(found)
     assert "with drive.acceleration 1 g" in said and "with drive.acceleration 2 g" in said
     assert "(cases lie 0.25 Hz apart)" in said
     some = np.where(np.abs(np.tile(x, 2) - 99.6) < 0.4, np.nan, both)  # beside the first peak alone
     found = peaks.found(keys, {name: (some, 0 * both, "m")}, {name: np.ones(322, bool)}, True)
-    assert np.isnan(found[0].height[0])
-    assert found[1].frequency[0] == pytest.approx(95 * np.sqrt(1 - 2 * damping**2), abs=1e-3)
+    assert np.isnan(found[0].swept.height.value)
+    assert found[1].swept.frequency.value == pytest.approx(95 * np.sqrt(1 - 2 * damping**2), abs=1e-3)
     assert "; where it peaks with drive.acceleration 1 g is not known" in peaks.sentence(found)
     assert "not known" in peaks.table(found) and peaks.sentence(found[:1]).startswith("Where relative displacement am")
 
@@ -60,13 +60,13 @@ def test_always_a_peak_at_an_end_is_none_and_a_side_that_stays_up_has_no_width()
     narrow = x[(x > 97) & (x < 130)]
     found, = peaks.found([key("drive.frequency", narrow)], {name: (curve(narrow, 100, 0.05), 0 * narrow, "m")},
                          {name: np.ones(narrow.size, bool)}, True)
-    assert np.isnan(found.width[0]) and "width" not in peaks.sentence([found])
+    assert np.isnan(found.swept.half_power_width.value) and "width" not in peaks.sentence([found])
     assert peaks.found([key("drive.frequency", x)], {}, {}, True) == []
     unsettled = {name: x < 90, f"{name}_steady": np.ones(41, bool)}  # by its steady estimate
     steady = {name: (np.where(x < 90, curve(x, 100, 0.05), 1.0), 0 * x, "m"),
               f"{name}_steady": (np.where(x < 90, np.nan, curve(x, 100, 0.05)), 0 * x, "m")}
     found, = peaks.found([key("drive.frequency", x)], steady, unsettled, True)
-    assert found.frequency[0] == pytest.approx(99.75, abs=0.02)
+    assert found.swept.frequency.value == pytest.approx(99.75, abs=0.02)
 
 
 @pytest.fixture(scope="module")
@@ -92,11 +92,11 @@ def test_always_drawn_cases_are_ranked_and_their_scatter_told(drawn):
     assert "Keys that matter most" in page and "Scatter of the answers" in page and "<svg viewBox" in page
     from patchfem.export.sweeps.page import read_table
 
-    again = lead_of(read_table(out))  # what `patchfem report` draws from the files
+    again = lead_of(read_table(out)).said  # what `patchfem report` draws from the files
     head, count, *_ = answer.out.splitlines()
     assert head == f"{again.rank.rstrip('.')}; {again.scatter}" == told["answer"] and count == "128 cases: 128 steady"
     loops = read_table(out)["measures"]["loop_area"]["values"]
-    low, _, high = again.spread["loop_area"][1]
+    low, _, high = lead_of(read_table(out)).spread["loop_area"][1]
     assert np.mean((loops >= low) & (loops <= high)) == pytest.approx(0.9, abs=0.02)
 
 
@@ -133,8 +133,8 @@ def test_always_a_sweep_of_which_no_case_has_settled_says_so_first(drawn):
     lead = lead_of(table | {"outcome": ["transient"] * (count - 2) + ["failed", ""]})
     assert lead.sentences()[0] == lead.answer() and lead.answer().endswith(
         f" (1 of {count} cases has no result yet and is left out; n{said}).")
-    assert "settled" not in lead.scatter and not any(said in one for one in lead.sentences()[1:])
-    assert lead_of(table | {"outcome": ["failed"] * count}).left == ""
+    assert "settled" not in lead.said.scatter and not any(said in one for one in lead.sentences()[1:])
+    assert lead_of(table | {"outcome": ["failed"] * count}).said.left == ""
 
 
 def test_static_cases_are_not_said_to_move():
@@ -205,9 +205,9 @@ def test_exact_too_few_settled_cases_are_no_ranking():
     assert lead.answer() == (
         "Only 1 of 64 cases settled (32 failed, 31 transient), so no ranking is possible; raise drive.cycles so that "
         "the transient cases settle and correct what the messages of the failed cases name.")
-    assert lead.span.startswith("31 of 64 cases did not settle; their relative displacement amplitude at the end of ")
-    assert "; relative displacement amplitude of the only settled case is " in lead.span
-    assert "throughout" not in lead.span and lead.span in lead.sentences()
+    assert lead.said.span.startswith("31 of 64 cases did not settle; their relative displacement amplitude at the end")
+    assert "; relative displacement amplitude of the only settled case is " in lead.said.span
+    assert "throughout" not in lead.said.span and lead.said.span in lead.sentences()
     table = table | {"outcome": ["failed"] * 32 + ["transient"] * 32}
     assert lead_of(table).answer().startswith("None of 64 cases settled (32 failed, 32 transient), so no ranking")
     table = table | {"outcome": ["failed"] * 40 + ["done"] * 24}
@@ -322,7 +322,7 @@ def test_exact_the_scatter_of_the_cases_that_settled_is_not_told_where_many_have
 
     lead, text = scatter(outcome)
     assert text.count("not known") == 4 and "34 of 100 cases do not count" in text and "curve" not in text
-    assert "34 of 100 cases did not settle; their relative displacement amplitude at the end of" in lead.span
+    assert "34 of 100 cases did not settle; their relative displacement amplitude at the end of" in lead.said.span
     lead, text = scatter(["steady"] * 100)
     assert "not known" not in text and "do not count" not in text
 

@@ -91,8 +91,8 @@ def test_exact_a_tolerance_that_only_the_floor_meets_is_told_with_the_floor():
     table = {"keys": [{"name": "slide.amplitude", "unit": "m", "values": np.array([1e-7, 1e-6]), "log": True,
                        "texts": ["0.1 um", "1 um"]}], "grid": True, "outcome": ["done"] * 2, "messages": {},
              "folders": None, "tolerance": 1e-3, "measures": {"loop_area": loop | {"means": ""}}}
-    assert lead_of(table).span == ("Loop area ranges from 0.16 nJ to 1 mJ, with errors of at most 0.01 % or 0.1 nJ, "
-                                   "the floor of this measure.")
+    assert lead_of(table).said.span == (
+        "Loop area ranges from 0.16 nJ to 1 mJ, with errors of at most 0.01 % or 0.1 nJ, the floor of this measure.")
 
 
 def test_exact_the_measure_that_is_asked_for_is_spoken_of_first():
