@@ -16,7 +16,7 @@ from ...surface.compare.compare import Comparison
 from ...surface.profile import Profile, even, level
 from ...surface.quantity import LEVEL
 from ...surface.roughness.spectrum import BAND
-from ...surface.scans.change import Change, hidden
+from ...surface.scans.change import Change, hidden_wear
 from ..pages.document import Section, document, figure, prose, table, warned
 from ..pages.words import pair
 from . import pictures
@@ -226,7 +226,7 @@ def _scans_data(change: Change) -> dict:
                 track[name] = {**quantity_data(quantity), "scatter": change.track.scatter.get(name)}
     return {
         "registration": registration,
-        "hidden_wear": quantity_data(hidden(change)),
+        "hidden_wear": quantity_data(hidden_wear(change)),
         "track": track,
         "removed": dict(zip(SIDES, change.removed)),
     }

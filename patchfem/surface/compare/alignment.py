@@ -7,12 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError, frozen_array
-from ..edges import sure_of
 from ..profile import Profile, runs_of
 from .errors import DrawnErrors, correlation_length, draw_errors, noise_along
 from .model import BENT, DATUM, MIN_HEIGHTS, RIGID, STRAIGHT, Parameter, TraceModel
 from .robust import MIN_UNWORN, REACH, find_floors, fit_biweight, solve_weighted
-from .section import find_end
+from .section import find_end, sure_of
 
 MAX_LOUDER = 1.5  # scale of a floor over that of the quietest one, beyond which it is no floor
 BEND_GAIN = 0.8  # a bend is taken out where the scale falls to this fraction or lower

@@ -10,7 +10,7 @@ from ..files.read import read_surface
 from ..profile import Profile, despiked, even
 from ..quantity import SIDE, Quantity, around, refused
 from ..roughness.spectrum import BAND
-from ..scans.change import Change, changed
+from ..scans.change import Change, compare_scans
 from .alignment import Alignment, align
 from .flanks import Flanks, flanks_of
 from .gain import find_gain
@@ -362,7 +362,7 @@ def _note_stretch(found: Alignment) -> list:
 def compared_scans(before: Areal, after: Areal, first: str = "x", keep_spikes: bool = False) -> list[Comparison]:
     """Compare two areal scans, place by place and by their waves in each direction: two `Comparison`, the first of
     which has the `Change`."""
-    flat, found = tuple(map(bridged, (before, after))), changed(before, after, keep_spikes)
+    flat, found = tuple(map(bridged, (before, after))), compare_scans(before, after, keep_spikes)
     notes = tuple(dict.fromkeys((*found.before.notes, *found.after.notes)))
     return [replace(_waves(before, after, flat, first), change=found, notes=notes, removed=found.removed),
             _waves(before, after, flat, "y" if first == "x" else "x")]

@@ -77,12 +77,16 @@ def trim(model, state, free, rounds: int = 12) -> np.ndarray:
     return state
 
 
-def fit_biweight(model, state, free, worn=None, rounds: int = 60) -> Fit:
-    """Fit by Tukey's biweight from a state; heights (n,) bool that are known as worn have no weight."""
+def fit_biweight(model, state, free, worn=None, rounds: int = 60, max_scale: float = np.inf) -> Fit:
+    """Fit by Tukey's biweight from a state.
+
+    Heights (n,) bool that are known as worn have no weight. The scale [m] of the weights is that of the
+    heights, at most `max_scale`.
+    """
     for _ in range(rounds):
         depth, jacobian = model.linearize(state)
         kept = np.ones(depth.size, bool) if worn is None else ~worn
-        scale = max(scale_about_zero(depth[kept]), model.least)
+        scale = max(min(scale_about_zero(depth[kept]), max_scale), model.least)
         weight = np.clip(1 - (depth / (BIWEIGHT * scale)) ** 2, 0, None) ** 2 * kept
         if (weight > 0).sum() < 12:
             break

@@ -10,21 +10,32 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import say
-from ..edges import sure_of
 from ..profile import runs_of
 from ..quantity import SIDE, Quantity, around, refused
+from .errors import block_length, correlation_length, draw_blocks, student_factor
 
-LIKELY = 1.5 * SIDE**2  # fall of twice the log-likelihood within which an end may lie; SIDE^2 for smooth models
+CHANCE = 1e-3  # fraction of traces in which noise alone is taken for worn
+N_LOOKS = 4  # means of 1, 4, 16 and 64 neighbours that each height is looked at by
+LIKELY = (
+    1.5 * SIDE**2
+)  # fall of twice the log-likelihood within which an end may lie; SIDE^2 for smooth models
 MIN_REACH = 12  # samples of a flank to either side
 MAX_PLACES = 160  # places of an end that are tried
 MAX_OFF = 16.0  # squared standard deviations that an unworn height counts with at most: a speck is no wear
 ABOVE = 3.0  # standard deviations above the first trace from which a height is pile-up
+OFFSETS = (
+    1 / 3,
+    2 / 3,
+    1.0,
+)  # samples before the first worn depth at which a smooth flank leaves zero
 STEP_GAIN = 12.0  # fall of twice the log-likelihood from which a flank begins with a step
 N_FIFTHS = 5  # parts of a track, the deepest of which is its floor
 MIN_SHARE = 0.01  # of the lost area that a run of worn heights holds, to be an end of the worn part
 CUT = 5  # samples from the end of the common part within which a track may go on outside
 MIN_WORN = 0.85  # fraction of worn heights in a track; tops between unworn valleys are none
-MAX_GAP = 0.05  # unworn gap over the width of a track, up to which worn places beside it belong to it
+MAX_GAP = (
+    0.05  # unworn gap over the width of a track, up to which worn places beside it belong to it
+)
 LONGEST_WAVES = 3.0  # longest waves of the band that a track is longer than
 
 _ONE_SIDE = "area above the first trace (before wear) within one track width"
@@ -74,9 +85,45 @@ class Section(NamedTuple):
         return float(weight @ self.depth), float(np.std(errors))
 
 
+def sure_of(count: int, looks: int = N_LOOKS) -> float:
+    """Return the deviations that normal noise exceeds in 1 of 1000 traces of so many heights (Bonferroni)."""
+    from scipy.special import ndtri
+
+    return float(-ndtri(CHANCE / max(count * looks, 1)))
+
+
+def section_of_depths(x, depth, outside) -> Section:
+    """Return the section of depths (n,) [m] at x (n,) [m], whose noise is that outside (n,) bool of a track."""
+    left = depth[outside] - np.median(depth[outside])
+    noise = max(1.4826 * float(np.median(np.abs(left))), 1e-300)
+    correlation = correlation_length(
+        np.where(outside, np.clip(depth, -4 * noise, 4 * noise), 0.0), outside
+    )
+    values = np.clip(left / noise, -4.0, 4.0)
+    length = block_length(correlation, values.size)
+    draws = noise * draw_blocks(values, length, depth.size) * student_factor(values.size / length)
+    return Section(x, depth, np.full(depth.size, noise), draws, correlation)
+
+
+class FlankEnd(NamedTuple):
+    """Where a flank begins in depths that run from outside into a track.
+
+    first, low, high: index of the first worn depth, and the range in which it lies at 95 %; offset:
+    distance in samples from that depth back to where the flank leaves zero, half a sample where it
+    begins with a step.
+    """
+
+    first: int
+    low: int
+    high: int
+    offset: float
+
+
 def widths_of(x) -> np.ndarray:
     """Return the part of the length (n,) [m] that each sample stands for."""
-    edges = np.concatenate([[1.5 * x[0] - x[1] / 2], (x[1:] + x[:-1]) / 2, [1.5 * x[-1] - x[-2] / 2]])
+    edges = np.concatenate(
+        [[1.5 * x[0] - x[1] / 2], (x[1:] + x[:-1]) / 2, [1.5 * x[-1] - x[-2] / 2]]
+    )
     return np.diff(edges)
 
 
@@ -93,14 +140,16 @@ def worn_heights(section: Section) -> np.ndarray:
     for many in (4, 16, 64):
         if many > relative.size // 4:
             break
-        left = np.clip(np.where(worn, 0.0, relative), -8, 8)  # deep heights would lift the means beside them
+        left = np.clip(
+            np.where(worn, 0.0, relative), -8, 8
+        )  # deep heights would lift the means beside them
         mean = np.convolve(left, np.full(many, 1 / many), "valid")
         for k in np.flatnonzero(mean > sure * np.sqrt(section.correlation / many)):
             worn[k + many // 4 : k + many - many // 4] = True
     return worn
 
 
-def find_end(depth, noise, correlation: float, worn: int) -> tuple:
+def find_end(depth, noise, correlation: float, worn: int) -> FlankEnd:
     """Find where a flank begins in depths that run from outside into a track.
 
     Before the end, depths are noise about zero, or pile-up above the first surface. Behind it they
@@ -115,11 +164,6 @@ def find_end(depth, noise, correlation: float, worn: int) -> tuple:
         Number of neighbouring depths that err alike.
     worn : int
         First sample that is known as worn.
-
-    Returns
-    -------
-    end, low, high : int
-        First worn sample, and the range in which it lies at 95 %.
     """
     deep = np.flatnonzero(depth[worn:] > 10 * noise[worn:])
     reach = max(int(deep[0]) if deep.size else depth.size - worn, MIN_REACH)
@@ -131,37 +175,42 @@ def find_end(depth, noise, correlation: float, worn: int) -> tuple:
     sure = np.flatnonzero(part[worn - low :] > sure_of(depth.size) * sigma[worn - low :])
     last = max(min(part.size - 4, worn - low + (int(sure[0]) if sure.size else reach // 2)), 0)
     places = np.unique(np.linspace(0, last, min(last + 1, MAX_PLACES)).astype(int))
-    costs = np.empty((2, places.size))
+    costs = np.empty((len(OFFSETS) + 1, places.size))
     for at, k in enumerate(places):
         costs[:, at] = outside[k] + _flank_costs(part[k:], sigma[k:])
     costs /= max(correlation, 1.0)
-    costs = costs[int(costs[1].min() < costs[0].min() - STEP_GAIN)]
+    shape = int(np.argmin(costs[:-1].min(axis=1)))
+    is_step = bool(costs[-1].min() < costs[shape].min() - STEP_GAIN)
+    offset = 0.5 if is_step else OFFSETS[shape]
+    costs = costs[-1 if is_step else shape]
     near = places[costs <= costs.min() + LIKELY]
     best = int(places[int(np.argmin(costs))])
     gap = int(places[1] - places[0]) if places.size > 1 else 1
-    return low + best, max(low + int(near[0]) - gap, 0), min(low + int(near[-1]) + gap, depth.size - 1)
+    last = min(low + int(near[-1]) + gap, depth.size - 1)
+    return FlankEnd(low + best, max(low + int(near[0]) - gap, 0), last, offset)
 
 
 def _flank_costs(flank, sigma) -> np.ndarray:
-    """Twice the negative log-likelihood (2,) of a flank that begins at zero, and of a flank with a step."""
-    t = np.arange(1, flank.size + 1) / flank.size
-    smooth = np.column_stack([t, t * t]) / sigma[:, None]
-    step = np.column_stack([1 / sigma, smooth])
-    values = flank / sigma
-    costs = []
-    for base in (smooth, step):
-        shape = np.linalg.lstsq(base, values, rcond=None)[0]
-        if base is smooth and shape[0] < 0:  # the flank would rise out of the surface first
-            only = base[:, 1]
-            shape = np.array([0.0, max(float(only @ values) / float(only @ only), 0.0)])
-        if base is step and shape[0] < 0:  # a step up is pile-up, where no track begins
-            costs.append(costs[0])
-            continue
-        left = float(((values - base @ shape) ** 2).sum())
-        mean = left / t.size
-        scatter = left if mean <= 1 else t.size * (1 + np.log(mean))
-        costs.append(scatter + 2 * float(np.log(sigma).sum()))
-    return np.array(costs)
+    """Return twice the negative log-likelihood of flanks that leave zero at each of OFFSETS, and of one with a step."""
+    weighted = flank / sigma
+    places = np.arange(flank.size)
+    left = []
+    for offset in OFFSETS:
+        t = (places + offset) / flank.size
+        base = np.column_stack([t, t * t]) / sigma[:, None]
+        shape = np.linalg.solve(base.T @ base, base.T @ weighted)
+        if shape[0] < 0:  # the flank would rise out of the surface first
+            curved = base[:, 1]
+            shape = np.array([0.0, max(float(curved @ weighted) / float(curved @ curved), 0.0)])
+        left.append(float(((weighted - base @ shape) ** 2).sum()))
+    base = np.column_stack([1 / sigma, base])
+    shape = np.linalg.lstsq(base, weighted, rcond=None)[0]
+    is_down = shape[0] >= 0  # a step up is pile-up, where no track begins
+    left.append(float(((weighted - base @ shape) ** 2).sum()) if is_down else left[-1])
+    left = np.array(left)
+    mean = left / flank.size
+    scatter = np.where(mean <= 1, left, flank.size * (1 + np.log(np.maximum(mean, 1.0))))
+    return scatter + 2 * float(np.log(sigma).sum())
 
 
 def find_tracks(section: Section, worn, longest: float) -> list:
@@ -179,7 +228,9 @@ def find_tracks(section: Section, worn, longest: float) -> list:
         while low > 0 and first - runs[low - 1][1] <= max(MAX_GAP * (last - first), CUT):
             low -= 1
             first = runs[low][0]
-        while high < len(runs) - 1 and runs[high + 1][0] - last <= max(MAX_GAP * (last - first), CUT):
+        while high < len(runs) - 1 and runs[high + 1][0] - last <= max(
+            MAX_GAP * (last - first), CUT
+        ):
             high += 1
             last = runs[high][1]
         runs = runs[:low] + runs[high + 1 :]
@@ -198,14 +249,19 @@ def find_ends(section: Section, span: tuple, free: tuple) -> tuple:
     first, last = max(span[0], low), min(span[1], high - 1)
     centre = (first + last) // 2
     out, cut = [], []
-    sides = ((slice(low, centre + 1), first - low, "from"), (slice(centre, high), high - 1 - last, "to"))
+    sides = (
+        (slice(low, centre + 1), first - low, "from"),
+        (slice(centre, high), high - 1 - last, "to"),
+    )
     for side, outside, name in sides:
         turn = slice(None, None, 1 if name == "from" else -1)
         places = x[side][turn]
-        at = find_end(section.depth[side][turn], section.noise[side][turn], section.correlation, outside)
-        half = (places[0] - places[1]) / 2  # an end lies between the last unworn sample and the first worn one
-        value, *limits = (float(places[k] + half) for k in at)
-        cut.append(at[0] < CUT and outside == (first if name == "from" else x.size - 1 - last))
+        at = find_end(
+            section.depth[side][turn], section.noise[side][turn], section.correlation, outside
+        )
+        back = (places[0] - places[1]) * at.offset
+        value, *limits = (float(places[k] + back) for k in at[:3])
+        cut.append(at.first < CUT and outside == (first if name == "from" else x.size - 1 - last))
         out.append(Quantity(value, min(limits), max(limits), "m", TEXTS[name]))
     return (*out, tuple(cut))
 
@@ -225,7 +281,9 @@ def measure_track(section: Section, span: tuple, free: tuple) -> dict:
     x = section.x
     width = max(end.value - start.value, 1e-300)
     area, error = section.total((x > start.value) & (x < end.value))
-    beside = [section.total((x >= one.low) & (x <= one.high))[0] / (2 * SIDE) for one in (start, end)]
+    beside = [
+        section.total((x >= one.low) & (x <= one.high))[0] / (2 * SIDE) for one in (start, end)
+    ]
     error = float(np.sqrt(error**2 + beside[0] ** 2 + beside[1] ** 2))
     width_error = float(np.hypot(start.high - start.low, end.high - end.low)) / (2 * SIDE)
     depth = area / width
@@ -235,7 +293,10 @@ def measure_track(section: Section, span: tuple, free: tuple) -> dict:
     left = _measure_pile_up(section, (start.value - width, start.value), "pile_up_left")
     right = _measure_pile_up(section, (end.value, end.value + width), "pile_up_right")
     piled = left.value + right.value
-    piled_error = float(np.hypot(*(max(one.high - one.value, one.value - one.low) for one in (left, right)))) / SIDE
+    piled_error = (
+        float(np.hypot(*(max(one.high - one.value, one.value - one.low) for one in (left, right))))
+        / SIDE
+    )
     mean_error = float(np.hypot(error / width, depth * width_error / width))
     values = {
         "from": start,
@@ -244,7 +305,9 @@ def measure_track(section: Section, span: tuple, free: tuple) -> dict:
         "depth_mean": around(depth, mean_error, "m", TEXTS["depth_mean"], 0.0),
         "depth_floor": _measure_floor(section, start.value, width),
         "step": around(step / third_length, step_error / third_length, "m", TEXTS["step"], 0.0),
-        "area_net": around(area - piled, float(np.hypot(error, piled_error)), "m2", TEXTS["area_net"]),
+        "area_net": around(
+            area - piled, float(np.hypot(error, piled_error)), "m2", TEXTS["area_net"]
+        ),
         "area_gross": around(area, error, "m2", TEXTS["area_gross"], 0.0),
         "pile_up": around(piled, piled_error, "m2", TEXTS["pile_up"], 0.0),
         "pile_up_left": left,
@@ -259,7 +322,10 @@ def _refuse_cut(values: dict, x, cut: tuple) -> dict:
     why = f"the track reaches the end of the common part of the traces at {where} and may be longer"
     gone = {"from": cut[0], "to": cut[1], "step": True, "area_net": True, "pile_up": True}
     gone |= {"pile_up_left": cut[0], "pile_up_right": cut[1]}
-    out = {name: refused(one.unit, one.text, why) if gone.get(name) else one for name, one in values.items()}
+    out = {
+        name: refused(one.unit, one.text, why) if gone.get(name) else one
+        for name, one in values.items()
+    }
     for name in ("width", "area_gross"):
         out[name] = out[name]._replace(high=None, text=f"{out[name].text}, at least: {why}")
     for name in ("depth_mean", "depth_floor"):
@@ -302,11 +368,15 @@ def _measure_floor(section: Section, start: float, width: float) -> Quantity:
     near = means.max() - 2 * noise * np.sqrt(section.correlation / parts[0].size)
     kept = [part for part, mean in zip(parts, means) if mean >= near]
     found = [_vertex(section.depth[part]) for part in kept]
-    errors = np.mean([section.draws[:, part] @ pull for part, (_, pull, _) in zip(kept, found)], axis=0)
+    errors = np.mean(
+        [section.draws[:, part] @ pull for part, (_, pull, _) in zip(kept, found)], axis=0
+    )
     rough = max(float(np.mean([left for *_, left in found])) ** 2 - noise**2, 0.0)
     alike = min(9.0 * section.correlation / kept[0].size, 1.0)
     value = float(np.mean([top for top, *_ in found]))
-    return around(value, float(np.sqrt(np.var(errors) + rough * alike)), "m", TEXTS["depth_floor"], 0.0)
+    return around(
+        value, float(np.sqrt(np.var(errors) + rough * alike)), "m", TEXTS["depth_floor"], 0.0
+    )
 
 
 def _vertex(values) -> tuple:

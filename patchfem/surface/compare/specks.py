@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 
 from ...core import frozen_array, say
-from ..edges import sure_of
 from ..profile import Profile, runs_of
 from .alignment import Alignment
+from .section import sure_of
 
 N_AROUND = 101  # samples whose jumps tell the roughness around a speck
 MEDIAN, WIDEST = 41, 12  # samples of the running median, and of the widest speck at half of its height

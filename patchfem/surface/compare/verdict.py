@@ -59,7 +59,7 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
         headline = f"{next(one.open for one in parts if one.open)}; {said}"
     if any(_gain(one, "") and word != "no change shown" for one, word in zip(parts, words)):
         headline += ", all heights by the same factor, as an error in the instrument's gain would do"
-    over = _over(parts) if parts[0].change is None else scans.over(parts[0].change)
+    over = _over(parts) if parts[0].change is None else scans.describe_variant(parts[0].change)
     headline = f"{headline}; {over}" if over else headline
     out = [] if parts[0].change is None else scans.sentences(parts[0].change)
     if areal and identical(parts[0].before, parts[0].after):

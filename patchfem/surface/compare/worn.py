@@ -177,7 +177,7 @@ def _outermost(section: Section, runs: list) -> tuple:
     for side, outer, inner in ((1, runs[0][0], runs[0][1]), (-1, last - runs[-1][1], last - runs[-1][0])):
         depth, noise, x = (one[::side][: inner + 1] for one in (section.depth, section.noise, section.x))
         at = find_end(depth, noise, section.correlation, outer)
-        places = [float(x[k]) for k in at]
+        places = [float(x[k]) for k in at[:3]]
         out.append(Quantity(places[0], min(places), max(places), "m", ""))
         cut.append(at[0] < CUT)
     return tuple(out), tuple(cut)

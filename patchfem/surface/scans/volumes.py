@@ -1,40 +1,42 @@
-"""Volumes, share and depths of what wore off and of what grew, from a map of depths.
-
-A height counts as worn where the mean of the depths around it stands above its scatter over the unworn heights, for
-squares of 1 to 32 heights: deep and narrow wear shows in the small ones, shallow and wide wear in the large ones.
-"""
+"""Volumes, fraction and depths of what wore off and of what grew, from a map of depths."""
 
 from typing import NamedTuple
 
 import numpy as np
 
+from ..compare.errors import N_DRAWS
 from ..quantity import SIDE, Quantity, around, refused
-from .registration import Laid
+from .alignment import ScanAlignment
+from .wear import mean_of_square, widen
 
-SQUARES = 1, 3, 5, 9, 17, 33  # heights along a side
-CLEAR = 5.0  # scatters above which a mean depth is worn: one of 3 million by chance
-ALONE = 1.6  # times as far must a single height lie, as noise is larger beside holes
-SHARE = 0.3  # of the mean depth of a square that the smaller ones inside it have, at least
-EDGE = 0.25  # of the height at its border, how well the volume of a worn part is known
-LEAK = 0.005  # of what wore, how well what grew is known, and the other way round: a shift makes both
-AWAY, ENOUGH = 0.15, 0.4  # of the shorter side that heights stand away from what changed; of the unworn ones, at least
-WALL = 0.5  # of the depth of a worn part beside it, how well a missing height at its border is known, all alike
-UNDER = 0.7  # of the slow errors of the scans beside a worn part, what they are in its mean
-TOGETHER = 3.0  # the noise of a volume over that of independent heights
-FEW = 0.25  # of a square, at least, is known
-WORN = {"worn_volume": "volume of material lost in the region that both scans show",
-        "grown_volume": "volume of material above the first scan (before wear), such as pile-up or deposits",
-        "worn_share": "worn area divided by the area of the region that both scans show",
-        "worn_depth_mean": "worn volume divided by the area of the region that both scans show",
-        "worn_depth_max": "largest worn depth, after taking the median of every 3 x 3 measured heights"}
-BOTH = "worn_volume", "grown_volume"
+FEET = 3  # heights beside what changed whose depths belong to it, as its feet are lower than noise
+WALL = 0.5  # of the depth beside it, by which a missing wall may be deeper or less deep, all walls alike
+BLUNT = 4.0  # standard deviations below the deepest height within which a height may be the deepest
+SEED = 1991
+TEXTS = {
+    "worn_volume": "volume of material lost in the region that both scans show",
+    "grown_volume": "volume of material above the first scan (before wear), such as pile-up or deposits",
+    "worn_share": "worn area divided by the area of the region that both scans show",
+    "worn_depth_mean": "worn volume divided by the area of the region that both scans show",
+    "worn_depth_max": "largest worn depth, after taking the median of every 3 x 3 measured heights",
+}
+UNITS = {
+    "worn_volume": "m3",
+    "grown_volume": "m3",
+    "worn_share": "1",
+    "worn_depth_mean": "m",
+    "worn_depth_max": "m",
+}
 
 
 class Volumes(NamedTuple):
-    """What `measured` found: values by the names of `WORN`; worn and grown (m, n): which heights; filled (m, n) [m]:
-    the depths, missing ones from their neighbours, NaN beyond the common region; error [m]: standard deviation of the
-    plane they count from, below the wear; open: whether something changed whichever part is the unworn one, and neither
-    wear nor growth in all cases."""
+    """Measures of a map of depths.
+
+    values: `Quantity` by the names of TEXTS; worn, grown: (m, n) bool arrays; filled (m, n) [m]: the
+    depths, missing ones from their neighbours, NaN beyond the common region; error [m]: standard
+    deviation of the mean depth of the worn part by the plane and slow errors; open: whether both of
+    two parts may be the unworn one, and neither wear nor growth shows in both cases.
+    """
 
     values: dict
     worn: np.ndarray
@@ -44,198 +46,167 @@ class Volumes(NamedTuple):
     open: bool = False
 
 
-def nothing(reason: str) -> dict:
-    """Values that are not known, and why."""
-    units = {"worn_volume": "m3", "grown_volume": "m3", "worn_share": "1"}
-    return {name: refused(units.get(name, "m"), text, reason) for name, text in WORN.items()}
+def no_values(reason: str) -> dict:
+    """Return the measures without values, and why."""
+    return {name: refused(UNITS[name], text, reason) for name, text in TEXTS.items()}
 
 
-def measured(found: Laid, x, y) -> Volumes:
-    """Measures of a map of depths at x (n,) and y (m,) [m].
+def measure_volumes(found: ScanAlignment, x, y) -> Volumes:
+    """Measure a map of depths at x (n,) and y (m,) [m].
 
-    Volumes are sums over the worn heights. Their standard deviation is that of the plane (`Laid.covariance`), of slow
-    errors of the scans and of the noise; what the heights that do not count as worn hold, above zero, widens the
-    interval; below zero, shallow wear has drawn the plane down, and it is raised to their mean there. So do missing
-    heights at the border of a worn part, of which all may be as deep as the part or none, as an instrument misses steep
-    walls. Where another part may be the unworn one, the interval reaches to what that gives.
+    Volumes are sums of the depths over the worn, or grown, heights and those beside them. Their
+    errors are those of the drawn fields (`errors`), and of steep walls, which instruments miss.
+    Where another part may be the unworn one, the intervals reach to what that gives.
     """
-    first = _measured(found, x, y)
+    first = _measure(found, x, y)
     if found.other is None:
         return first
-    second = measured(found.other, x, y)
-    both = {name: one._replace(low=min(one.low, second.values[name].low), high=max(one.high, second.values[name].high))
-            for name, one in first.values.items()}
-    shown = [any(each[name].low > 0 for name in BOTH) for each in (first.values, second.values, both)]
-    return first._replace(values=both, open=(second.open or shown[1]) and shown[0] and not shown[2])
+    second = _measure(found.other, x, y)
+    both = {}
+    for name, one in first.values.items():
+        other = second.values[name]
+        both[name] = one._replace(low=min(one.low, other.low), high=max(one.high, other.high))
+    shown = [
+        any(values[name].low > 0 for name in ("worn_volume", "grown_volume"))
+        for values in (first.values, second.values, both)
+    ]
+    return first._replace(values=both, open=shown[0] and shown[1] and not shown[2])
 
 
-def _measured(found: Laid, x, y) -> Volumes:
-    from scipy.ndimage import binary_erosion
-
-    place, cell, inside = _nearest(found.depth), _cells(x, y), found.region
-    depth = np.where(inside, found.depth[place], np.nan)
-    heights, area, values, hidden = np.where(inside, depth, 0.0), float(cell[inside].sum()), {}, {}
-    many = np.bincount(np.ravel_multi_index(place, cell.shape)[inside], minlength=cell.size).reshape(cell.shape)
-    squares = _squares(found)
-    worn, grown = (_beyond(squares, sign)[place] & inside for sign in (1.0, -1.0))
-    grown &= ~worn
-    rest, bent, away = inside & ~worn & ~grown, _bent(found, worn | grown), _away(found, worn | grown, x, y)
-    for name, mask, sign, beside in (("worn_volume", worn, 1.0, grown), ("grown_volume", grown, -1.0, worn)):
-        volume = float((sign * cell * heights)[mask].sum())
-        noise = found.noise * float(np.sqrt((cell[mask]**2 * many[place][mask]).sum())) * TOGETHER
-        edge = EDGE * float((cell * np.abs(heights))[mask & ~binary_erosion(mask)].sum())
-        slow = UNDER * bent * float(cell[mask].sum())
-        reach = SIDE * float(np.hypot(np.hypot(_of_plane(found, mask, cell, x, y), slow), noise)) + edge
-        walls, deep = _walls(found, mask)
-        reach += WALL * float((cell * deep)[walls].sum()) + LEAK * float((cell * np.abs(heights))[beside].sum())
-        left = sign * float((cell * heights)[rest].sum())
-        left = max(left, -left * (1 + float(cell[mask].sum()) / max(float(cell[rest].sum()), 1e-300)))
-        more = -sign * float(_pull(mask, cell, x, y) @ away)
-        values[name] = Quantity(max(volume, 0.0), max(volume - reach + min(more, 0.0), 0.0),
-                                max(volume + reach + left + max(more, 0.0), 0.0), "m3", WORN[name])
-        hidden[name] = WALL * float(cell[walls].sum()) / area
-    share = [float(cell[_beyond(squares, 1.0, *rule)[place] & inside].sum()) / area
-             for rule in ((CLEAR, 0.0), (2 * CLEAR, 0.0), (CLEAR, 2.0), (CLEAR / 1.8, 2.0))]
-    values["worn_share"] = Quantity((share[0] + share[2]) / 2, max(min(share) - hidden["worn_volume"], 0.0),
-                                    min(max(share) + hidden["worn_volume"], 1.0), "1", WORN["worn_share"])
+def _measure(found: ScanAlignment, x, y) -> Volumes:
+    inside = found.region
+    cell = np.where(inside, np.gradient(y)[:, None] * np.gradient(x)[None, :], 0.0)
+    area = float(cell.sum())
+    nearest = _nearest_known(found.depth)
+    filled = np.where(inside, found.depth[nearest], np.nan)
+    worn, grown = found.worn[nearest] & inside, found.grown[nearest] & inside
+    depth = np.where(inside, filled, 0.0)
+    walls = _doubt_of_walls(found, worn), _doubt_of_walls(found, grown)
+    values = {}
+    parts = (
+        ("worn_volume", worn, grown, 1.0, walls[0]),
+        ("grown_volume", grown, worn, -1.0, walls[1]),
+    )
+    for name, mask, other, sign, doubt in parts:
+        weight = sign * cell * (widen(mask, FEET) & ~other)
+        values[name] = _volume(found, weight, depth, float((cell * doubt).sum()), name)
+    values["worn_share"] = _share(found, cell, worn, walls[0] > 0)
     mean = (one / area for one in values["worn_volume"][:3])
-    values["worn_depth_mean"] = Quantity(*mean, "m", WORN["worn_depth_mean"])
+    values["worn_depth_mean"] = Quantity(*mean, "m", TEXTS["worn_depth_mean"])
     values["worn_depth_max"] = _largest(found, worn)
-    known = max(float(cell[worn].sum()), 1e-300)
-    error = float(np.hypot(_of_plane(found, worn, cell, x, y) / known, UNDER * bent)) if worn.any() else 0.0
-    return Volumes(values, worn, grown, depth, error)
+    error = 0.0
+    if worn.any():
+        error = float(np.std(found.errors.of_sum(np.where(worn, cell, 0.0), 0.0))) / float(
+            cell[worn].sum()
+        )
+    return Volumes(values, worn, grown, filled, error)
 
 
-def _cells(x, y) -> np.ndarray:
-    """Area [m2] that each place of a raster stands for (m, n)."""
-    return np.gradient(y)[:, None] * np.gradient(x)[None, :]
-
-
-def _nearest(depth) -> tuple:
-    """Rows and columns (m, n) of the known depth that is nearest to each place."""
+def _nearest_known(depth) -> tuple:
+    """Return rows and columns (m, n) of the known depth nearest to each place."""
     from scipy.ndimage import distance_transform_edt
 
-    return tuple(distance_transform_edt(~np.isfinite(depth), return_distances=False, return_indices=True))
+    return tuple(
+        distance_transform_edt(~np.isfinite(depth), return_distances=False, return_indices=True)
+    )
 
 
-def _walls(found: Laid, mask) -> tuple:
-    """Missing heights (m, n) about as far from a deep one in the mask as from one beside it, less than twice as far;
-    and the size [m] of the nearest deep one, above half of their median."""
+def _volume(found: ScanAlignment, weight, depth, doubt: float, name: str) -> Quantity:
+    """Sum weight (m, n) [m2] times depth [m], with its interval; doubt [m3]: of missing walls."""
+    volume = float((weight * depth).sum())
+    deviation = float(np.std(found.errors.of_sum(weight, found.noise)))
+    if not weight.any():
+        return Quantity(
+            0.0, 0.0, SIDE * found.noise * float(np.abs(weight).max(initial=0.0)), "m3", TEXTS[name]
+        )
+    reach = SIDE * deviation + doubt
+    return Quantity(
+        max(volume, 0.0), max(volume - reach, 0.0), max(volume + reach, 0.0), "m3", TEXTS[name]
+    )
+
+
+def _doubt_of_walls(found: ScanAlignment, changed) -> np.ndarray:
+    """Return by how much the depths (m, n) [m] of missing walls may differ from those of the nearest heights.
+
+    A wall is missing where a height that is unknown lies about as far from a deep height, or a high
+    one, as from one that did not change. It may be as deep as the deep one, or not deep at all.
+    """
     from scipy.ndimage import distance_transform_edt
 
     known = np.isfinite(found.depth)
     missing = found.region & ~known
-    if not missing.any() or not (mask & known).any() or not (known & ~mask).any():
-        return np.zeros(mask.shape, bool), np.zeros(mask.shape)
-    size = np.where(mask & known, np.abs(found.depth), 0.0)
-    near, place = distance_transform_edt(size <= 0.5 * np.median(size[size > 0]), return_indices=True)
-    far = distance_transform_edt(~(known & ~mask))
-    return missing & (near < 2 * far) & (far < 2 * near), size[tuple(place)]
+    if not missing.any() or not (changed & known).any() or not (known & ~changed).any():
+        return np.zeros(changed.shape)
+    size = np.where(changed & known, np.abs(found.depth), 0.0)
+    from_deep, place = distance_transform_edt(
+        size <= np.median(size[size > 0]) / 2, return_indices=True
+    )
+    from_unchanged = distance_transform_edt(~(known & ~changed))
+    is_wall = missing & (from_deep < 2 * from_unchanged) & (from_unchanged < 2 * from_deep)
+    return np.where(is_wall, WALL * size[tuple(place)], 0.0)
 
 
-def _means(depth, side: int, even: bool = True) -> np.ndarray:
-    """Mean of the known depths in the square around each place, NaN where few are known.
+def _share(found: ScanAlignment, cell, worn, walls) -> Quantity:
+    """Return the worn fraction of the common region.
 
-    even: times the root of the share that is known, so that its noise is the same everywhere.
+    The area above a threshold shrinks linearly with the threshold at the edge of round wear. The areas
+    above three and six standard deviations of the mean of 3 x 3 depths give that above none, which is
+    known to half of the distance, and to half a height around the worn part.
     """
-    from scipy.ndimage import uniform_filter
-
-    if side == 1:
-        return depth
-    known = np.isfinite(depth)
-    weight = np.maximum(uniform_filter(known.astype(float), side, mode="constant"), 1e-9)
-    mean = uniform_filter(np.where(known, depth, 0.0), side, mode="constant") / weight
-    return np.where(weight >= FEW, mean * (np.sqrt(weight) if even else 1.0), np.nan)
-
-
-def _scatter(means, used, side: int) -> float:
-    """Standard deviation of the means of squares that are unworn for the most part."""
-    from scipy.ndimage import uniform_filter
-
-    quiet = (uniform_filter(used.astype(float), side) > 0.5) if side > 1 else used
-    here = means[quiet & np.isfinite(means)]
-    if here.size < 50:
-        return np.inf
-    return 1.4826 * float(np.median(np.abs(here)))
+    area = float(cell.sum())
+    nearest = _nearest_known(found.depth)
+    mean, known = mean_of_square(found.depth, 3)
+    even = (mean * np.sqrt(known))[nearest]
+    quiet = found.used & ~widen(worn, FEET)
+    scatter = float(even[quiet].std()) if quiet.any() else found.noise / 3
+    near = widen(worn, FEET) & found.region
+    share, less = (float(cell[near & (even > k * scatter)].sum()) / area for k in (3.0, 6.0))
+    rim = float(cell[widen(worn, 1) & ~worn].sum()) / area
+    value = min(2 * share - less, 1.0)
+    reach = (value - share + rim) / 2 + WALL * float(cell[walls].sum()) / area
+    return Quantity(
+        value, max(value - reach, 0.0), min(value + reach, 1.0), "1", TEXTS["worn_share"]
+    )
 
 
-class _Square(NamedTuple):
-    """Means of the depths (m, n) in the square of `side` heights around each place, and their scatter where unworn."""
+def _largest(found: ScanAlignment, worn) -> Quantity:
+    """Return the largest median depth of 3 x 3 heights, less what noise adds to the largest of many.
 
-    side: int
-    means: np.ndarray
-    scatter: float
-
-
-def _squares(found: Laid) -> list:
-    """The means for each side of a square, the smallest first, of known depths alone: one beside holes, read for all of
-    them, would look like many that agree."""
-    out = []
-    for side in SQUARES:
-        means = _means(found.depth, side)
-        out.append(_Square(side, means.astype(np.float32), max(_scatter(means, found.used, side), found.noise / side)))
-    return out
-
-
-def _beyond(squares: list, sign: float = 1.0, clear: float = CLEAR, less: float = 2.0) -> np.ndarray:
-    """Which heights are deep, sign > 0, or high: by the mean of a square around them, of which the smaller squares
-    inside have their share, but for `less` of their scatter; beside a groove they have not."""
-    out = np.zeros(squares[0].means.shape, bool)
-    for k, one in enumerate(squares):
-        with np.errstate(invalid="ignore"):
-            deep = sign * one.means > (ALONE if one.side == 1 else 1.0) * clear * one.scatter
-            for inner in squares[:k]:
-                deep &= ~(sign * inner.means < sign * SHARE * one.means - less * inner.scatter)
-        out |= deep
-    return out
-
-
-def _bent(found: Laid, changed) -> float:
-    """Standard deviation [m] of slow errors of the scans, from the wide means that lie above the scan before
-    and do not count as changed."""
-    means = _means(found.depth, SQUARES[-1], False)
-    with np.errstate(invalid="ignore"):
-        above = -means[(means < 0) & ~changed]
-    return float(np.quantile(above, 0.8)) / 1.2816 if above.size > 50 else found.noise
-
-
-def _of_plane(found: Laid, mask, cell, x, y) -> float:
-    """Standard deviation of the volume under a mask [m3] that the plane leaves open."""
-    pull = _pull(mask, cell, x, y)
-    return float(np.sqrt(pull @ found.covariance[3:, 3:] @ pull))
-
-
-def _pull(mask, cell, x, y) -> np.ndarray:
-    """Volume [m3] under a mask of a plane of level 1, of slope 1 along x, of slope 1 along y, about the middle (3,)."""
-    x, y = x - (x[0] + x[-1]) / 2, y - (y[0] + y[-1]) / 2
-    weight = np.where(mask, cell, 0.0)
-    return np.array([weight.sum(), weight.sum(axis=0) @ x, weight.sum(axis=1) @ y])
-
-
-def _away(found: Laid, changed, x, y) -> np.ndarray:
-    """Least-squares plane (3,) as in `_pull` of the unworn depths that stand well away from what changed: beside a
-    shallow slope the noise hides where it begins, and the plane leans into it. Zero where too few stand away."""
-    from scipy.ndimage import uniform_filter
-
-    side = 2 * int(AWAY * min(changed.shape)) + 1
-    far = found.used & (uniform_filter(changed.astype(np.float32), side) < 0.5 / side**2)
-    if not changed.any() or far.sum() < ENOUGH * found.used.sum():
-        return np.zeros(3)
-    normal = np.array([_pull(far, one, x, y) for one in
-                       np.broadcast_arrays(1.0, x - (x[0] + x[-1]) / 2, (y - (y[0] + y[-1]) / 2)[:, None])])
-    return np.linalg.lstsq(normal, _pull(far, found.depth, x, y), rcond=1e-12)[0]
-
-
-def _largest(found: Laid, worn) -> Quantity:
-    """Largest median depth of 3 x 3 heights, less what the noise of as many alike depths adds."""
+    The noise of the medians is drawn from those of unworn heights.
+    """
     from scipy.ndimage import median_filter
 
-    text, known = WORN["worn_depth_max"], np.isfinite(found.depth)
+    text = TEXTS["worn_depth_max"]
+    known = np.isfinite(found.depth)
     if not (worn & known).any():
-        return Quantity(0.0, 0.0, SIDE * 2 * found.noise, "m", text)
-    middle = np.where(worn & known, median_filter(np.where(known, found.depth, 0.0), 3), -np.inf)
-    scatter, top = 0.5 * found.noise, float(middle.max())  # of a median of nine
-    excess = scatter * np.sqrt(2 * np.log(max(float((middle > top - 3 * scatter).sum()) / 5, 1.0)))
-    mid = around(top - excess, float(np.hypot(scatter, excess / 2)), "m", text, 0.0)
+        return Quantity(0.0, 0.0, 2 * SIDE * found.noise, "m", text)
+    medians = median_filter(np.where(known, found.depth, 0.0), 3)
+    pool = medians[found.used & ~widen(~known, 1)]
+    pool = pool if pool.size > 100 else medians[found.used]
+    scatter = float(pool.std()) if pool.size > 1 else found.noise / 2
+    here = medians[worn & known]
+    top = float(here.max())
+    near = here[here > top - 2 * BLUNT * scatter]
+    random = np.random.default_rng(SEED)
+    peaks = (
+        np.array([(near + random.choice(pool, near.size)).max() for _ in range(N_DRAWS)])
+        if pool.size
+        else near
+    )
+    clean = _shrink(near, scatter)
+    excess = (
+        float(np.mean([(clean + random.choice(pool, near.size)).max() for _ in range(N_DRAWS)]))
+        - clean.max()
+    )
+    error = float(np.hypot(peaks.std(), excess / 2))
+    level = float(np.std(found.errors.of_sum(worn / worn.sum(), 0.0)))
+    value = around(top - excess, float(np.hypot(error, level)), "m", text, 0.0)
     finest = float(found.depth[worn & known].max())
-    return mid._replace(high=max(mid.high, finest + scatter))
+    return value._replace(high=max(value.high, finest + scatter))
+
+
+def _shrink(values, scatter: float) -> np.ndarray:
+    """Return values (k,) with the scatter about their mean that they have without noise of a standard deviation."""
+    seen = float(values.var())
+    share = np.sqrt(max(seen - scatter**2, 0.0) / max(seen, 1e-300))
+    return values.mean() + share * (values - values.mean())

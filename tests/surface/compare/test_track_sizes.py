@@ -7,8 +7,8 @@ from scipy.special import ndtr
 
 from patchfem.core import frozen_array
 from patchfem.surface.compare.compare import compared
+from patchfem.surface.compare.section import sure_of
 from patchfem.surface.compare.verdict import verdicts
-from patchfem.surface.edges import sure_of
 from patchfem.surface.profile import Profile
 
 RIDGE, COUNT, HELD_OUT = 60.0, 2401, 41000  # base of a ridge [um], samples of 1 um; rules were tuned on 1000 to 1011

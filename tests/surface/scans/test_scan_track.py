@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from made_scans import aligned
 
 from patchfem.surface.areal import Areal
 from patchfem.surface.scans import change
-from patchfem.surface.scans.registration import Laid
-from patchfem.surface.scans.track import direction_of, track_of
+from patchfem.surface.scans.track import direction_of, measure_scan_track
 
 CELL, COUNT = 1e-6, 260
 SIDE, WIDTH, DEPTH, RIDGE = CELL * (COUNT - 1), 60e-6, 0.5e-6, 20e-6  # RIDGE: base of the ridges
@@ -32,9 +32,7 @@ def tracked(depth, noise: float = 2e-9, seed: int = 0):
     """The track in a map of depths."""
     axis = CELL * np.arange(COUNT)
     depth = depth + noise * np.random.default_rng(seed).normal(size=depth.shape)
-    found = Laid(None, 0.0, np.zeros(2), depth, np.zeros((6, 6)), noise, np.abs(depth) < 2 * noise,
-                 np.isfinite(depth), 1.0)
-    return track_of(found, depth, depth > 5 * noise, (axis, axis), 0.2e-9)
+    return measure_scan_track(aligned(depth, noise), depth, depth > 5 * noise, (axis, axis), 0.2e-9)
 
 
 @pytest.mark.parametrize("angle, length, ridges", [(0.0, 0.0, (0.0, 0.0)), (0.35, 0.0, (0.2e-6, 0.1e-6)),
@@ -97,7 +95,7 @@ def test_always_two_scans_tell_their_track():
     x, y = np.meshgrid(axis, axis)
     before, after = (Areal(axis, axis, z + 2e-9 * random.normal(size=z.shape), "a scan") for z in
                      (waves(x, y), waves(x, y) - depth + 1e-3 * x))
-    found = change.changed(before, after)
+    found = change.compare_scans(before, after)
     assert found.track.values["width"].value == pytest.approx(WIDTH, rel=0.02)
     assert found.track.values["direction"].value == pytest.approx(0.35, abs=0.01)
     assert any(text.startswith("A track at") and "leaves the region" in text for text in change.sentences(found))

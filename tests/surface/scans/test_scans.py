@@ -15,7 +15,8 @@ from patchfem.export.surfaces.areal import write_x3p
 from patchfem.surface.areal import Areal, filled
 from patchfem.surface.files.read import read_surface
 from patchfem.surface.scans import change, search
-from patchfem.surface.scans.search import rotation, variant
+from patchfem.surface.scans.model import rotation
+from patchfem.surface.scans.search import variant
 
 STEP, COUNT, COARSE, FULL = 1e-6, 200, 112, search.SIZE
 SIDE = STEP * (COUNT - 1)
@@ -72,7 +73,7 @@ def grooved():
 
 @pytest.fixture(scope="module")
 def worn(grooved):
-    return change.changed(*grooved)
+    return change.compare_scans(*grooved)
 
 
 def test_exact_a_groove_between_unworn_parts_has_its_volume_and_its_place(worn):
@@ -90,17 +91,17 @@ def test_exact_a_groove_between_unworn_parts_has_its_volume_and_its_place(worn):
 @pytest.mark.share(0)
 @pytest.mark.parametrize("mirrored, turned", [("x", False), ("y", True)])
 def test_exact_a_scan_that_is_mirrored_or_turned_over_has_the_same_volume(grooved, worn, mirrored, turned):
-    other = change.changed(grooved[0], variant(grooved[1], mirrored, turned))
+    other = change.compare_scans(grooved[0], variant(grooved[1], mirrored, turned))
     assert (other.found.guess.mirrored, other.found.guess.turned) == (mirrored, turned)
     assert other.values["worn_volume"].value == pytest.approx(worn.values["worn_volume"].value, rel=1e-6)
-    assert mirrored in change.sentences(other)[0] and ("turned over" in change.over(other)) == turned
+    assert mirrored in change.sentences(other)[0] and ("turned over" in change.describe_variant(other)) == turned
 
 
 @pytest.mark.slow
 def test_exact_a_scan_that_is_turned_half_round_is_found(grooved, worn):
     scan = grooved[1]
     half = Areal(scan.x, scan.y, scan.z[::-1, ::-1], scan.source)
-    found = change.changed(grooved[0], half)
+    found = change.compare_scans(grooved[0], half)
     assert abs(abs(found.registration["rotation"].value) - np.pi) < 0.04 and not found.found.guess.mirrored
     assert found.values["worn_volume"].value == pytest.approx(worn.values["worn_volume"].value, rel=1e-6)
 
@@ -108,19 +109,19 @@ def test_exact_a_scan_that_is_turned_half_round_is_found(grooved, worn):
 @pytest.mark.share(1)
 @pytest.mark.parametrize("depth", [0.0, 0.5e-6])
 def test_always_even_wear_and_none_are_told_alike_and_have_no_depth(depth):
-    found = change.changed(*scans(lambda x, y, z: depth + 0 * x))
+    found = change.compare_scans(*scans(lambda x, y, z: depth + 0 * x))
     assert change.headline(found) == change.NONE
     assert all(one.value is None and "uniform or wedge-shaped wear" in one.reason for one in found.values.values())
 
 
 def test_always_files_in_the_wrong_order_are_named(grooved):
-    found = change.changed(*grooved[::-1])
+    found = change.compare_scans(*grooved[::-1])
     assert change.headline(found) == change.GREW and found.values["grown_volume"].low > 0
 
 
 @pytest.mark.slow
 def test_always_two_places_have_no_depth(grooved):
-    found = change.changed(grooved[0], scans(groove, seed=5)[1])
+    found = change.compare_scans(grooved[0], scans(groove, seed=5)[1])
     assert change.headline(found) == change.ELSEWHERE and found.values["worn_volume"].value is None
     assert found.registration["shift_x"].reason
 
@@ -130,7 +131,7 @@ def test_always_either_side_of_an_edge_may_be_the_unworn_one():
     """A wedge that begins in the middle: both halves are planes."""
     def wedge(x, y, z):
         return 0.8e-6 * np.clip((x - 0.55 * SIDE) / SIDE, 0.0, None)
-    found = change.changed(*scans(wedge))
+    found = change.compare_scans(*scans(wedge))
     truth, volume = common(0.03, (12e-6, -18e-6), wedge), found.values["worn_volume"]
     assert volume.low <= truth <= volume.high and found.found.other is not None
     assert any("edge" in text for text in change.sentences(found))
@@ -142,7 +143,7 @@ def test_always_a_part_as_large_as_the_rest_leaves_open_whether_it_wore_or_the_r
     """A flat floor over 58 % that keeps its roughness; one over 42 % in two scans in the wrong order."""
     def wide(x, y, z):
         return 0.8e-6 * (np.abs(x - SIDE / 2) < half * SIDE)
-    found = change.changed(*scans(wide)[::sign])
+    found = change.compare_scans(*scans(wide)[::sign])
     assert change.headline(found) == change.OPEN
     assert all(one.value is None and "either part may be the unworn" in one.reason for one in found.values.values())
     volume = found.volumes.values["worn_volume" if sign > 0 else "grown_volume"]
@@ -157,7 +158,7 @@ def test_always_a_noisy_height_between_holes_is_no_growth():
     z[90:110, 90:110] = np.nan
     z[98:103, 98:103] = after.z[98:103, 98:103]
     z[100, 100] += 1e-7
-    found = change.changed(before, replace(after, z=z))
+    found = change.compare_scans(before, replace(after, z=z))
     assert found.volumes.values["grown_volume"].low == 0.0 and change.headline(found) == change.NONE
 
 
@@ -182,10 +183,10 @@ def test_always_spikes_are_left_out_and_pits_are_not(grooved):
 
 
 def test_always_what_grew_stands_beside_the_reason_why_no_wear_is_shown():
-    found = change.changed(*scans(lambda x, y, z: -0.4e-6 * np.clip(
+    found = change.compare_scans(*scans(lambda x, y, z: -0.4e-6 * np.clip(
         1 - (np.hypot(x - SIDE / 2, y - SIDE / 2) / 25e-6)**2, 0.0, None)))
     assert change.headline(found) == change.GREW and found.values["worn_volume"].value is None
-    assert found.values["worn_volume"].reason == change.hidden(found).reason == change.GROWN
+    assert found.values["worn_volume"].reason == change.hidden_wear(found).reason == change.GROWN
 
 
 def test_always_a_spike_on_a_slope_is_left_out():
@@ -201,7 +202,7 @@ def test_always_a_spike_on_a_slope_is_left_out():
 def test_always_kept_spikes_count_and_the_others_do_not(grooved, worn):
     scan, z = grooved[1], grooved[1].z.copy()
     z[120:122, 20:22] += 4e-6
-    grown = [change.changed(grooved[0], replace(scan, z=z), keep).volumes.values["grown_volume"].value
+    grown = [change.compare_scans(grooved[0], replace(scan, z=z), keep).volumes.values["grown_volume"].value
              for keep in (False, True)]
     assert grown[0] < 0.1 * grown[1] and grown[1] == pytest.approx(4 * STEP**2 * 4e-6, rel=0.3)
 
@@ -220,11 +221,11 @@ def test_exact_a_scan_beside_itself_shows_no_change(grooved, tmp_path):
     assert "two or four traces are needed, or two areal scans" in cli("compare", file, tmp_path / "trace.csv").err
 
 
-@pytest.mark.parametrize("clear, least", [(3.0, change.LIKELY), (30.0, change.ALIKE)])
+@pytest.mark.parametrize("clear, least", [(3.0, change.ALIKE_UNCLEAR), (30.0, change.ALIKE)])
 def test_always_a_refused_place_names_the_likeness_that_it_wants(grooved, worn, monkeypatch, clear, least):
-    found = replace(worn.found, like=least - 0.004, guess=worn.found.guess._replace(clear=clear))
-    monkeypatch.setattr(change, "laid", lambda before, after: found)
-    why = change.changed(*grooved).why
+    found = replace(worn.found, likeness=least - 0.004, guess=worn.found.guess._replace(clear=clear))
+    monkeypatch.setattr(change, "align_scans", lambda before, after: found)
+    why = change.compare_scans(*grooved).why
     assert f"of {least - 0.004:.3f}, but only values above {least:g} " in why
 
 
@@ -234,7 +235,7 @@ def independent(seed):
     kind, *sides, truth = make(seed)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(search, "SIZE", FULL)
-        found = change.changed(*(Areal(*map(np.asarray, one), "a scan") for one in sides))
+        found = change.compare_scans(*(Areal(*map(np.asarray, one), "a scan") for one in sides))
     return kind, found, truth, sides[0][0][1]
 
 

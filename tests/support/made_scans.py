@@ -1,0 +1,29 @@
+"""Alignments of scans with a given map of depths, as if place and plane were known."""
+
+import numpy as np
+
+from patchfem.surface.compare.robust import REACH
+from patchfem.surface.scans.alignment import ScanAlignment
+from patchfem.surface.scans.errors import scan_errors
+from patchfem.surface.scans.wear import find_change
+
+
+def aligned(depth, noise: float) -> ScanAlignment:
+    """Return the alignment of two scans whose depths (m, n) [m] have noise of a standard deviation [m]."""
+    with np.errstate(invalid="ignore"):
+        used = np.abs(depth) <= REACH * noise
+    worn, grown = find_change(depth, used, noise)
+    used &= ~worn & ~grown
+    return ScanAlignment(
+        guess=None,
+        state=np.zeros(6),
+        depth=depth,
+        noise=noise,
+        used=used,
+        worn=worn,
+        grown=grown,
+        region=np.ones(depth.shape, bool),
+        covariance=np.zeros((3, 3)),
+        errors=scan_errors(depth, used, np.zeros(3)),
+        likeness=1.0,
+    )

@@ -1,0 +1,128 @@
+"""Machined surfaces for `scan_pairs`: six finishes, drawn as areal heights of unit deviation."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.fft import fftfreq, irfft2, rfft2, rfftfreq
+
+FINISHES = ("self-affine", "ground", "honed", "turned", "plateau-honed", "peened")
+
+
+class Finish(NamedTuple):
+    """Parameters of a finish; lengths in points of the surface grid."""
+
+    name: str
+    hurst: float  # of the self-affine part
+    rolloff: float  # wavelength above which the spectrum is flat
+    cutoff: float  # wavelength below which the surface is smooth
+    angle: float  # [rad] of the lay from x
+    crossing: float  # [rad] half the angle between the two lays of honing
+    elongation: float  # of the lay: length along / length across
+    period: float  # feed of turning, radius of the dimples, or distance between deep grooves
+
+
+def draw_finish(random) -> Finish:
+    """Draw a finish and its parameters."""
+    return Finish(
+        name=FINISHES[random.integers(len(FINISHES))],
+        hurst=random.uniform(0.3, 0.95),
+        rolloff=random.uniform(30, 160),
+        cutoff=random.uniform(5, 12),
+        angle=random.uniform(0, np.pi),
+        crossing=random.uniform(0.25, 0.75),
+        elongation=random.uniform(10, 40),
+        period=random.uniform(14, 45),
+    )
+
+
+def draw_surface(random, shape: tuple, finish: Finish) -> np.ndarray:
+    """Draw heights (n, m) of zero mean and unit deviation; two calls give two places of alike surfaces."""
+    if finish.name == "ground":
+        heights = _spectral(random, shape, finish, finish.angle)
+    elif finish.name == "honed":
+        heights = _cross_lay(random, shape, finish)
+    elif finish.name == "turned":
+        heights = _turned(random, shape, finish)
+    elif finish.name == "plateau-honed":
+        heights = _plateau(random, shape, finish)
+    elif finish.name == "peened":
+        heights = _peened(random, shape, finish)
+    else:
+        heights = _spectral(random, shape, finish)
+    heights = heights - heights.mean()
+    return heights / heights.std()
+
+
+def _spectral(random, shape: tuple, finish: Finish, angle: float | None = None) -> np.ndarray:
+    """Draw Gaussian heights with a self-affine spectrum, stretched along a lay at `angle` if there is one."""
+    ky, kx = fftfreq(shape[0])[:, None], rfftfreq(shape[1])[None, :]
+    k = np.hypot(kx, ky)
+    if angle is not None:
+        along, across = (
+            np.cos(angle) * kx + np.sin(angle) * ky,
+            np.cos(angle) * ky - np.sin(angle) * kx,
+        )
+        k = np.hypot(across, finish.elongation * along)
+    amplitude = np.maximum(k, 1 / finish.rolloff) ** (-1 - finish.hurst)
+    amplitude *= np.exp(-((finish.cutoff * np.hypot(kx, ky)) ** 2) / 4)
+    amplitude[0, 0] = 0.0
+    heights = irfft2(amplitude * rfft2(random.normal(size=shape)), shape)
+    return heights / heights.std()
+
+
+def _cross_lay(random, shape: tuple, finish: Finish) -> np.ndarray:
+    """Draw two crossing lays."""
+    lays = [
+        _spectral(random, shape, finish, finish.angle + side * finish.crossing) for side in (-1, 1)
+    ]
+    return lays[0] + lays[1]
+
+
+def _turned(random, shape: tuple, finish: Finish) -> np.ndarray:
+    """Draw cusped feed marks on circles about a distant centre, over a fine random surface."""
+    distance = random.uniform(2, 10) * max(shape)
+    y, x = np.indices(shape)
+    r = np.hypot(x - distance * np.cos(finish.angle), y - distance * np.sin(finish.angle))
+    first = np.floor(r.min() / finish.period)
+    turn = r / finish.period - first
+    depths = random.normal(size=int(turn.max()) + 2)  # each turn lies a little higher or lower
+    cusps = 4 * (np.mod(turn, 1.0) - 0.5) ** 2 + 0.08 * depths[turn.astype(int)]
+    return cusps / cusps.std() + random.uniform(0.15, 0.4) * _spectral(random, shape, finish)
+
+
+def _plateau(random, shape: tuple, finish: Finish) -> np.ndarray:
+    """Draw a fine plateau with deep crossing grooves (negative skewness)."""
+    y, x = np.indices(shape)
+    grooves = np.zeros(shape)
+    for side in (-1, 1):
+        angle = finish.angle + side * finish.crossing
+        across = np.cos(angle) * y - np.sin(angle) * x
+        places = np.arange(across.min() - 20, across.max() + 20)
+        profile = np.zeros(places.size)
+        for place in random.uniform(
+            places[0], places[-1], int(places.size / (2 * finish.period)) + 1
+        ):
+            depth, half = random.exponential(1.0) + 0.3, random.uniform(3, 8)
+            profile = np.maximum(profile, depth * np.maximum(1 - np.abs(places - place) / half, 0))
+        grooves = np.maximum(grooves, np.interp(across, places, profile))
+    return -grooves + random.uniform(0.08, 0.2) * _spectral(random, shape, finish)
+
+
+def _peened(random, shape: tuple, finish: Finish) -> np.ndarray:
+    """Draw overlapping round dimples."""
+    heights = np.zeros(shape)
+    count = int(3.0 * heights.size / (np.pi * finish.period**2))
+    for _ in range(count):
+        radius = finish.period * random.uniform(0.6, 1.2)
+        i, j = random.uniform(0, shape[0]), random.uniform(0, shape[1])
+        rows = slice(max(int(i - radius), 0), int(i + radius) + 2)
+        columns = slice(max(int(j - radius), 0), int(j + radius) + 2)
+        block = heights[rows, columns]
+        y, x = np.ogrid[
+            rows.start : rows.start + block.shape[0], columns.start : columns.start + block.shape[1]
+        ]
+        dimple = ((y - i) ** 2 + (x - j) ** 2) / radius**2 - 1
+        np.minimum(
+            block, dimple * (radius / finish.period) ** 2 * random.uniform(0.6, 1.0), out=block
+        )
+    return heights / heights.std() + random.uniform(0.05, 0.2) * _spectral(random, shape, finish)

@@ -1,0 +1,145 @@
+"""Score `patchfem compare` on traces with known truth (`trace_pairs`), with the rules of `score_pairs`.
+
+    python tests/support/score_traces.py --first 1 --count 16 -j 2 --table scores.json
+
+A seed gives one pair: the kinds take turns. With --all each seed gives a pair of every kind. Flanks that run out flat
+(`trace_pairs.RUN_OUT`) are scored apart: the ends and widths of their tracks have the suffix `_flat`.
+"""
+
+import argparse
+import json
+import multiprocessing
+import os
+import tempfile
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+import trace_pairs
+from score_pairs import check_intervals, compare, find_faults, print_summary
+
+PLACES = (
+    "track_from",
+    "track_to",
+    "track_width",
+    "track_depth",
+    "worn_from_after",
+    "worn_to_after",
+)
+
+
+def score_pair(request: tuple) -> dict:
+    """Compare the pair (kind, seed) and score the answer."""
+    kind, seed = request
+    pair = trace_pairs.draw_pair(kind, seed)
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            answer = compare(pair, Path(folder))
+        except Exception as failure:  # a crash is counted like a refusal, with its type
+            answer = {"seconds": 0.0, "error": f"CRASH {type(failure).__name__}: {failure}"}
+    row = {
+        "kind": kind,
+        "seed": seed,
+        "seconds": answer["seconds"],
+        "headline": answer.get("verdict", ""),
+    }
+    if "error" in answer:
+        return row | {
+            "error": answer["error"],
+            "faults": [],
+            "intervals": {},
+            "truth": {},
+            "missed": False,
+        }
+    intervals = check_intervals(pair, answer)
+    truth = {name: answer[name]["value"] - check[2] for name, check in intervals.items()}
+    suffix = "_flat" if kind in trace_pairs.RUN_OUT else ""
+    names = {name: name + suffix if name in PLACES else name for name in intervals}
+    is_worn = kind not in (*trace_pairs.UNWORN, *trace_pairs.HIDDEN, "elsewhere", "deposits")
+    return row | {
+        "sentences": answer.get("sentences", []),
+        "faults": find_faults(pair, kind in trace_pairs.UNWORN, answer),
+        "intervals": {names[name]: check for name, check in intervals.items()},
+        "truth": {names[name]: value for name, value in truth.items()},
+        "missed": is_worn and "worn" not in row["headline"].lower(),
+    }
+
+
+def print_row(row: dict) -> None:
+    """Print one line per pair."""
+    wrong = [f"{name} {check[3]:.1f}" for name, check in row["intervals"].items() if not check[0]]
+    print(
+        f"{row['seed']:6d} {row['kind']:15s} {row['seconds']:5.1f} s {row['headline'][:70]!r} "
+        f"{row.get('error', '')[:120]} {row['faults'] or ''} {wrong or ''}",
+        flush=True,
+    )
+
+
+def print_precision(rows: list) -> dict:
+    """Print and return the counts per kind and, per quantity, the intervals that hold and their half-widths."""
+    summary = {}
+    for kind in dict.fromkeys(row["kind"] for row in rows):
+        chosen = [row for row in rows if row["kind"] == kind]
+        quantities = defaultdict(list)
+        for row in chosen:
+            for name, (holds, half, _, _) in row["intervals"].items():
+                true = abs(row["truth"][name])
+                quantities[name].append((holds, half / true if true > 0 else np.nan))
+        counts = {
+            name: [
+                sum(bool(check[0]) for check in checks),
+                len(checks),
+                float(np.median([check[1] for check in checks])),
+            ]
+            for name, checks in quantities.items()
+        }
+        summary[kind] = {
+            "pairs": len(chosen),
+            "false": sum(bool(row["faults"]) for row in chosen),
+            "refused": sum("error" in row for row in chosen),
+            "missed": sum(row["missed"] for row in chosen),
+            "quantities": counts,
+        }
+        cells = [
+            f"{name} {held}/{of} ({100 * half:.2g} %)" for name, (held, of, half) in counts.items()
+        ]
+        entry = summary[kind]
+        print(
+            f"{kind:15s} {entry['pairs']} pairs, {entry['false']} false, {entry['refused']} refused, "
+            f"{entry['missed']} missed; " + ", ".join(cells)
+        )
+    return summary
+
+
+def main() -> None:
+    """Score the pairs of consecutive seeds."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--first", type=int, required=True, help="first seed")
+    parser.add_argument("--count", type=int, required=True, help="number of seeds")
+    parser.add_argument("--all", action="store_true", help="every kind for each seed")
+    parser.add_argument("-j", "--jobs", type=int, default=1, help="processes")
+    parser.add_argument("--table", type=Path, help="JSON file of the scores")
+    request = parser.parse_args()
+    os.environ.setdefault("OMP_NUM_THREADS", "1")  # the processes share the cores
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    kinds, seeds = trace_pairs.KINDS, range(request.first, request.first + request.count)
+    wanted = [(kinds[(seed - 1) % len(kinds)], seed) for seed in seeds]
+    if request.all:
+        wanted = [(kind, seed) for seed in seeds for kind in kinds]
+    rows = []
+    with multiprocessing.get_context("spawn").Pool(request.jobs) as pool:
+        for row in pool.imap(score_pair, wanted):
+            rows.append(row)
+            print_row(row)
+    print("\nheld/intervals (median half-width / truth) per kind")
+    summary = print_precision(rows)
+    print()
+    print_summary(rows)
+    if request.table:
+        request.table.write_text(
+            json.dumps({"summary": summary, "rows": rows}, indent=1, default=float)
+        )
+
+
+if __name__ == "__main__":
+    main()
