@@ -173,15 +173,15 @@ EFFECTS = {
                                      "(Oden, Pires)", ("bond_length", "order spread"), "exact",
                                      "averaged set-valued timeless memoryless"),
     "friction.law=iwan": _law("laws.iwan", "F = int rho(phi) (u - x_phi) dphi, rho = R phi^chi + S delta(phi - phi_max)"
-                              " (Segalman)", ("stiffness chi beta", ""), "joints harmonic pieces grooves",
+                              " (Segalman)", ("stiffness chi beta", ""), "joints harmonic pieces",
                               "timeless cells"),
     "friction.law=bouc-wen": _law("laws.bouc_wen", "F = mu N z, z' = v/eps (1 - |z|^n (s sgn(v z) + 1 - s)) (Wen)",
-                                  ("stiffness", "exponent shape"), "joints harmonic grooves",
+                                  ("stiffness", "exponent shape"), "joints harmonic",
                                   "timeless"),
     "friction.law=lugre": _law("laws.lugre", "F = k z + s_1 z' + s_2 v, z' = v - k |v| z/g(v), g = mu_k N + "
                                "(mu_s - mu_k) N exp(-(v/v_s)^2) (Canudas de Wit; Dahl: mu_k = mu_s, no damping)",
                                ("stiffness stribeck_speed", "kinetic micro_damping viscous"),
-                               "joints harmonic grooves", "overshoots"),
+                               "joints harmonic", "overshoots"),
     "friction.reading=stretch": Effect("patchfem.friction.bonds.recursion",
                                        "phi: (|u|/eps)^p exp(-int dR/eps)/Gamma(p+1)"),
     "friction.reading=report": Effect("patchfem.friction.bonds.quadrature",

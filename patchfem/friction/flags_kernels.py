@@ -38,12 +38,6 @@ def gives(num, turn):
     return 1.0
 
 
-@njit(error_model="numpy", **LEAN)
-def longest(num, turn):
-    """The `longest` of laws whose rates tell the error of a step: no bound [s]."""
-    return inf
-
-
 @njit(error_model="numpy", forceinline=True, **LEAN)
 def after(k, z, square, dx, way):
     """The `after` of laws whose rate alone is known: nothing."""
@@ -57,4 +51,4 @@ def layer(k, h):
 
 
 __all__ = ["BENDS", "FAST", "FOLLOWS", "INNER", "LAYERS", "LEAN", "SET_VALUED", "after", "closed", "gives", "knee",
-           "layer", "longest", "middle"]
+           "layer", "middle"]

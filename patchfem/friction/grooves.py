@@ -22,23 +22,6 @@ TERMS = 18  # of it: 0.1^18 is round-off
 
 
 @dataclass(frozen=True, slots=True)
-class Swing:
-    """How a load swings about its mean N, N + amplitude cos(omega t + phase): amplitude [N] below the mean, omega
-    [rad/s], phase [rad]; amplitude 0 of a load that stays."""
-
-    amplitude: float = 0.0
-    omega: float = 0.0
-    phase: float = 0.0
-
-    def about(self, load: float, time):
-        """The load [N] at times [s] about its mean `load` [N]."""
-        return load + self.amplitude * np.cos(self.omega * np.asarray(time, float) + self.phase)
-
-
-STEADY = Swing()
-
-
-@dataclass(frozen=True, slots=True)
 class Grooves:
     """Grooves of a wavelength [m] and an amplitude [m], half peak to peak, whose bottom lies at q = phase/k, phase
     [rad]; lifted_mass [kg] rises with the load; key: of their table in the scene."""

@@ -24,9 +24,9 @@ path to the next kink sets y from the memory; rate(num, mem, turn, dq, v, y, out
 shown(num, mem, turn, dq, q, v, y) -> (force, stored energy, irreversible part of q); finish(num, mem, turn, dq, v, y)
 -> energy dissipated [J], or nan, moves the memory; knee(num) -> speed [m/s] at which the rates have a kink, 0 for none.
 Its irreversible part of q turns where q does or the force passes zero. A law that holds the slide at rest has
-SET_VALUED true: gives(num, turn) -> direction in which it lets go, 0 where it holds, longest(num, turn) -> longest step
-[s]; of turn it takes besides what `dynamics.smooth.arrays` lists, and its last two states are what is left of its hold
-and of its load [N], by their rates alone. Those of `flags_kernels` belong to laws that hold nothing.
+SET_VALUED true: gives(num, turn) -> direction in which it lets go, 0 where it holds; of turn it takes besides what
+`dynamics.smooth.arrays` lists, and its last two states are what is left of its hold and of its load [N], by their rates
+alone. That of `flags_kernels` belongs to laws that hold nothing.
 
 A law of one stretch z may march in lanes (`dynamics.lanes`): flowing(k, z, v, way) -> (force, dz/dq in the direction
 `way`, slopes of the force over z and v) is all of it without an array or a branch, so that cases stand side by side; k

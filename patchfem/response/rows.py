@@ -305,8 +305,7 @@ ROWS = (
                                      "over two cycles",
         lambda s: s.energies.get("friction_work"), group="energy"),
     Row("energy_stored", "J", 1e-10, "energy stored in all interfaces at the end of the run: elastic energy and, with "
-                                     "grooves, the potential energy of the load (if the load changes: the work done "
-                                     "against the load)", group="energy"),
+                                     "grooves, the potential energy of the load", group="energy"),
     Row("energy_dissipated", "J", 1e-10, "energy dissipated by friction in all interfaces over the whole run; with "
                                          "method `harmonic`, over two cycles",
         lambda s: s.energies.get("energy_dissipated"), group="energy"),

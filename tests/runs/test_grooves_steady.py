@@ -32,7 +32,7 @@ method = "harmonic"
 """
 SHOWN = ("relative_displacement_amplitude", "loop_area", "friction_force_peak")
 EVERY = [("coulomb", 139), ("coulomb", 143), ("coulomb", 150), ("elastic-plastic", 139), ("elastic-plastic", 143),
-         ("elastic-plastic", 150), ("nonlocal", 143), ("iwan", 143), ("bouc-wen", 150), ("lugre", 139), ("tanh", 150)]
+         ("elastic-plastic", 150), ("nonlocal", 143), ("tanh", 150)]
 
 
 def scene(law, *sets):
@@ -52,7 +52,7 @@ def marched(text, cycles=40, steps=400):
     return float(np.ptp(done.amplitudes[-1])) / 2, done.window_work, float(np.abs(done.window.force).max())
 
 
-@pytest.mark.share(1, 4, 6, 7, 10)
+@pytest.mark.share(1, 4, 6)
 @pytest.mark.parametrize(("law", "frequency"), EVERY)
 def test_always_the_steady_motion_is_that_of_a_march(law, frequency):
     asked = scene(law, f"drive.frequency={frequency} Hz")
@@ -65,7 +65,7 @@ def test_always_the_steady_motion_is_that_of_a_march(law, frequency):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("law", KEYS)
+@pytest.mark.parametrize("law", ["coulomb", "elastic-plastic", "nonlocal", "tanh"])
 @pytest.mark.parametrize("frequency", [130, 139, 143, 150, 165])
 def test_always_the_steady_motion_with_a_lifted_mass_is_that_of_a_march(law, frequency):
     """Elastic-plastic elements under a force that changes slip a little further in every cycle of a march."""

@@ -12,8 +12,7 @@ from scipy.integrate import solve_ivp
 
 class Case(NamedTuple):
     """One mode on grooves: mass [kg], omega [rad/s], zeta, base acceleration [m s-2], its omega [rad/s]; load [N],
-    wavelength [m], amplitude [m], phase [rad], lifted mass [kg]; mu_s, mu_k; of a load that swings as a cosine
-    amplitude [N], omega [rad/s] and phase [rad]."""
+    wavelength [m], amplitude [m], phase [rad], lifted mass [kg]; mu_s, mu_k."""
 
     mass: float
     omega: float
@@ -27,9 +26,6 @@ class Case(NamedTuple):
     lifted: float
     static: float
     kinetic: float
-    swing: float = 0.0
-    pace: float = 0.0
-    lag: float = 0.0
 
 
 def case_of(seed: int) -> Case:
@@ -50,11 +46,6 @@ def flank(c: Case, q: float) -> tuple:
     return c.amplitude * k * np.sin(k * q - c.phase), c.amplitude * k * k * np.cos(k * q - c.phase)
 
 
-def loaded(c: Case, t: float) -> float:
-    """Load at the time t."""
-    return c.load + c.swing * np.cos(c.pace * t + c.lag)
-
-
 def forces(c: Case, t: float, q: float, v: float, way: float, mu: float) -> tuple:
     """(acceleration of the slide, normal force on the flank, force along x) in motion."""
     steep, bend = flank(c, q)
@@ -63,14 +54,14 @@ def forces(c: Case, t: float, q: float, v: float, way: float, mu: float) -> tupl
     across, up = sine + way * mu * cosine, cosine - way * mu * sine  # what a newton on the flank gives
     free = -2 * c.zeta * c.omega * v - c.omega**2 * q - c.acceleration * np.sin(c.drive * t)
     gain, press = np.linalg.solve([[c.mass, across], [-c.lifted * steep, up]],
-                                  [c.mass * free, loaded(c, t) + c.lifted * bend * v * v])
+                                  [c.mass * free, c.load + c.lifted * bend * v * v])
     return gain, press, press * across
 
 
 def held(c: Case, t: float, q: float) -> tuple:
     """(force that holds the slide, how steep it would have to be): the angle of friction at rest decides."""
     need = c.mass * (-c.omega**2 * q - c.acceleration * np.sin(c.drive * t))
-    return need, np.arctan2(need, loaded(c, t)) - np.arctan(flank(c, q)[0])
+    return need, np.arctan2(need, c.load) - np.arctan(flank(c, q)[0])
 
 
 def run(c: Case, end: float, times) -> tuple:
@@ -100,7 +91,7 @@ def run(c: Case, end: float, times) -> tuple:
             gain, press, _ = forces(c, s, x[0], x[1], way, c.kinetic)
             own = way * c.kinetic * press * np.hypot(1, flank(c, x[0])[0]) * x[1]
             return [x[1], gain, own, -c.mass * c.acceleration * np.sin(c.drive * s) * x[1],
-                    loaded(c, s) * flank(c, x[0])[0] * x[1]]
+                    c.load * flank(c, x[0])[0] * x[1]]
 
         def turns(s, x, way=way, begin=t):
             return way * x[1] if s > begin + 1e-9 / c.drive else 1e-12

@@ -86,30 +86,15 @@ class Rub(namedtuple("Rub", ("force", "memory", "pressed", "modes", "under", *Sh
 class Climbing(namedtuple("Climbing", ("flank", "now_at", "share", *Rub._fields))):
     """A law with memory along flanks, `grooves.points_kernels`.
 
-    flank (9,): load [N], wave number [rad/m], amplitude [m], phase [rad], lifted mass [kg], kind of the law as in
-    `shear_points_kernels`, amplitude [N], pace [rad/s] and phase [rad] of the load's
-    swing; now_at (16,): speed of what rises [m/s], vertical force of the step before [N],
-    the last two slides of a step [m], 1 once the vertical force has fallen to zero, then of the step that was tried
-    last: mean force U [N], its slope [N/m], force f along the flank [N], dz/dq, ds/dq, vertical force [N], and the
-    force f at the end of the step before, then the normal force at both ends of the step [N], the time [s]
-    and the work done against a load that swings [J]; share (m,): of the points
-    in the normal force; the rest is as of `Rub`, with their shares of it for the loads.
+    flank (6,): load [N], wave number [rad/m], amplitude [m], phase [rad], lifted mass [kg], kind of the law as in
+    `shear_points_kernels`; now_at (14,): speed of what rises [m/s], vertical force of the step before [N], the last two
+    slides of a step [m], 1 once the vertical force has fallen to zero, then of the step that was tried last: mean force
+    U [N], its slope [N/m], force f along the flank [N], dz/dq, ds/dq, vertical force [N], and the force f at the end of
+    the step before, then the normal force at both ends of the step [N]; share (m,): of the points in the normal force;
+    the rest is as of `Rub`, with their shares of it for the loads.
     """
 
     __slots__ = ()
-
-
-class Flanked(NamedTuple):
-    """A law of constant load along flanks, `grooves.element_kernels`: flank and now_at as of `Climbing`; num (1, k),
-    mem (1, m) as the law has them under the load; tried (1, m): room for the memory of a step that is tried; bound
-    (1,): largest force [N] under the load, infinite where none is."""
-
-    flank: np.ndarray
-    now_at: np.ndarray
-    num: np.ndarray
-    mem: np.ndarray
-    tried: np.ndarray
-    bound: np.ndarray
 
 
 class BondList(NamedTuple):

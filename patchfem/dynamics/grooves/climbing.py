@@ -1,15 +1,13 @@
-"""Contacts along the flanks of grooves, for marches and for slides that are given: of laws with memory, as under a load
-that changes, and of laws of constant load, `friction.protocol.Element`."""
+"""Contacts of laws with memory along the flanks of grooves, for marches and for prescribed slides."""
 
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...core import Outcome, PatchfemError, Response
-from ...friction.grooves import STEADY, Grooves, Swing
-from ...friction.protocol import Element
+from ...friction.grooves import Grooves
 from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes, tangential_stiffness
-from ..contacts.arrays import Climbing, Flanked
+from ..contacts.arrays import Climbing
 from ..integrated import accelerations
 from ..march.march import Run
 from ..march.varying_load import PLASTIC, Rubbing, plastic, rub_of
@@ -17,7 +15,7 @@ from ..march.varying_load import PLASTIC, Rubbing, plastic, rub_of
 HERE = "dynamics.grooves.contact_kernels"
 STIFF = 0.1  # of tolerance times the slide at which pieces let go: a bond length that is 1.7 of it off in force at most
 SHORT = 1e-3  # of that slide: the shortest bonds by which shear modes are chosen
-RISE, VERTICAL, LIFTS, BEFORE, NORMAL, RAISED = 0, 1, 4, 12, 13, 15  # of Climbing.now_at
+RISE, VERTICAL, LIFTS, BEFORE, NORMAL = 0, 1, 4, 12, 13  # of Climbing.now_at
 
 
 def refuse_heavy(grooves: Grooves, static: float, modes) -> None:
@@ -38,16 +36,15 @@ def lifts(grooves: Grooves, time: float) -> str:
             f"mass takes all of the load; lower {grooves.key}.lifted_mass or the drive, or raise the load")
 
 
-def model_of(grooves: Grooves, load: float, static: float, law, modes) -> "FlankModel":
-    """The model of a `law` under a load [N]: a Rubbing (`march.varying_load.plastic` or `bonds`), or the Element of a
-    law of constant load.
+def model_of(grooves: Grooves, load: float, law: Rubbing, modes) -> "ClimbingModel":
+    """Return the model of a law with memory (`march.varying_load.plastic` or `bonds`) under a load [N].
 
     Coulomb's law at the points of pieces that give way is plastic of the length 0, which `giving` makes anew.
     modes: of the rig, None of a bench; PatchfemError as of `refuse_heavy`.
     """
     if modes is not None:
-        refuse_heavy(grooves, static, modes)
-    return ElementsModel(grooves, load, static, law) if isinstance(law, Element) else ClimbingModel(grooves, load, law)
+        refuse_heavy(grooves, law.static, modes)
+    return ClimbingModel(grooves, load, law)
 
 
 def giving(model: "ClimbingModel", patch, count: int | None, tolerance: float) -> "ClimbingModel":
@@ -71,9 +68,8 @@ def giving(model: "ClimbingModel", patch, count: int | None, tolerance: float) -
 
 
 class FlankModel:
-    """What `march.march` asks of a contact along flanks: of `grooves`, under a `load` [N] with its `swing`, of the
-    coefficient `static` [1]. Under a load that swings the books count the work done against it, int N dz, for what its
-    height stores."""
+    """What `march.march` asks of a contact along the flanks of `grooves`, under a `load` [N], of the coefficient
+    `static` [1]."""
 
     __slots__ = ()
     joints, laws, loading = (), (), ""  # nothing beside it, and the loop knows of a load that stays
@@ -81,7 +77,7 @@ class FlankModel:
     @property
     def limit(self) -> float:
         """Scale of the residuals [N]: the largest force of the steepest flank."""
-        return self.grooves.capacity(self.load + abs(self.swing.amplitude), self.static)
+        return self.grooves.capacity(self.load, self.static)
 
     @property
     def reduction(self):
@@ -95,16 +91,6 @@ class FlankModel:
     def shown(self, contact) -> dict:
         """Nothing: all points share its stretch, if it has any."""
         return {}
-
-    def flank(self, kind: float) -> tuple:
-        """(`Climbing.flank`, `Climbing.now_at`) at rest at the slide 0, the normal force there [N]; kind: of the
-        law."""
-        g, swing, at = self.grooves, self.swing, np.zeros(16)
-        begin = float(swing.about(self.load, 0.0))
-        normal = begin * np.hypot(1.0, float(g.slope(0.0)))
-        at[[VERTICAL, BEFORE, NORMAL, RAISED]] = begin, normal, normal, begin * g.height(0.0)
-        swings = swing.amplitude, swing.omega, swing.phase
-        return np.array([self.load, g.wave, g.amplitude, g.phase, g.lifted_mass, kind, *swings]), at, normal
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -121,7 +107,6 @@ class ClimbingModel(FlankModel):
     law: Rubbing
     shear: object = None
     share: tuple = (1.0,)
-    swing: Swing = STEADY
 
     @property
     def kind(self) -> tuple:
@@ -145,8 +130,13 @@ class ClimbingModel(FlankModel):
 
     def build(self) -> Climbing:
         """The Climbing with arrays of its own, at rest at the slide 0."""
-        law, share, (flank, at, normal) = self.law, np.array(self.share, float), self.flank(self.law.kind)
-        return Climbing(flank, at, share, *rub_of(law, normal * share, self.shear, self.limit))
+        g = self.grooves
+        share = np.array(self.share, float)
+        flank = np.array([self.load, g.wave, g.amplitude, g.phase, g.lifted_mass, self.law.kind])
+        normal = self.load * np.hypot(1.0, float(g.slope(0.0)))
+        now_at = np.zeros(14)
+        now_at[[VERTICAL, BEFORE, NORMAL]] = self.load, normal, normal
+        return Climbing(flank, now_at, share, *rub_of(self.law, normal * share, self.shear, self.limit))
 
     def shown(self, contact) -> dict:
         """Of pieces that give way the points' friction along the flank [N], what is elastic there [m] and their share
@@ -163,53 +153,18 @@ class ClimbingModel(FlankModel):
         return {"nodes": np.stack([force, over + contact.b @ contact.modes, contact.share * contact.now_at[VERTICAL]])}
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class ElementsModel(FlankModel):
-    """A law of constant load: the element of a contact under that load, taken to the normal force of the flank."""
-
-    grooves: Grooves
-    load: float
-    static: float
-    element: Element
-    swing: Swing = STEADY
-
-    @property
-    def kind(self) -> tuple:
-        """(contact, law): what `march.instances` takes an instance of its loop for."""
-        return HERE, self.element.kernels
-
-    @property
-    def length(self) -> float:
-        """Slide over which the law stretches before it slips [m]."""
-        return self.element.length
-
-    @property
-    def runner(self):
-        """The class that marches it."""
-        return FlankRun
-
-    def build(self) -> Flanked:
-        """The Flanked with arrays of its own, at rest at the slide 0."""
-        law, (flank, at, _) = self.element, self.flank(-1.0)
-        bound = law.limit if law.bounded else np.inf
-        return Flanked(flank, at, np.array(law.numbers[None]), np.array(law.memory[None]),
-                       np.array(law.memory[None]), np.array([bound]))
-
-
 class GroovesRun(Run):
     """The arrays of a march over grooves, and its clock."""
 
     def response(self, rows, number) -> Response:
-        """Histories; with a lifted mass or a load that swings `extra` has normal_load [N], the vertical force
-        N + m (t q'' + t' q'^2)."""
-        out, g, modes, swing = super().response(rows, number), self.model.grooves, self.modes, self.model.swing
-        if not g.lifted_mass and not swing.amplitude:
+        """Histories; with a lifted mass `extra` has normal_load [N], the vertical force N + m (t q'' + t' q'^2)."""
+        out, g, modes = super().response(rows, number), self.model.grooves, self.modes
+        if not g.lifted_mass:
             return out
         along = accelerations(modes, self.drive.values(out.time), out.modal, out.modal_rate,
                               np.outer(out.force, modes.slide)) @ modes.slide
         lift = g.slope(out.slide) * along + g.bend(out.slide) * out.slide_rate**2
-        return replace(out, extra=out.extra | {"normal_load": swing.about(self.model.load, out.time)
-                                               + g.lifted_mass * lift})
+        return replace(out, extra=out.extra | {"normal_load": self.model.load + g.lifted_mass * lift})
 
     def _leaves(self) -> None:
         """Mark the run as one whose lifted mass has left the grooves."""
@@ -217,17 +172,18 @@ class GroovesRun(Run):
         self.message = lifts(self.model.grooves, self.done * self.prop.dt)
 
 
-class FlankRun(GroovesRun):
-    """The arrays of a march of a contact along flanks, and its clock."""
+class ClimbingRun(GroovesRun):
+    """The arrays of a march whose points have a memory of their loads, and its clock."""
 
     def __init__(self, modes, drive, model, steps_per_cycle, travel, loops, start=None):
         super().__init__(modes, drive, model, steps_per_cycle, travel, loops, start)
         q, v = self.modes.slide @ self.state[0], self.modes.slide @ self.state[1]
-        steep, at = float(model.grooves.slope(q)), self.contact.now_at
-        begin = float(model.swing.about(model.load, 0.0))
-        normal = begin * np.hypot(1.0, steep)
-        self._pressed(normal / at[NORMAL])
-        at[RISE], at[BEFORE], at[NORMAL], at[RAISED] = steep * v, normal, normal, begin * model.grooves.height(q)
+        slope = float(model.grooves.slope(q))
+        contact, now_at = self.contact, self.contact.now_at
+        normal = model.load * np.hypot(1.0, slope)
+        contact.memory[:] *= normal / now_at[NORMAL]
+        contact.pressed[:] *= normal / now_at[NORMAL]
+        now_at[[RISE, BEFORE, NORMAL]] = slope * v, normal, normal
         self.ledger[0] += self.strained()
 
     def placed(self, place, rate) -> None:
@@ -235,19 +191,7 @@ class FlankRun(GroovesRun):
         super().placed(place, rate)
         self.contact.now_at[RISE] = float(self.model.grooves.slope(self.modes.slide @ place)) * self.modes.slide @ rate
 
-    def _pressed(self, share: float) -> None:
-        """Bring the memory to a normal force that is `share` of that at the slide 0, for which it was built."""
-
     def _judge(self, status: int) -> None:
         super()._judge(status)
         if self.contact.now_at[LIFTS] and self.outcome is None:
             self._leaves()
-
-
-class ClimbingRun(FlankRun):
-    """The arrays of a march whose points have a memory of their loads."""
-
-    def _pressed(self, share: float) -> None:
-        c = self.contact
-        c.memory[:] *= share
-        c.pressed[:] *= share

@@ -5,8 +5,7 @@ ds under a normal force that goes from R0 to R1, R = V sqrt(1 + t^2) + f t, and 
 against the slide is U = (V dz + f ds)/dq, which does exactly the work that height, lifted mass and law take. What rises
 keeps its own speed w, dz = dt (w0 + w1)/2, so V = N + m (w1 - w0)/dt takes exactly what its kinetic energy gains.
 Where the pieces give way the path ds is that of the holder. The functions are those that `march.loop_kernels` asks of
-every contact; the text runs with the points of a law with memory, `points_kernels`, or a law of constant load,
-`element_kernels`, as what is inside.
+every contact; the points of the law are those of `points_kernels`.
 """
 
 from math import cos, sin, sqrt
@@ -16,11 +15,11 @@ import numpy as np
 from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN
 from ..modal_kernels import narrowed
-from . import points_kernels as inside
+from . import points_kernels as points
 
-LOAD, WAVE, AMPLITUDE, PHASE, LIFTED, KIND, SWING, PACE, LAG = range(9)  # of contacts.arrays.Climbing.flank
-RISE, VERTICAL, LAST, LAST_BUT_ONE, LIFTS, PULL, PULL_SLOPE, ALONG, MEAN_SLOPE, PATH, HELD, PLACE, BEFORE, NORMAL, \
-    CLOCK, RAISED = range(16)  # of now_at
+LOAD, WAVE, AMPLITUDE, PHASE, LIFTED = range(5)  # of contacts.arrays.Climbing.flank
+RISE, VERTICAL, LAST, LAST_BUT_ONE, LIFTS, PULL, PULL_SLOPE, ALONG, MEAN_SLOPE, PATH, HELD, PLACE, BEFORE, NORMAL \
+    = range(14)  # of now_at
 INNER = sqrt(0.6)  # outer points of Gauss's rule of three
 STEEP = 1e-4  # radians of a groove below which sines are series
 
@@ -33,37 +32,12 @@ def steep(flank, q):
 
 @njit(error_model="numpy", **LEAN)
 def path_over(flank, q, dq):
-    """Mean of sqrt(1 + t^2), ds/dq, over the slide dq [m] from q [m], by Gauss's rule of three; real, or complex."""
-    path = 0.0 * q
+    """Mean of sqrt(1 + t^2), ds/dq, over the slide dq [m] from q [m], by Gauss's rule of three."""
+    path = 0.0
     for k in range(-1, 2):
         t = steep(flank, q + 0.5 * dq * (1 + k * INNER))
         path = path + (4 / 9 if k == 0 else 5 / 18) * np.sqrt(1 + t * t)
     return path
-
-
-@njit(error_model="numpy", **LEAN)
-def loaded(flank, at, dt):
-    """(load [N] at the start of a step, load at its end dt [s] later)."""
-    if flank[SWING] == 0.0:
-        return flank[LOAD], flank[LOAD]
-    turn = flank[PACE] * at[CLOCK] + flank[LAG]
-    return flank[LOAD] + flank[SWING] * cos(turn), flank[LOAD] + flank[SWING] * cos(turn + flank[PACE] * dt)
-
-
-@njit(error_model="numpy", **LEAN)
-def raised(dq, dt, flank, at):
-    """Book the work of a solved step against the load, and what carries on into the next one."""
-    before, after = loaded(flank, at, dt)
-    at[RAISED] += 0.5 * (before + after) * at[MEAN_SLOPE] * dq
-    at[VERTICAL], at[LAST_BUT_ONE], at[LAST] = at[HELD] + 0.5 * (after - before), at[LAST], dq
-    at[CLOCK] += dt
-
-
-@njit(error_model="numpy", **LEAN)
-def of_height(c, q):
-    """Energy [J] of the load's height at the slide q [m], or what was done against a load that swings."""
-    turn = sin(0.5 * (c.flank[WAVE] * q - c.flank[PHASE]))
-    return c.now_at[RAISED] if c.flank[SWING] != 0.0 else 2 * c.flank[LOAD] * c.flank[AMPLITUDE] * turn * turn
 
 
 @njit(error_model="numpy", **LEAN)
@@ -79,12 +53,11 @@ def climb(dq, q, dt, flank, at):
     """(path [m] along the flank, normal force [N] at its end without friction, slope [1] there) of a slide dq [m] in dt
     [s]; mean slope, path over slide and mean vertical force [N] go into `at`."""
     at[MEAN_SLOPE], at[PATH] = over(flank, q, dq)
-    before, after = loaded(flank, at, dt)
-    at[HELD] = 0.5 * (before + after)
+    at[HELD] = flank[LOAD]
     if flank[LIFTED] > 0.0:
         at[HELD] += flank[LIFTED] * 2 * (at[MEAN_SLOPE] * dq / dt - at[RISE]) / dt
     end = steep(flank, q + dq)
-    return at[PATH] * dq, max(at[HELD] + 0.5 * (after - before), 0.0) * sqrt(1 + end * end), end
+    return at[PATH] * dq, max(at[HELD], 0.0) * sqrt(1 + end * end), end
 
 
 @njit(error_model="numpy", **LEAN)
@@ -102,7 +75,7 @@ def pull(dq, q, dt, c):
     """Write the mean force over the slide dq [m] in dt [s], and what belongs to it, into c.now_at: NORMAL is then the
     normal force at its end; BEFORE is that at its start, PLACE the force of the law there."""
     ds, flat, end = climb(dq, q, dt, c.flank, c.now_at)
-    pulled, gain = inside.drag(ds, flat, end, dt, c)
+    pulled, gain = points.drag(ds, flat, end, dt, c)
     resist(pulled, gain, q + 0.5 * dq, dt, c.flank, c.now_at)
 
 
@@ -111,7 +84,7 @@ def solve(free, beta, q, v, dt, c, goal):
     """(dq [m], mean force [N], iterations) of a step with dq = free - beta force, as of `contacts.element_kernels`."""
     at, low, high = c.now_at, -np.inf, np.inf
     t = steep(c.flank, q)
-    inside.begun(c, v * sqrt(1 + t * t), dt)
+    points.begun(c, v * sqrt(1 + t * t), dt)
     dq = 2 * at[LAST] - at[LAST_BUT_ONE]
     for count in range(1, 200):
         pull(dq, q, dt, c)
@@ -130,7 +103,7 @@ def solve(free, beta, q, v, dt, c, goal):
 def given(dq, q, v, dt, c, goal):
     """(mean force [N], True) over a slide dq [m] in dt [s] that is prescribed."""
     t = steep(c.flank, q)
-    inside.begun(c, v * sqrt(1 + t * t), dt)
+    points.begun(c, v * sqrt(1 + t * t), dt)
     pull(dq, q, dt, c)
     return c.now_at[PULL], True
 
@@ -142,12 +115,12 @@ def commit(dq, force, q, v0, v1, dt, c):
     t0, t1 = steep(c.flank, q), steep(c.flank, q + dq)
     v0, v1 = v0 * sqrt(1 + t0 * t0), v1 * sqrt(1 + t1 * t1)
     along = (force - at[HELD] * at[MEAN_SLOPE]) / at[PATH]
-    lost, fine = inside.commit(at[PATH] * dq, along, v0, v1, dt, c)
+    lost, fine = points.commit(at[PATH] * dq, along, v0, v1, dt, c)
     if c.flank[LIFTED] > 0.0:
         at[RISE] = 2 * at[MEAN_SLOPE] * dq / dt - at[RISE]
         at[LIFTS] = max(at[LIFTS], 0.0 if at[HELD] > 0.0 else 1.0)
-    raised(dq, dt, c.flank, at)
-    at[BEFORE], at[PLACE] = at[NORMAL], inside.state(c, 0.0, v1)[0]
+    at[VERTICAL], at[LAST_BUT_ONE], at[LAST] = at[HELD], at[LAST], dq
+    at[BEFORE], at[PLACE] = at[NORMAL], points.state(c, 0.0)[0]
     return lost, fine
 
 
@@ -157,6 +130,7 @@ def state(c, q, v):
     slide q [m] and the speed v [m/s]."""
     at, t = c.now_at, steep(c.flank, q)
     length = sqrt(1 + t * t)
-    along, energy, kept = inside.state(c, q, v * length)
-    energy += of_height(c, q) + 0.5 * c.flank[LIFTED] * at[RISE] * at[RISE]
+    half = sin(0.5 * (c.flank[WAVE] * q - c.flank[PHASE]))
+    along, energy, kept = points.state(c, q)
+    energy += 2 * c.flank[LOAD] * c.flank[AMPLITUDE] * half * half + 0.5 * c.flank[LIFTED] * at[RISE] * at[RISE]
     return at[VERTICAL] * t + along * length, energy, q - (q - kept) / length

@@ -1,24 +1,22 @@
 """Coulomb's law, or a force that follows the speed, along the flanks of grooves that the load climbs: a law of
 `dynamics.smooth` that holds the slide at rest.
 
-num: free, load [N], wave number [rad/m], amplitude [m], phase of the grooves, lifted mass [kg], mu_s, mu_k, v_0 [m/s]
-of a law of the speed or 0, and of the load amplitude [N], pace [rad/s] and phase of its swing; mem: work against the
-load at the start [J], and whether it has begun. The states y are friction's own loss along the flank, the work done
-against the load, int N dz [J], and two whose rates alone count: what is left of the hold and of the load [N]. turn:
-`smooth.arrays.Moving`; it sticks where the direction is 0.
+num: free, load [N], wave number [rad/m], amplitude [m], phase of the grooves, lifted mass [kg], mu_s, mu_k, and v_0
+[m/s] of a law of the speed or 0; there is no memory. The states y are friction's own loss along the flank [J] and two
+whose rates alone count: what is left of the hold and of the load [N]. turn: `smooth.arrays.Moving`; the slide sticks
+where the direction is 0.
 """
 
 from math import cos, inf, nan, sin, sqrt, tanh
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import LEAN, knee
-from ..smooth.arrays import CLOCK, EASE, FREE, PLACE, PULL, UPRIGHT
+from ..smooth.arrays import EASE, FREE, PLACE, PULL, UPRIGHT
 
-__all__ = ["SET_VALUED", "begin", "finish", "gives", "knee", "longest", "rate", "shown"]
+__all__ = ["SET_VALUED", "begin", "finish", "gives", "knee", "rate", "shown"]
 
 SET_VALUED = True
-LOAD, WAVE, AMPLITUDE, PHASE, LIFTED, STATIC, KINETIC, SPEED, SWING, PACE, LAG = range(1, 12)  # of num
-QUICK = 0.2  # radians of a load that swings in a step: what sticks has no error that would tell of it
+LOAD, WAVE, AMPLITUDE, PHASE, LIFTED, STATIC, KINETIC, SPEED = range(1, 9)  # of num
 
 
 @njit(error_model="numpy", **LEAN)
@@ -31,8 +29,7 @@ def flank(num, q):
 @njit(error_model="numpy", **LEAN)
 def holds(num, turn):
     """(smallest, largest) force [N] with which the flank holds the slide at rest, as `turn` has it."""
-    t, mu = flank(num, turn[PLACE])[0], num[0, STATIC]
-    load = num[0, LOAD] + num[0, SWING] * cos(num[0, PACE] * turn[CLOCK] + num[0, LAG])
+    t, mu, load = flank(num, turn[PLACE])[0], num[0, STATIC], num[0, LOAD]
     return load * (t - mu) / (1 + mu * t), load * (t + mu) / (1 - mu * t)
 
 
@@ -46,16 +43,8 @@ def gives(num, turn):
 
 
 @njit(error_model="numpy", **LEAN)
-def longest(num, turn):
-    """Longest step [s] under a load that swings."""
-    return QUICK / num[0, PACE] if num[0, SWING] != 0.0 else inf
-
-
-@njit(error_model="numpy", **LEAN)
 def begin(num, mem, way, y):
-    """Set the work against the load at the start; there is no kink ahead."""
-    if mem[0, 1] == 0.0:
-        y[1], mem[0, 1] = mem[0, 0], 1.0
+    """Path to the next kink: there is none, and no state to set."""
     return inf
 
 
@@ -67,13 +56,12 @@ def rate(num, mem, turn, dq, v, y, out):
     and F = V c are linear in F, c = (t + phi)/(1 - phi t): F (1 + m_l t c s) = c (N + m_l (t' q'^2 + t a)).
     """
     steep, bend = flank(num, turn[PLACE])
-    load = num[0, LOAD] + num[0, SWING] * cos(num[0, PACE] * turn[CLOCK] + num[0, LAG])
-    free, share, heavy = turn[FREE], turn[EASE], num[0, LIFTED]
-    out[2], normal = 1.0, load
+    load, free, share, heavy = num[0, LOAD], turn[FREE], turn[EASE], num[0, LIFTED]
+    out[1], normal = 1.0, load
     if turn[0] == 0.0 and num[0, SPEED] == 0.0:
         turn[PULL], out[0] = free / share, 0.0
         low, high = holds(num, turn)
-        out[2] = min(high - turn[PULL], turn[PULL] - low)
+        out[1] = min(high - turn[PULL], turn[PULL] - low)
     else:
         phi = turn[0] * num[0, KINETIC]
         if num[0, SPEED] > 0:
@@ -82,16 +70,16 @@ def rate(num, mem, turn, dq, v, y, out):
         turn[PULL] = ratio * (load + heavy * (bend * v * v + steep * free)) / (1 + heavy * steep * ratio * share)
         normal += heavy * (steep * (free - share * turn[PULL]) + bend * v * v)
         out[0] = phi * (1 + steep * steep) / (1 - phi * steep) * normal * v
-    out[1], out[3], turn[UPRIGHT] = load * steep * v, normal, normal
+    out[2], turn[UPRIGHT] = normal, normal
     return turn[PULL]
 
 
 @njit(error_model="numpy", **LEAN)
 def shown(num, mem, turn, dq, q, v, y):
-    """(force [N] that `rate` left in turn, energy [J] of the load's height, or what was done against a load that
-    swings, and of the mass that rises, the slide q [m])."""
+    """(force [N] that `rate` left in turn, energy [J] of the load's height and of the mass that rises, the
+    slide q [m])."""
     half, rise = sin(0.5 * (num[0, WAVE] * q - num[0, PHASE])), flank(num, q)[0] * v
-    height = y[1] if num[0, SWING] != 0.0 else 2 * num[0, LOAD] * num[0, AMPLITUDE] * half * half
+    height = 2 * num[0, LOAD] * num[0, AMPLITUDE] * half * half
     return turn[PULL], height + 0.5 * num[0, LIFTED] * rise * rise, q
 
 

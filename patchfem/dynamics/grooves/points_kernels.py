@@ -1,8 +1,8 @@
 """The points of a contact that climbs flanks under a law with memory, loaded by the normal force of the flank.
 
-`contact_kernels` runs with this text for points under a load that changes, of `contacts.arrays.Climbing`: one of rigid
-pieces, or those behind shear modes, which share the normal force and slide along the flank, as in
-`contacts.shear_solve_kernels`. It asks for begun, drag, commit and state.
+The points are those of `contacts.arrays.Climbing`: one of rigid pieces, or those behind shear modes, which share the
+normal force and slide along the flank, as in `contacts.shear_solve_kernels`. `contact_kernels` asks for begun, drag,
+commit and state.
 """
 
 from ...compiled.inner import njit
@@ -101,6 +101,6 @@ def commit(ds, along, v0, v1, dt, c):
 
 
 @njit(error_model="numpy", **LEAN)
-def state(c, q, v):
+def state(c, q):
     """(force along the flank [N], energy stored in the law [J], irreversible slip [m]) at the slide q [m]."""
     return rub_state(int(c.flank[KIND]), c, q)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...core import Outcome, Start
-from ...friction.grooves import STEADY, Grooves, Swing
+from ...friction.grooves import Grooves
 from ...friction.path_work import sampled_work
 from ...friction.protocol import Element
 from ..march.models import coulomb_model
@@ -30,7 +30,6 @@ class GroovesModel(FlankModel):
     static: float
     kinetic: float
     speed: float | None = None
-    swing: Swing = STEADY
 
     @property
     def length(self) -> float:
@@ -73,11 +72,10 @@ class SampledRun(GroovesRun):
 
     def _begin(self) -> None:
         """Begin the motion from the state as it stands, at the start of the drive."""
-        g, model, swing = self.model.grooves, self.model, self.model.swing
-        raised = swing.about(model.load, 0.0) * g.height(self.modes.slide @ self.state[0])
+        g, model = self.model.grooves, self.model
         numbers = [1.0, model.load, g.wave, g.amplitude, g.phase, g.lifted_mass, model.static, model.kinetic,
-                   model.speed or 0.0, swing.amplitude, swing.omega, swing.phase]
-        element = Element(HERE, np.array(numbers), np.array([raised, 0.0]), model.limit, sizes=(np.inf,) * 4)
+                   model.speed or 0.0]
+        element = Element(HERE, np.array(numbers), np.zeros(0), model.limit, sizes=(np.inf,) * 3)
         self.motion_of = smooth.Motion(self.modes, self.drive, element, 1.0, TOLERANCE, start=Start(*self.state))
         self.motion_of.ends_only(1)
         n, least = self.modes.omega.size, self.motion_of.moving.work[24]
@@ -151,9 +149,7 @@ class SampledRun(GroovesRun):
                             "accuracy.steps_per_cycle")
 
     def strained(self) -> float:
-        """Energy of the height of the load, or done against one that swings, and of the speed of what rises [J]."""
+        """Energy of the height of the load and of the speed of what rises [J]."""
         g, (z, v) = self.model.grooves, self.state
         q, rate = float(self.modes.slide @ z), float(self.modes.slide @ v)
-        swings = self.model.swing.amplitude
-        height = self.motion_of.moving.y[2 * z.size + 1] if swings else self.model.load * g.height(q)
-        return float(height + 0.5 * g.lifted_mass * (g.slope(q) * rate)**2)
+        return float(self.model.load * g.height(q) + 0.5 * g.lifted_mass * (g.slope(q) * rate)**2)

@@ -10,7 +10,6 @@ from ... import compiled
 from ..contacts.dispatch import COULOMB, law_of
 
 HERE = "dynamics.march"
-SOLVES = {"dynamics.grooves.contact_kernels": "dynamics.grooves.element_kernels"}  # contacts that solve their step
 SHEARED_LISTS = "dynamics.contacts.shear_list_kernels"  # lists of bonds behind shear modes
 STEADY, WHOLE, POINTS = "", "whole", "points"  # loads: that stays; that changes, borne as a whole or point by point
 
@@ -25,8 +24,6 @@ def contact_of(kind: tuple):
     if not law:
         return compiled.load(contact)
     law = compiled.load(law)
-    if contact in SOLVES:
-        return compiled.instance(contact, {"inside": compiled.instance(SOLVES[contact], {"law": law})})
     solver = compiled.instance("dynamics.contacts.element_solve_kernels", {"law": law})
     return compiled.instance(contact, {"law": law, "solver": solver})
 

@@ -9,7 +9,7 @@ TIME, STEP, TURNED, ORIGIN, LEFT, CREST, CREST_SPEED, PACE, BEGUN, STOOD, MASS, 
 # of Kept.tally
 POWER, STORED, LOST, DONE, REFUSED, TURNS, SAMPLE, PARTS, PERIOD, FORCE = range(10)
 # of Moving.turn, beyond direction, path to the next kink and knee: what a law that holds has to know, and tells
-CLOCK, FREE, EASE, PLACE, PULL, UPRIGHT = range(3, 9)
+FREE, EASE, PLACE, PULL, UPRIGHT = range(3, 8)
 NODES = 9  # places of a part of a step at which it stands
 ENDS = (1 - np.cos(np.pi * np.arange(NODES) / (NODES - 1))) / 2  # these places, as shares of it (Chebyshev)
 
@@ -18,7 +18,7 @@ class Moving(NamedTuple):
     """Modes, drive, law and the state of a motion, in few arrays, as each is handed on in every call.
 
     rows (5, n): omega, 2 zeta omega, slide, base, output; damping: (n, n) where it couples, else (0, 0). pieces (p,
-    12): of the drive, as of `events.drive_kernels`. num, mem of the law, turn (9,) as the law takes it. y (N,): state;
+    12): of the drive, as of `events.drive_kernels`. num, mem of the law, turn (8,) as the law takes it. y (N,): state;
     work (26, N): slopes of the 16 stages, extension of the step (8), sizes of the law's states and least ones of the
     others, state after a step. now (15,): time [s], length of the next step and of the first after a reversal [s],
     slide at the start of the motion in this direction [m], energy lost to friction till then [J], largest coordinate

@@ -65,8 +65,8 @@ def left(m, what, y, slopes, travel):
         side = 1.0 if m.turn[2] > 0 else -1.0
         floor = law.knee(m.num)
         return side * (way * v - floor), side * way * gain, 1e-12 * floor
-    if what >= RELEASE:  # a law that holds writes what is left of its hold and of the load behind its two losses
-        return slopes[2 * n + what - RELEASE + 2], 0.0, 0.0
+    if what >= RELEASE:  # a law that holds writes what is left of its hold and of the load behind its loss
+        return slopes[2 * n + what - RELEASE + 1], 0.0, 0.0
     x, w = watching.output_of(m, y)
     return travel - abs(x), -w if x > 0 else w, 1e-13 * travel
 
@@ -315,7 +315,7 @@ def accept(m, h, k):
 def try_step(m, h, tolerance, k):
     """Take a step of at most h [s] whose error meets the tolerance: (its length, the next length)."""
     if law.SET_VALUED:
-        h = min(h, law.longest(m.num, m.turn), STUCK * k.tally[PERIOD] if m.turn[0] == 0 else np.inf)
+        h = min(h, STUCK * k.tally[PERIOD] if m.turn[0] == 0 else np.inf)
     for _ in range(60):
         steps.step(m, h)
         error = steps.missed(m, h, tolerance)

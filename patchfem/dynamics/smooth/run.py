@@ -99,7 +99,7 @@ def started(modes: ModalBasis, drive, element, cycles: float, start=None) -> tup
     now[[DRIVEN, MOVES]], tally[PERIOD] = (drive.period, drive.moving), drive.period
     work[24, 2 * n:-3] = element.sizes
     rows = np.stack([modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base, modes.output])
-    law = element.numbers[None], element.memory[None], [1.0, np.inf, 1.0, *np.zeros(6)]
+    law = element.numbers[None], element.memory[None], [1.0, np.inf, 1.0, *np.zeros(5)]
     own = (rows, damping, segments_of(drive), *law, state, work, now)
     moving = Moving(*(np.array(part, float, order="C") for part in own))
     cycles = np.zeros((4, max(1, ceil(cycles - 1e-9))))

@@ -14,7 +14,7 @@ from ...friction.flags_kernels import FAST, INNER
 from ...friction.laws import stretch_kernels as law
 from ..events.drive_kernels import value_now
 from ..tableau_kernels import BEFORE, FIFTH, INSIDE, PLACES, SHARES, STAGES, THIRD
-from .arrays import CLOCK, CREST, CREST_SPEED, DRIVEN, EASE, FREE, MASS, ORIGIN, PIECE, PLACE, STIFF, TIME
+from .arrays import CREST, CREST_SPEED, DRIVEN, EASE, FREE, MASS, ORIGIN, PIECE, PLACE, STIFF, TIME
 
 OMEGA, DAMP, SLIDE, BASE, OUTPUT = range(5)  # of Moving.rows
 EXTENSION, SIZES, TRIAL = 16, 24, 25  # of Moving.work, whose first rows are the slopes
@@ -55,9 +55,9 @@ def of_mode(m, i, y, out, drive, pull):
 
 
 @njit(error_model="numpy", **INNER)
-def offered(m, t, q, y, drive):
-    """Write what a law that holds has to know into m.turn: time [s], acceleration [m s-2] that the slide has without
-    the force and what a newton takes of it [1/kg], slide [m]."""
+def offered(m, q, y, drive):
+    """Write what a law that holds has to know into m.turn: acceleration [m s-2] that the slide has without the force
+    and what a newton takes of it [1/kg], slide [m]."""
     n, free, ease = m.rows.shape[1], 0.0, 0.0
     for i in range(n):
         damped = m.rows[DAMP, i] * y[n + i]
@@ -67,7 +67,7 @@ def offered(m, t, q, y, drive):
                 damped += m.damping[i, j] * y[n + j]
         free -= m.rows[SLIDE, i] * (damped + m.rows[OMEGA, i] * m.rows[OMEGA, i] * y[i] + m.rows[BASE, i] * drive)
         ease += m.rows[SLIDE, i] * m.rows[SLIDE, i] / m.now[MASS]
-    m.turn[CLOCK], m.turn[FREE], m.turn[EASE], m.turn[PLACE] = t, free, ease, q
+    m.turn[FREE], m.turn[EASE], m.turn[PLACE] = free, ease, q
 
 
 @njit(error_model="numpy", forceinline=True, **INNER)
@@ -81,7 +81,7 @@ def slope(m, t, y, out):
     drive, mass = push(m, t), m.now[MASS]
     q, v = slide_of(m, y)
     if law.SET_VALUED:
-        offered(m, t, q, y, drive)
+        offered(m, q, y, drive)
     force = law.rate(m.num, m.mem, m.turn, q - m.now[ORIGIN], v, y[2 * n:energies], out[2 * n:energies])
     work, lost = of_mode(m, 0, y, out, drive, force / mass)
     for i in range(1, n):

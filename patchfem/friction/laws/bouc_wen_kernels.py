@@ -10,11 +10,11 @@ from math import exp, expm1, inf, log, log1p, nan
 import numpy as np
 
 from ...compiled.inner import njit
-from ..flags_kernels import FAST, LAYERS, LEAN, SET_VALUED, closed, gives, knee, layer, longest, middle
+from ..flags_kernels import FAST, LAYERS, LEAN, SET_VALUED, closed, gives, knee, layer, middle
 from .exponential_kernels import decay
 
 __all__ = ["BENDS", "FOLLOWS", "LAYERS", "SET_VALUED", "after", "begin", "closed", "commit", "finish", "flow",
-           "flowing", "gives", "knee", "layer", "longest", "mean", "middle", "pull", "rate", "shown", "state"]
+           "flowing", "gives", "knee", "layer", "mean", "middle", "pull", "rate", "shown", "state"]
 
 UNITS, BENDS, FOLLOWS = "N m 1 1", True, True  # of the numbers k of the law in lanes; as of `flags_kernels`
 

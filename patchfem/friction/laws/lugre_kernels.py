@@ -8,11 +8,11 @@ from math import inf, nan
 
 from ...compiled.inner import njit
 from ..bonds.point_kernels import shape
-from ..flags_kernels import BENDS, FAST, FOLLOWS, LAYERS, LEAN, SET_VALUED, after, closed, gives, layer, longest, middle
+from ..flags_kernels import BENDS, FAST, FOLLOWS, LAYERS, LEAN, SET_VALUED, after, closed, gives, layer, middle
 from .exponential_kernels import decay
 
 __all__ = ["BENDS", "FOLLOWS", "LAYERS", "SET_VALUED", "after", "begin", "closed", "commit", "finish", "flow",
-           "flowing", "gives", "knee", "layer", "longest", "mean", "middle", "pull", "rate", "shown", "state"]
+           "flowing", "gives", "knee", "layer", "mean", "middle", "pull", "rate", "shown", "state"]
 
 UNITS = "N/m N N m/s N_s/m N_s/m"  # of the numbers k of the law in lanes
 

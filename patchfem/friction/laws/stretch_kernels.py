@@ -11,11 +11,11 @@ from math import exp, expm1, inf, nan
 
 from ...compiled.inner import njit
 from ..bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step
-from ..flags_kernels import BENDS, FAST, LAYERS, LEAN, SET_VALUED, closed, gives, layer, longest
+from ..flags_kernels import BENDS, FAST, LAYERS, LEAN, SET_VALUED, closed, gives, layer
 from .exponential_kernels import decay
 
 __all__ = ["BENDS", "LAYERS", "SET_VALUED", "after", "begin", "closed", "commit", "finish", "flow", "flowing", "gives",
-           "knee", "layer", "longest", "mean", "middle", "pull", "rate", "shown", "state"]
+           "knee", "layer", "mean", "middle", "pull", "rate", "shown", "state"]
 
 GROWTH, WEIGHT = 2, 8  # of num: where the growth and the weights begin
 FREE = 7  # of num: share of the bond length that stretches without damage

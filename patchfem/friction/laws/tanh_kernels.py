@@ -17,12 +17,11 @@ from ..flags_kernels import (
     closed,
     gives,
     knee,
-    longest,
     middle,
 )
 
 __all__ = ["BENDS", "FOLLOWS", "LAYERS", "SET_VALUED", "after", "at_end", "begin", "closed", "commit", "finish",
-           "flowing", "gives", "knee", "layer", "longest", "mean", "middle", "rate", "shown", "state"]
+           "flowing", "gives", "knee", "layer", "mean", "middle", "rate", "shown", "state"]
 
 UNITS, LAYERS = "N s/m", True  # of the numbers k of the law in lanes; as of `flags_kernels`
 SATURATED = 15.0  # argument from which tanh is 1 to 2e-13

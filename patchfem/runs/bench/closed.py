@@ -1,5 +1,4 @@
-"""A rigid slide of a law without memory, in closed form: a pressure that rides on the upper piece, a constant load,
-over grooves one that swings too.
+"""A rigid slide of a law without memory, in closed form: a pressure that rides on the upper piece, a constant load.
 
 In every step such a law carries a share of its limit, and the limit is that of the way it slides.
 """
@@ -45,82 +44,42 @@ def closed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
 
 
 def climbed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
-    """As `closed_form`, of a slow slide over grooves: the force is N (t + phi)/(1 - phi t), phi = f/R along the flank.
+    """Slide a law without memory slowly over grooves: the force is N (t + phi)/(1 - phi t), phi = f/R along the flank.
 
-    The height of the load is stored, friction's own work along the flank is dissipated; no mass is lifted. Under a load
-    N(time) on a point what counts as stored is the work done against it, int N dz.
+    The height of the load is stored, friction's own work along the flank is dissipated; no mass is lifted. Arguments as
+    of `closed_form`.
     """
     (time, slide), (sigma, weight), law, grooves = path, pressure_of(model, patch), law_for(model, patch), model.grooves
-    move, f, varies = np.diff(slide), model.friction, model.load_varies
-    load = model.point.at(time) if varies else np.full(time.size, float(weight @ sigma))
-    pace = np.divide(move, np.diff(time), out=np.zeros_like(move), where=np.diff(time) > 0)
+    load = float(weight @ sigma)
+    move = np.diff(slide)
     if law.holds:
         last = np.maximum.accumulate(np.where(move != 0, np.arange(move.size), -1))
         way = np.append(0.0, np.where(last < 0, 0.0, np.sign(move)[last]))
         ratio = grooves.ratio(slide, way, law.kinetic)
-        rests = np.append(True, move == 0)
-        if varies:
-            _held(grooves, slide, load, ratio, np.flatnonzero(rests & (way != 0)), f.static)
-        at_first = way == 0
-        least, most = (grooves.ratio(slide[0], side, f.static) for side in (-1.0, 1.0))
-        ratio[at_first] = np.clip(0.0, least, most)  # at rest before the motion the flank holds what it must
-
-        def share(q, speed):
-            return law.kinetic * np.sign(speed)
+        lowest, highest = (grooves.ratio(slide[0], side, model.friction.static) for side in (-1.0, 1.0))
+        ratio[way == 0] = np.clip(0.0, lowest, highest)  # at rest before the motion the flank holds what it must
+        own = load * grooves.lost(slide[:-1], slide[1:], law.kinetic)
     else:
-        def share(q, speed):
-            return law.static * law.share(np.sqrt(1 + grooves.slope(q)**2) * speed, 1.0)
-
-        ratio = _ratio(grooves, slide, share(slide, np.append(0.0, pace)))
-    if law.holds and not varies:
-        own = load[0] * grooves.lost(slide[:-1], slide[1:], law.kinetic)
-    else:
-        own = over_steps(load, slide, move, lambda q: _own(grooves, q, share(q, pace)))
-    height = load[0] * grooves.height(slide)
-    if varies:
-        height = height[0] + np.append(0.0, np.cumsum(over_steps(load, slide, move, grooves.slope)))
-    rise = np.diff(height) if varies else load[0] * grooves.rise(slide[:-1], slide[1:])
+        duration = np.diff(time)
+        speed = np.divide(move, duration, out=np.zeros_like(move), where=duration > 0)
+        t, phi = _along_flank(grooves, law, slide, np.append(0.0, speed))
+        ratio = (t + phi) / (1 - phi * t)
+        own = np.zeros_like(move)
+        for place, gauss_weight in zip(*np.polynomial.legendre.leggauss(GAUSS)):
+            t, phi = _along_flank(grooves, law, slide[:-1] + 0.5 * (1 + place) * move, speed)
+            own += 0.5 * gauss_weight * load * phi * (1 + t**2) / (1 - phi * t) * move
+    rise = load * grooves.rise(slide[:-1], slide[1:])
     for k, side in ends_of_rest(model, slide).items():
-        ratio[k] = grooves.ratio(slide[k], side, f.static)
+        ratio[k] = grooves.ratio(slide[k], side, model.friction.static)
     at = frame_numbers(slide.size, frames)
     watch.tell(1.0)
-    return Slid(load * ratio, load, slide.copy(), ledger_of(np.append(0.0, np.cumsum(rise + own)), height,
-                np.stack([np.zeros(slide.size), np.append(0.0, own)], axis=1)), at,
-                (load[at] / model.point.load * ratio[at] if varies else ratio[at])[:, None] * sigma,
+    losses = np.stack([np.zeros(slide.size), np.append(0.0, own)], axis=1)
+    ledger = ledger_of(np.append(0.0, np.cumsum(rise + own)), load * grooves.height(slide), losses)
+    return Slid(load * ratio, np.full(time.size, load), slide.copy(), ledger, at, ratio[at, None] * sigma,
                 np.repeat(slide[at, None], sigma.size, axis=1))
 
 
-def _ratio(grooves, q, phi):
-    """Force over vertical force [1] of a share phi = f/R along the flank at slides q [m]."""
-    t = grooves.slope(q)
-    return (t + phi) / (1 - phi * t)
-
-
-def _own(grooves, q, phi):
-    """Friction's own work per slide and vertical force [1], phi (1 + t^2)/(1 - phi t), at slides q [m]."""
-    t = grooves.slope(q)
-    return phi * (1 + t**2) / (1 - phi * t)
-
-
-def over_steps(load, slide, move, part) -> np.ndarray:
-    """int N part(q) dq [J] of every step of the slide (k,) [m], move (k - 1,) [m], under a load (k,) [N] that changes
-    evenly in it; part: function of slides (k - 1,) [m]."""
-    out = np.zeros_like(move)
-    for place, weight in zip(*np.polynomial.legendre.leggauss(GAUSS)):
-        share = 0.5 * (1 + place)
-        out += 0.5 * weight * (load[:-1] + share * np.diff(load)) * part(slide[:-1] + share * move) * move
-    return out
-
-
-def _held(grooves, slide, load, ratio, rests, static: float) -> None:
-    """Write the ratios of force to load at the samples `rests`, at which a slide has stopped while the load changes.
-
-    The friction f along the flank stays, as it does where the load is constant, or is the limit mu R of the normal
-    force R = N sqrt(1 + t^2) + f t.
-    """
-    for k in rests:
-        t = grooves.slope(slide[k])
-        long = np.sqrt(1 + t * t)
-        f = (ratio[k - 1] * load[k - 1] - load[k - 1] * t) / long
-        least, most = (load[k] * long * side * static / (1 - side * static * t) for side in (-1.0, 1.0))
-        ratio[k] = t + min(max(f, least), most) * long / load[k]
+def _along_flank(grooves, law, slide, speed) -> tuple:
+    """Return (slope t, f/R along the flank) [1] of a law of the speed, at slides [m] with speeds of the slide [m/s]."""
+    t = grooves.slope(slide)
+    return t, law.static * law.share(np.sqrt(1 + t**2) * speed, 1.0)

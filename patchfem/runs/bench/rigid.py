@@ -13,8 +13,7 @@ from ...dynamics.events.elements import JOINED, cells_joined
 from ...dynamics.grooves import climbing as flank_climbing
 from ...dynamics.march import varying_load
 from ...dynamics.march.models import ContactModel, element_model, list_model, points_model
-from ...effects import carries, has
-from ...friction import grooves
+from ...effects import has
 from ...friction.laws.elastic_plastic import parallel
 from ...friction.record import law_from
 from ...response.coarser import Coarser
@@ -50,20 +49,16 @@ def climbing(model, load: float, patch=None, count: int | None = None):
     patch: the solved Patch where its pieces give way, count: how many shear modes stand for them, None: by the
     tolerance.
     """
-    f, modes = model.friction, model.rig.modes if model.rig is not None else None
-    grooves = model.grooves if modes is not None else replace(model.grooves, lifted_mass=0.0)
-    varies = carries(f, "varying-load")
-    law = law_from(f, load).element(load) if not varies else \
-        varying_load.bonds(model.bonds) if has(f.law, "bonds") else varying_load.plastic(f.static, f.bond_length or 0.0)
-    found = replace(flank_climbing.model_of(grooves, load, f.static, law, modes), swing=swing_of(model))
-    return flank_climbing.giving(found, patch, count, model.accuracy.tolerance) if model.soft and varies else found
-
-
-def swing_of(model):
-    """How the load of a point swings about its mean, a `friction.grooves.Swing`."""
-    point = model.point
-    return grooves.Swing(point.amplitude, 2 * np.pi * point.frequency, point.phase) if model.load_varies \
-        else grooves.STEADY
+    f = model.friction
+    if has(f.law, "bonds"):
+        law = varying_load.bonds(model.bonds)
+    else:
+        law = varying_load.plastic(f.static, f.bond_length or 0.0)
+    if model.rig is None:
+        found = flank_climbing.model_of(replace(model.grooves, lifted_mass=0.0), load, law, None)
+    else:
+        found = flank_climbing.model_of(model.grooves, load, law, model.rig.modes)
+    return flank_climbing.giving(found, patch, count, model.accuracy.tolerance) if model.soft else found
 
 
 def one_point(model, load: float, engine: BenchEngine, springs=None) -> ContactModel:

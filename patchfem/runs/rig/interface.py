@@ -1,6 +1,5 @@
 """From the law, the load and the pressed patch to the contact that a march moves."""
 
-from dataclasses import replace
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -80,8 +79,7 @@ def _climbing(model: Model, patch, count: int | None = None):
 
     speed = None if has(f.law, "set-valued") else f.reference_speed
     kinetic = f.static if f.kinetic is None else f.kinetic
-    climbs = run.model_of(model.grooves, load, f.static, kinetic, speed, model.rig.modes)
-    return replace(climbs, swing=rigid.swing_of(model))
+    return run.model_of(model.grooves, load, f.static, kinetic, speed, model.rig.modes)
 
 
 def element_of(one: InterfaceLaw, load: float, speed: float) -> Element:

@@ -4,6 +4,7 @@ METHODS = {
     name: f"'{name}' was removed in patchfem 1.0; use 'march' (studies/integrators compares the methods)"
     for name in ("duhamel", "newmark", "euler")
 }
+LAWS_OVER_GROOVES = ("iwan", "bouc-wen", "lugre")
 KEYS = {
     f"accuracy.{name}": f"this key of method '{method}' was removed in patchfem 1.0; use method 'march' without it"
     for name, method in (

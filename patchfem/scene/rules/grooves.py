@@ -6,6 +6,7 @@ from math import pi
 from typing import Any
 
 from ...effects import carries, has, listed, named, refusal, unbuilt
+from ..keys import removed
 from .draft import Draft
 from .methods import changing_load, turning
 
@@ -54,18 +55,6 @@ def _locks(draft: Draft, at: str, grooves: Any, law: Any) -> None:
                                      f"= {most:.6g} m is needed, or a smaller `static`")
 
 
-def _under_changing_load(draft: Draft, beside: str) -> None:
-    """A load that is prescribed may swing above zero; heave and pitch would press the flanks by themselves."""
-    cause, normal = changing_load(draft.tables), draft.tables.normal
-    if cause == "normal.amplitude":
-        if normal.load is not None and normal.amplitude >= normal.load:
-            draft.say(cause, f"{normal.amplitude:.6g} N lets the load fall to zero, and without a load nothing holds "
-                             f"the pieces in their grooves; an amplitude below normal.load = {normal.load:.6g} N is "
-                             f"needed {beside}")
-    elif cause:
-        draft.say(cause, unbuilt(beside, "either"))
-
-
 def _beside(draft: Draft, at: str, grooves: Any, law: Any) -> None:
     """Grooves are climbed as a whole by one interface, whose load heave and pitch do not change."""
     contact, structure = draft.tables.contact, draft.tables.structure
@@ -73,6 +62,8 @@ def _beside(draft: Draft, at: str, grooves: Any, law: Any) -> None:
     if has(law.law, "bonds") and (listed(law) or law.breakaway):
         key = "reading" if law.reading == "report" else "breakaway" if law.breakaway else "order"
         draft.say(f"friction.{key}", unbuilt(beside, "recursion"))
+    elif law.law in removed.LAWS_OVER_GROOVES:
+        draft.say("friction.law", f"{named(law)} {beside} was removed in patchfem 1.0; {refusal('grooves')}")
     elif not carries(law, "grooves"):
         draft.say("friction.law", unbuilt(f"{named(law)} {beside}", refusal("grooves", odd=law)))
     accuracy = draft.tables.accuracy  # None where [accuracy] could not be read
@@ -87,7 +78,9 @@ def _beside(draft: Draft, at: str, grooves: Any, law: Any) -> None:
             draft.say("contact.holder.tangential_stiffness", unbuilt(beside, "out"))
     if contact is not None and contact.strips is not None and (turning(draft.tables) or contact.gives_way):
         draft.say(at, unbuilt("with strips that yaw or are elastic", "either"))
-    _under_changing_load(draft, beside)
+    if cause := changing_load(draft.tables):
+        over = "a normal load that oscillates over grooves was removed in patchfem 1.0; leave one of the two out"
+        draft.say(cause, over if cause == "normal.amplitude" else unbuilt(beside, "either"))
     lower = [f"contact.{name}.on" for name, one in (contact.shapes if contact is not None else {}).items()
              if one.on == "lower"]
     if lower:

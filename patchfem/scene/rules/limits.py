@@ -12,7 +12,7 @@ from ..keys.contact import Contact
 from ..keys.tables import Friction, Interface, Tables
 from .contact import OfInterface, of_interfaces
 from .draft import Draft
-from .methods import beside_load, changing_load, check_method, climbed, turning
+from .methods import beside_load, changing_load, check_method, turning
 
 NOT_YET_BUILT = "structure.mode.lateral"  # valid in a scene, but no run can do it
 
@@ -36,8 +36,7 @@ def combinations(draft: Draft, kind: str) -> None:
     _quadrature(draft, kind, law, shear)
     if kind == "rig" and (cause := changing_load(draft.tables)):
         _under_changing_load(draft, law, shear, cause)
-    still = _still(law) and not climbed(draft.tables)  # along flanks every law has a normal force that changes
-    if kind == "bench" and still and draft.tables.normal is not None and draft.tables.normal.amplitude:
+    if kind == "bench" and _still(law) and draft.tables.normal is not None and draft.tables.normal.amplitude:
         draft.say("normal.amplitude", unbuilt(f"with law '{law.law}'", refusal("varying-load")))
     if (kind == "rig" or shear) and has(law.law, "bonds") and law.breakaway and law.order != 1:
         where = "in a rig" if kind == "rig" else f"and {shear}"
@@ -169,11 +168,9 @@ def _under_changing_load(draft: Draft, law: Friction, shear: str, cause: str) ->
     contact, structure, beside = draft.tables.contact, draft.tables.structure, beside_load(cause)
     if contact is None and cause != "normal.amplitude":
         draft.say(cause, "a single contact point cannot heave or pitch: use [contact] in place of [normal]")
-    carried = "grooves" if climbed(draft.tables) else "varying-load"
-    if not has(law.law, "bonds") and not carries(law, carried):
-        draft.say("friction.law", unbuilt(f"'{law.law}' {beside}", refusal(carried)))
-    elif has(law.law, "bonds") and (law.breakaway or (listed(law) and (climbed(draft.tables) or
-                                                                      law.reading != "report"))):
+    if not has(law.law, "bonds") and not carries(law, "varying-load"):
+        draft.say("friction.law", unbuilt(f"'{law.law}' {beside}", refusal("varying-load")))
+    elif has(law.law, "bonds") and (law.breakaway or (listed(law) and law.reading != "report")):
         key = "reading" if law.reading == "report" else "breakaway" if law.breakaway else "order"
         draft.say(f"friction.{key}", unbuilt(beside, "recursion"))
     if shear and has(law.law, "set-valued") and carries(law, "shear"):

@@ -1,6 +1,5 @@
 """Laws with memory along the flanks of grooves: their NumPy twin, Coulomb's law as the limit, the law itself, order."""
 
-from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -15,7 +14,7 @@ from patchfem.dynamics.march.models import element_model, points_model
 from patchfem.dynamics.march.varying_load import bonds, plastic
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.recursion import Recursion
-from patchfem.friction.grooves import STEADY, Grooves, Swing
+from patchfem.friction.grooves import Grooves
 from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.response.measures import energy_balance
 
@@ -23,25 +22,23 @@ LOAD, MU = 115.65, 0.4
 ONE = np.ones(1)
 BASIS = ModalBasis(("axial",), np.array([2 * np.pi * 143]), np.array([0.003]), ONE, ONE, ONE, 1.194)
 DRIVE = BaseSine(49.0, 2 * np.pi * 143)
-SWING = Swing(40.0, 2 * np.pi * 97, 0.7)
 LAWS = {"elastic-plastic": (lambda length: plastic(MU, length), lambda length: ElasticPlastic(MU, length)),
         "bonds": (lambda length: bonds(Bonds(MU, length)), lambda length: Recursion(Bonds(MU, length)))}
 
 
-def marched(law, grooves, steps, cycles=6, swing=STEADY):
-    done = march(BASIS, DRIVE, ClimbingModel(grooves, LOAD, law, swing=swing), cycles, steps, window=3)
+def marched(law, grooves, steps, cycles=6):
+    done = march(BASIS, DRIVE, ClimbingModel(grooves, LOAD, law), cycles, steps, window=3)
     assert done.outcome is None and energy_balance(done.ledger) < 1e-11
     return float(done.amplitudes[-1, 1])
 
 
-def twin(law, grooves, slide, loads=None):
+def twin(law, grooves, slide):
     """Force and energy lost (k - 1,) of the steps of a slow slide: the NumPy law over the path along the flank under
-    the normal force R = N sqrt(1 + t^2) + f t, half of whose change comes before the motion. loads (k,) [N]: N at the
-    samples, LOAD where none are given."""
-    slope, loads = grooves.slope, np.full(slide.size, LOAD) if loads is None else loads
-    normal = np.array([loads[0] * np.hypot(1, slope(slide[0]))])
+    the normal force R = N sqrt(1 + t^2) + f t, half of whose change comes before the motion."""
+    slope = grooves.slope
+    normal = np.array([LOAD * np.hypot(1, slope(slide[0]))])
     state, held, forces, losses = law.start(normal), 0.0, [], []
-    for (q, end), (load, later) in zip(pairwise(slide), pairwise(loads)):
+    for q, end in pairwise(slide):
         dq = end - q
         inner = 0.5 * (q + end) + 0.5 * dq * np.array([-np.sqrt(0.6), 0, np.sqrt(0.6)])
         path = np.array([5, 8, 5]) / 18 @ np.hypot(1, slope(inner)) * dq
@@ -52,39 +49,35 @@ def twin(law, grooves, slide, loads=None):
             step = law.step(before.state, path, half, half, 1.0)
             pulled = float(step.mean[0])
             last, old = np.clip(2 * pulled - held, -MU * after[0], MU * after[0]), after
-            after = np.array([later * np.hypot(1, slope(end)) + last * slope(end)])
+            after = np.array([LOAD * np.hypot(1, slope(end)) + last * slope(end)])
             if abs(after - old)[0] < 1e-13 * LOAD:
                 break
         final = law.press(step.state, half, after)
-        forces.append((0.5 * (load + later) * float(grooves.rise(q, end)) + pulled * path) / dq)
+        forces.append((LOAD * float(grooves.rise(q, end)) + pulled * path) / dq)
         losses.append(float((before.dissipated + step.dissipated + final.dissipated)[0]))
         state, normal, held = final.state, after, float(law.traction(final.state)[0])
     return np.array(forces), np.array(losses)
 
 
-@pytest.mark.parametrize("swing", [STEADY, pytest.param(SWING, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("law", LAWS)
-def test_exact_a_slow_slide_by_the_numpy_law(law, swing):
-    """Under a load that swings the energy in the height is what was done against it, int N dz."""
+def test_exact_a_slow_slide_by_the_numpy_law(law):
     grooves, slide = Grooves(80e-6, 7.5e-6, 0.4), 30e-6 * np.sin(np.linspace(0, 7.3, 101))
-    model = ClimbingModel(grooves, LOAD, LAWS[law][0](2e-6), swing=swing)
+    model = ClimbingModel(grooves, LOAD, LAWS[law][0](2e-6))
     forces, energies, contact = np.zeros((101, 3)), np.zeros((101, 2)), model.build()
     assert follow_path(slide, 1e-3, model.kind, contact, 1e-9, energies, forces) == 0
-    mean, lost = twin(LAWS[law][1](2e-6), grooves, slide, swing.about(LOAD, 1e-3 * np.arange(101)))
+    mean, lost = twin(LAWS[law][1](2e-6), grooves, slide)
     np.testing.assert_allclose(forces[:-1, 1], mean, rtol=1e-9, atol=1e-9 * LOAD)
     np.testing.assert_allclose(energies[:-1, 0], lost, rtol=1e-7, atol=1e-12 * lost.sum())
     work = forces[:-1, 1] @ np.diff(slide)
     assert work - energies[:-1, 0].sum() == pytest.approx(energies[-1, 1] - energies[0, 1], rel=1e-9)
 
 
-@pytest.mark.parametrize(("law", "swing"), [("elastic-plastic", STEADY), ("bonds", STEADY),
-                                           pytest.param("elastic-plastic", SWING, marks=pytest.mark.slow)])
-def test_always_short_bonds_are_coulombs_law_on_the_flank(law, swing):
+@pytest.mark.parametrize("law", LAWS)
+def test_always_short_bonds_are_coulombs_law_on_the_flank(law):
     """The amplitude goes to that of the exact stops and releases; what rings on the bonds dies out with them."""
     grooves = Grooves(80e-6, 7.5e-6, 0.3)
-    model = replace(model_of(grooves, LOAD, MU, MU, None, BASIS), swing=swing)
-    true = march(BASIS, DRIVE, model, 6, 100, window=3).amplitudes[-1, 1]
-    far, near, last = (abs(marched(LAWS[law][0](length), grooves, steps, swing=swing) - true) for length, steps in (
+    true = march(BASIS, DRIVE, model_of(grooves, LOAD, MU, MU, None, BASIS), 6, 100, window=3).amplitudes[-1, 1]
+    far, near, last = (abs(marched(LAWS[law][0](length), grooves, steps) - true) for length, steps in (
         (4e-7, 1000), (1e-7, 2000), (2.5e-8, 4000)))
     assert far > 2 * near and near > 1.5 * last and last < 0.03 * true
 
@@ -111,13 +104,13 @@ def test_exact_flat_grooves_are_the_law_itself(law):
     assert marched(LAWS[law][0](1e-6), Grooves(80e-6, 1e-17), 200) == pytest.approx(alone, rel=1e-9)
 
 
-@pytest.mark.parametrize(("law", "lifted", "swing"), [*((law, lifted, STEADY) for law in LAWS for lifted in (0.0, 0.5)),
-                                                      ("bonds", 0.0, SWING)])
-def test_order_two_in_the_step(law, lifted, swing):
+@pytest.mark.parametrize("lifted", [0.0, 0.5])
+@pytest.mark.parametrize("law", LAWS)
+def test_order_two_in_the_step(law, lifted):
     grooves = Grooves(80e-6, 7.5e-6, 0.3, lifted)
-    values = [marched(LAWS[law][0](2e-6), grooves, steps, 3, swing) for steps in (200, 400, 800, 1600)]
+    values = [marched(LAWS[law][0](2e-6), grooves, steps, 3) for steps in (200, 400, 800, 1600)]
     changes = np.abs(np.diff(values))
-    assert changes[0] / changes[2] > 6 and changes[2] < (4e-4 if swing.amplitude else 2e-4) * abs(values[-1])
+    assert changes[0] / changes[2] > 6 and changes[2] < 2e-4 * abs(values[-1])
 
 
 def test_always_a_lifted_mass_that_leaves_the_grooves_is_said():

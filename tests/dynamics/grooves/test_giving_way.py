@@ -92,7 +92,7 @@ def coulomb(grooves, tolerance, compliance=GIVING):
     """Coulomb's law at the points."""
     ones = SimpleNamespace(interface=SimpleNamespace(weight=np.ones(COUNT)))
     patch = SimpleNamespace(pressure=SimpleNamespace(sigma_n=LOAD * SHARE), pieces=ones, giving=compliance)
-    return climbing.giving(climbing.model_of(grooves, LOAD, MU, plastic(MU, 0.0), None), patch, None, tolerance)
+    return climbing.giving(climbing.model_of(grooves, LOAD, plastic(MU, 0.0), None), patch, None, tolerance)
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4])

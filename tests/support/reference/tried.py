@@ -77,8 +77,6 @@ RIGS = (Beside("one point", POINT + RIG), Beside("a patch", PATCH + RIG),
         Beside("`[contact.shear]`, a mode with pitch", PATCH + "[contact.shear]\n" + RIG,
                ("structure.mode.axial.pitch=1 rad/m",)))
 MORE = (Beside("`[normal.grooves]`", POINT + GROOVES.format("normal") + RIG),
-        Beside("`[normal.grooves]`, changing load", POINT + GROOVES.format("normal") + RIG,
-               ("normal.amplitude=20 N", "normal.frequency=50 Hz")),
         Beside("`[contact.grooves]`, `[contact.shear]`", PATCH + GROOVES.format("contact") + "[contact.shear]\n" + RIG),
         Beside("a cubic spring", POINT + RIG, ("structure.stiffening.cubic=1e10 N/m^3",)),
         Beside("an interlocking spring", POINT + RIG, ("structure.bonded.stiffness=1e5 N/m",
