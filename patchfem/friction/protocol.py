@@ -1,9 +1,9 @@
 """What every law of friction returns for a step, and how it hands itself to compiled code.
 
-A law is start(sigma) -> state, step(state, dq, s0, s1, dt) -> Step for an increment of slide over a pressure that
-changes along the way, and, of laws that a varying load carries, press(state, s0, s1) -> Step for a pressure that
-changes in time at rest. None of them changes the state it was given. No traction outlives the contact, and at rest none
-exceeds mu sigma.
+A law under a pressure that changes is start(sigma) -> state, step(state, dq, s0, s1, dt) -> Step for an increment of
+slide over a pressure that changes along the way, and press(state, s0, s1) -> Step for a pressure that changes in time
+at rest. Laws of constant load (Iwan, Bouc-Wen, LuGre) have only their Element. None of them changes the state it was
+given. No traction outlives the contact, and at rest none exceeds mu sigma.
 
 element(load) -> Element is the same law of a whole contact for the loops. The kernels that an Element names are a
 module with three compiled functions of one signature, num (e, k) and mem (e, k) the numbers and memories of e contacts:

@@ -51,8 +51,8 @@ def motion_inside_steps(window: Response, law: LuGre, load: float) -> Response:
     stretch = relax(window.slide[0] - window.slip[0], kept.reshape(-1, PARTS),
                     ((1 - kept) * np.sign(increment) * length).reshape(-1, PARTS))
     rate = speed - law.stiffness * np.abs(speed) * stretch / law.limit(speed)
-    return replace(window, time=time, slide=slide, slide_rate=speed, slip=slide - stretch,
-                   force=law.traction((stretch, rate, speed, load)))
+    force = load * (law.stiffness * stretch + law.micro_damping * rate + law.viscous * speed)
+    return replace(window, time=time, slide=slide, slide_rate=speed, slip=slide - stretch, force=force)
 
 
 def divide_steps(time, slide, speed) -> Steps:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..protocol import Element, Step
+from ..protocol import Element
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(20)
 PIECES = 10  # of the integrals of a stroke
@@ -21,8 +21,8 @@ PIECES = 10  # of the integrals of a stroke
 class BoucWen:
     """The Bouc-Wen law as a law object: mu [1], eps [m], exponent n and shape s of the module's equation.
 
-    All points of a contact share z, as all share the slide. The pressure must stay constant. Compiled twin:
-    `bouc_wen_kernels`.
+    All points of a contact share z, as all share the slide. The pressure must stay constant. `bouc_wen_kernels` steps
+    it.
     """
 
     static: float
@@ -37,49 +37,6 @@ class BoucWen:
         return Element("friction.laws.bouc_wen_kernels", numbers, np.zeros(1), self.static * load, self.length,
                        form="flow", sizes=(1.0,))
 
-    def start(self, sigma):
-        """State (z [1], pressure (m,) [Pa]) before any motion: z = 0 under the pressure sigma (m,) [Pa]."""
-        return 0.0, sigma
-
-    def step(self, state, dq: float, s0, s1, dt: float) -> Step:
-        """One straight increment of slide dq [m] under a pressure (m,) [Pa] that stays; s0 and dt are not used.
-
-        The mean traction is mu s1 int z dq/dq, by the integral of `along`; with dq = 0 it is the traction as it stands.
-        """
-        way, before = float(np.sign(dq)), self.stored(state)
-        end, area = self.along(way * state[0], abs(dq) / self.length)
-        after = way * end if dq else state[0], s1
-        work = self.static * s1 * self.length * area
-        mean = np.divide(work, abs(dq)) * way if dq else self.traction(state)
-        return Step(mean, work - (self.stored(after) - before), after)
-
-    def along(self, y: float, x: float) -> tuple:
-        """(y, integral of y) [1] after a slide x > 0 in lengths eps, from y = z sgn v.
-
-        Equation: dy/dx = 1 - |y|^n, below zero 1 - (1 - 2 s) |y|^n. It is solved by its inverse function: x as an
-        integral over y, which Newton's method turns around.
-        """
-        area = 0.0
-        if y < 0:
-            give = 1 - 2 * self.shape
-            way = self._integral(lambda u: 1 / (1 - give * u**self.exponent), 0.0, -y)
-            if way >= x:
-                u = -y
-                for _ in range(60):
-                    miss = self._integral(lambda v: 1 / (1 - give * v**self.exponent), u, -y) - x
-                    u = min(max(u + miss * (1 - give * u**self.exponent), 0.0), -y)
-                    if abs(miss) <= 1e-15 * x:
-                        break
-                return -u, -self._integral(lambda v: v / (1 - give * v**self.exponent), u, -y)
-            area, x, y = -self._integral(lambda u: u / (1 - give * u**self.exponent), 0.0, -y), x - way, 0.0
-        w = begin = -np.log1p(-min(y, 1 - 1e-16))  # the knee taken out; w has no bound at y = 1
-        for _ in range(60):
-            miss = self._integral(lambda v: 1 / self._pace(v), begin, w) - x
-            w -= miss * self._pace(w)
-            if abs(miss) <= 1e-15 * max(x, 1.0):
-                break
-        return -np.expm1(-w), area + self._integral(lambda v: -np.expm1(-v) / self._pace(v), begin, w)
-
     def stroke(self, w) -> tuple:
         """(slide [eps], its slope over w, area [mu N eps]) of a stroke between the tips -y and y, w = -ln(1 - y) (...).
 
@@ -87,7 +44,8 @@ class BoucWen:
         """
         edges = np.linspace(0.0, 1.0, PIECES + 1)
         half = np.diff(edges)[:, None] / 2
-        root = (edges[:-1, None] + half * (1 + NODES)).ravel()  # the fourth root, as in `_integral`
+        # Gauss rule in the fourth root of v, where powers of v are smooth down to zero
+        root = (edges[:-1, None] + half * (1 + NODES)).ravel()
         v = w[..., None] * root**4
         rule = w[..., None] * (half * WEIGHTS).ravel() * 4 * root**3
         rise, spent = self._rates(v)
@@ -106,23 +64,6 @@ class BoucWen:
         with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             pace = -np.expm1(self.exponent * np.where(w < 0.7, np.log(y), np.log1p(-np.exp(-w)))) * np.exp(w)
         return np.where(w > 30.0, self.exponent, pace)  # 1 - y = 1e-13: the pace is n but for that
-
-    @staticmethod
-    def _integral(of, a: float, b: float) -> float:
-        """Gauss rule on pieces of 1/4, in the fourth root of the place, where powers are smooth down to zero."""
-        a, b = a**0.25, b**0.25
-        edges = np.linspace(a, b, 1 + max(1, int(np.ceil(16 * abs(b - a)))))
-        half = np.diff(edges)[:, None] / 2
-        root = edges[:-1, None] + half * (1 + NODES)
-        return float(np.sum(half * WEIGHTS * 4 * root**3 * of(root**4)))
-
-    def traction(self, state):
-        """Traction mu sigma z (m,) [Pa] of a state, > 0 against slip towards +x."""
-        return self.static * state[1] * state[0]
-
-    def stored(self, state):
-        """Elastic energy per area mu sigma eps z^2/2 (m,) [J/m2] of a state."""
-        return self.static * state[1] * self.length * state[0]**2 / 2
 
 
 def loop_from_keys(friction, load: float, slide) -> tuple:

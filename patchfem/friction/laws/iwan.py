@@ -15,7 +15,7 @@ from functools import lru_cache
 import numpy as np
 
 from ...core import frozen_array
-from ..protocol import Element, Step
+from ..protocol import Element
 from .elastic_plastic import parallel
 
 CELLS = 768  # of the power law, each one element with its stiffness and force: forces to 1e-6 of the slip force
@@ -35,29 +35,6 @@ class Iwan:
         """The law of a contact under a constant load [N], as the loops take it: the parallel elements of
         `elastic_plastic`."""
         return parallel(self.stiffness * load, self.yield_slide)
-
-    def start(self, sigma):
-        """State (stretch (t,) [m] of the elements, pressure (m,) [Pa]) before any motion: unstretched under sigma (m,)
-        [Pa]."""
-        return np.zeros(self.yield_slide.size), sigma
-
-    def step(self, state, dq: float, s0, s1, dt: float) -> Step:
-        """One straight increment dq [m] under a pressure (m,) [Pa] that stays; s0 and dt are not used. The path mean is
-        exact."""
-        stretch, before = state[0], self.stored(state)
-        end = np.clip(stretch + dq, -self.yield_slide, self.yield_slide)
-        part = np.divide(end - stretch, dq, out=np.ones_like(end), where=dq != 0)
-        mean = s1 * float(self.stiffness @ (part * (stretch + end) / 2 + (1 - part) * end))
-        after = end, s1
-        return Step(mean, mean * dq - (self.stored(after) - before), after)
-
-    def traction(self, state):
-        """Traction (m,) [Pa] of a state, > 0 against slip towards +x."""
-        return state[1] * float(self.stiffness @ state[0])
-
-    def stored(self, state):
-        """Elastic energy per area (m,) [J/m2] of a state."""
-        return state[1] * float(self.stiffness @ state[0]**2) / 2
 
 
 def largest(force: float, stiffness: float, chi: float, beta: float) -> float:

@@ -1,13 +1,16 @@
 """The Bouc-Wen law: limit, slope and closed loops, and one law in every run."""
 
+from dataclasses import astuple
+
 import numpy as np
 import pytest
 from law_runs import LOAD, bench_along, fitted, masses, plain_masses, rig, shrinking
 from scene_texts import COATED, DRIVE, MODE, mistakes, only
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
+from stepped_laws import SteppedBoucWen
 
-from patchfem.friction.laws.bouc_wen import BoucWen, from_keys, loop_from_keys
+from patchfem.friction.laws.bouc_wen import from_keys, loop_from_keys
 from patchfem.scene.keys.tables import Friction
 from patchfem.scene.scene import loads
 
@@ -68,7 +71,7 @@ def test_exact_steady_loops_by_stepping_the_law(exponent, shape):
     keys, one = Friction.model_construct(static=0.31, stiffness=1.3e7, exponent=exponent, shape=shape), np.ones(1)
     slides = np.array([[0.5, 3.0], [12.0, 40.0]]) * EPS
     tip, area = loop_from_keys(keys, LOAD, slides)
-    law = from_keys(keys, LOAD)
+    law = SteppedBoucWen(*astuple(from_keys(keys, LOAD)))
     for u, force, loss in zip(slides.flat, tip.flat, area.flat):
         state = law.start(one)
         for _ in range(150):
@@ -91,8 +94,8 @@ def test_exact_one_and_one_is_the_stretch_reading():
 @pytest.mark.parametrize("exponent, shape", [(1.0, 0.5), (3.3, 0.9)])
 def test_exact_the_compiled_bench_is_the_plain_law(exponent, shape):
     time, slide = shrinking(60)
-    found, law, one = bench_along(law_of(exponent, shape), time, slide), BoucWen(0.31, EPS, exponent, shape), \
-        np.full(1, LOAD)
+    found, one = bench_along(law_of(exponent, shape), time, slide), np.full(1, LOAD)
+    law = SteppedBoucWen(0.31, EPS, exponent, shape)
     state = law.start(one)
     for k, dq in enumerate(np.diff(slide)):
         step = law.step(state, dq, one, one, 1.0)

@@ -5,8 +5,9 @@ import pytest
 from law_runs import LOAD, bench_along, fitted, masses, rig, shrinking
 from march_paths import share_one_loop
 from scene_texts import COATED, DRIVE, MODE, mistakes, only
+from stepped_laws import SteppedIwan
 
-from patchfem.friction.laws.iwan import Iwan, from_keys, largest, sliders
+from patchfem.friction.laws.iwan import from_keys, largest, sliders
 from patchfem.scene.scene import loads
 
 LAW = 'law = "iwan"\nstatic = 0.31\nstiffness = "1.3e7 N/m"\nchi = -0.4\nbeta = 0.3\n'
@@ -73,8 +74,8 @@ def test_exact_a_bench_loop_is_the_density_itself():
 def test_exact_the_compiled_bench_is_the_plain_law():
     time, slide = shrinking(60)
     found, law, one = bench_along(LAW, time, slide), from_keys(loads_of(LAW), LOAD), np.full(1, LOAD)
+    law = SteppedIwan(law.stiffness, law.yield_slide)
     state = law.start(one)
-    assert isinstance(law, Iwan)
     for k, dq in enumerate(np.diff(slide)):
         step = law.step(state, dq, one, one, 1.0)
         state = step.state

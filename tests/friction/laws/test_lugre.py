@@ -7,8 +7,8 @@ import pytest
 from law_runs import LOAD, bench_along, fitted, masses, rig, shrinking
 from scene_texts import COATED, DRIVE, MODE, mistakes, only
 from scipy.integrate import solve_ivp
+from stepped_laws import SteppedLuGre
 
-from patchfem.friction.laws.lugre import LuGre
 from patchfem.scene.scene import loads
 
 STATIC, KINETIC, STIFFNESS, SPEED = 0.31 * LOAD, 0.22 * LOAD, 1.3e7, 2e-3
@@ -89,7 +89,7 @@ def test_exact_a_bench_loop_is_the_equation(law, micro, viscous):
 def test_exact_the_compiled_bench_is_the_plain_law():
     time, slide = shrinking(60)
     found, one = bench_along(DAMPED, time, slide), np.full(1, LOAD)
-    law = LuGre(0.31, 0.22, STIFFNESS / LOAD, SPEED, 900 / LOAD, 300 / LOAD)
+    law = SteppedLuGre(0.31, 0.22, STIFFNESS / LOAD, SPEED, 900 / LOAD, 300 / LOAD)
     state = law.start(one)
     for k, (dq, dt) in enumerate(zip(np.diff(slide), np.diff(time))):
         step = law.step(state, dq, one, one, dt)
