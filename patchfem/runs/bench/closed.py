@@ -64,10 +64,11 @@ def climbed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
         speed = np.divide(move, duration, out=np.zeros_like(move), where=duration > 0)
         t, phi = _along_flank(grooves, law, slide, np.append(0.0, speed))
         ratio = (t + phi) / (1 - phi * t)
-        own = np.zeros_like(move)
-        for place, gauss_weight in zip(*np.polynomial.legendre.leggauss(GAUSS)):
-            t, phi = _along_flank(grooves, law, slide[:-1] + 0.5 * (1 + place) * move, speed)
-            own += 0.5 * gauss_weight * load * phi * (1 + t**2) / (1 - phi * t) * move
+        def own_force(q):
+            t, phi = _along_flank(grooves, law, q, speed)
+            return load * phi * (1 + t**2) / (1 - phi * t)
+
+        own = integrate_steps(slide, own_force)
     rise = load * grooves.rise(slide[:-1], slide[1:])
     for k, side in ends_of_rest(model, slide).items():
         ratio[k] = grooves.ratio(slide[k], side, model.friction.static)
@@ -77,6 +78,18 @@ def climbed_form(model, patch, path: tuple, frames: int, watch: Watch) -> Slid:
     ledger = ledger_of(np.append(0.0, np.cumsum(rise + own)), load * grooves.height(slide), losses)
     return Slid(load * ratio, np.full(time.size, load), slide.copy(), ledger, at, ratio[at, None] * sigma,
                 np.repeat(slide[at, None], sigma.size, axis=1))
+
+
+def integrate_steps(slide, integrand) -> np.ndarray:
+    """Integrate integrand(q) over q in every step of a slide (k,) [m], by Gauss's rule; returns (k - 1,).
+
+    integrand: function of slides (k - 1,) [m].
+    """
+    move = np.diff(slide)
+    out = np.zeros_like(move)
+    for place, weight in zip(*np.polynomial.legendre.leggauss(GAUSS)):
+        out += 0.5 * weight * integrand(slide[:-1] + 0.5 * (1 + place) * move) * move
+    return out
 
 
 def _along_flank(grooves, law, slide, speed) -> tuple:

@@ -8,7 +8,7 @@ import numpy as np
 from ...core import Measure, Outcome
 from ...response.outcome import settle
 from ..bench import bench
-from ..bench.closed import over_steps
+from ..bench.closed import integrate_steps
 from ..bench.engine import steps_of
 from ..patch.press import areas
 from ..results.travel import outcome_on_piece
@@ -192,7 +192,7 @@ def slip_path_of(model, patch, slide, vertical, local, tau) -> tuple:
     g, sigma = model.grooves, patch.pressure.sigma_n
     t = g.slope(slide)[:, None]
     long, carried = np.sqrt(1 + t * t), (vertical / patch.pressure.load)[:, None] * sigma
-    steps = over_steps(np.ones(slide.size), slide, np.diff(slide), lambda q: np.hypot(1, g.slope(q)))
+    steps = integrate_steps(slide, lambda q: np.hypot(1, g.slope(q)))
     path = np.append(0.0, np.cumsum(steps))
     worn = np.abs(tau - t * carried) if model.wear.energy else np.maximum(carried + tau * t, 0.0)
     return path[:, None] - (slide[:, None] - local) * long, worn / long
