@@ -1,6 +1,7 @@
-"""A matrix of heights in text, a row of the scan in each line, whose size and units stand in the lines above it."""
+"""Matrix of heights in text: a row of the scan in each line, size and units above."""
 
-import io
+import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -8,148 +9,180 @@ from ...core import PatchfemError
 from ..areal import Areal
 from ..profile import Profile
 from ..samples import GIVEN, checked
-from .head import COMMA, COMMENT, VOID, Head, is_number, named, trimmed
+from .head import Fact, Head, names_columns
 from .raster import areal
-from .raw import shown
-from .units import GIVE, PIXEL, factor_of, pixel_of
+from .raw import shorten
+from .rows import read_matrix
+from .units import GIVE, PIXEL, length_unit, pixel_size
 
 SIZE = "`# Width: 1.2 mm` and `# Height: 0.8 mm`"
 ABOVE = f"write the scan's {SIZE} and `# Value units: um` above its rows, or {PIXEL}"
+UNKNOWN = Fact()
+MAX_UNEVEN = 1e-6  # relative scatter of the steps of coordinates; heights scatter more
+
+
+class Scale(NamedTuple):
+    """Step of an axis [m], or factor of the heights to metres; notes."""
+
+    value: float
+    notes: tuple = ()
+
+
+class Unit(NamedTuple):
+    """Unit that counts, None without one; notes."""
+
+    name: str | None
+    notes: tuple = ()
 
 
 def is_matrix(count: int, names: list, facts: dict) -> bool:
-    """Whether rows of `count` numbers are a matrix and no columns x, (y,) z."""
-    sized = count == 1 and not {"width", "step_x"}.isdisjoint(facts)
-    return not named(names) and (count > 3 or sized or facts.get("columns", (0,))[0] == count)
+    """Return whether rows of numbers are a matrix and not columns x, (y,) z.
 
+    Parameters
+    ----------
+    count : int
+        Numbers in a row.
+    names : list
+        Names of the columns, [] without any.
+    facts : dict
+        Facts of the head.
 
-def matrix(path, head: Head, facts: dict, given: tuple | None, body: str) -> Profile | Areal:
-    """The scan in a matrix of heights; a trace where it is one row or one column.
-
-    The step is that of a pixel: Width over the number of columns. facts: what the head tells; given: units of x, y and
-    of z, which complete and overrule it. PatchfemError for a matrix of unknown size or unit, or of uneven rows.
+    Returns
+    -------
+    bool
     """
-    table = _table(path, head, body)
-    if table.shape[1] == 1 and {"height", "step_y"}.isdisjoint(facts):
-        table = table.T  # one height a line
-    for name, axis, count in (("rows", "rows", table.shape[0]), ("columns", "numbers per row", table.shape[1])):
-        stated = facts.get(name, (None,))[0]
+    if names_columns(names):
+        return False
+    has_size = "width" in facts or "step_x" in facts
+    return count > 3 or (count == 1 and has_size) or facts.get("columns", UNKNOWN).number == count
+
+
+def read_scan(path, head: Head, facts: dict, units: tuple | None, body: str) -> Profile | Areal:
+    """Read the scan in a matrix of heights; a trace if it is one row or one column.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    head : Head
+    facts : dict
+        Facts of the head.
+    units : tuple or None
+        Units of x, y and of z, which complete and overrule the facts; the first may be the size of
+        a pixel.
+    body : str
+        Text below the head.
+
+    Returns
+    -------
+    Profile or Areal
+    """
+    table = read_matrix(path, body, head)
+    if table.shape[1] == 1 and "height" not in facts and "step_y" not in facts:
+        table = table.T  # a trace with one height in each line
+    for name, axis, count in zip(("rows", "columns"), ("rows", "numbers per row"), table.shape):
+        stated = facts.get(name, UNKNOWN).number
         if stated is not None and stated != count:
-            raise PatchfemError(f"{path}: {count} {axis}, but the header says {stated:g}; the file is cut off or "
-                                "joined from parts: export the scan anew")
-    if min(table.shape) > 3 and _even(table[0, 1:]) and _even(table[1:, 0]) and not _even(table[1, 1:]):
-        raise PatchfemError(f"{path}: the first row and the first column of the matrix grow evenly, like coordinates "
-                            "and not heights; leave out this row and this column")
-    steps, notes = [], ()
-    for axis, count in zip(("x", "y"), table.shape[::-1]):
-        if axis == "y" and count == 1:
-            continue
-        step, more = _step(path, axis, count, facts, given)
-        steps.append(step)
-        notes += more
-    up, more = _height(path, facts, given)
-    table, said, notes = table * up, GIVEN if given else "", (*notes, *more)
-    if len(steps) == 1:
-        trace = checked(path, np.arange(table.shape[1]) * steps[0], table[0], None, (1.0, 1.0), said)
+            raise PatchfemError(
+                f"{path}: {count} {axis}, but the header says {stated:g}; the file is cut off or "
+                "joined from parts: export the scan anew"
+            )
+    if (
+        min(table.shape) > 3
+        and _is_even(table[0, 1:])
+        and _is_even(table[1:, 0])
+        and not _is_even(table[1, 1:])
+    ):
+        raise PatchfemError(
+            f"{path}: the first row and the first column of the matrix grow evenly, like "
+            "coordinates and not heights; leave out this row and this column"
+        )
+    rows, columns = table.shape
+    step_x = _find_step(path, "x", columns, facts, units)
+    step_y = Scale(1.0) if rows == 1 else _find_step(path, "y", rows, facts, units)
+    factor = _find_height_factor(path, facts, units)
+    notes = (*step_x.notes, *step_y.notes, *factor.notes)
+    stated = GIVEN if units else ""
+    x = np.arange(columns) * step_x.value
+    z = table * factor.value
+    if rows == 1:
+        trace = checked(path, x, z[0], None, (1.0, 1.0), stated)
         return Profile(trace.x, trace.z, trace.source, (*notes, *trace.notes))
-    axes = [np.arange(count) * step for count, step in zip(table.shape[::-1], steps)]
-    return areal(path, *axes, table, said, notes)
+    return areal(path, x, np.arange(rows) * step_y.value, z, stated, notes)
 
 
-def _even(values) -> bool:
-    """Whether numbers (n,) grow by one step."""
+def _is_even(values) -> bool:
+    """Return whether numbers (n,) rise by one step."""
     steps = np.diff(values)
-    return bool(steps[0] > 0 and np.ptp(steps) < 1e-6 * steps[0])
+    return bool(steps[0] > 0 and np.ptp(steps) < MAX_UNEVEN * steps[0])
 
 
-def _height(path, facts: dict, given: tuple | None) -> tuple:
-    """Factor of the heights to metres; notes."""
-    told = next((facts[name][1] for name in ("value", "factor") if facts.get(name, ("", ""))[1]), None)
-    scale = facts.get("factor", (None,))[0]
-    if facts.get("scaled", ("", ""))[1].lower() == "yes":
-        scale = facts.get("scale", (None,))[0]
-    if told is None and facts.get("bit2nm", (None,))[0]:
-        told, scale = "nm", facts["bit2nm"][0]
+def _find_height_factor(path, facts: dict, units: tuple | None) -> Scale:
+    """Find the factor of the heights to metres."""
+    stated = facts.get("value", UNKNOWN).word or facts.get("factor", UNKNOWN).word or None
+    scale = facts.get("factor", UNKNOWN).number
+    if facts.get("scaled", UNKNOWN).word.lower() == "yes":
+        scale = facts.get("scale", UNKNOWN).number
+    bit = facts.get("bit2nm", UNKNOWN).number
+    if stated is None and bit:
+        stated = "nm"
+        scale = bit
     scale = 1.0 if scale is None else scale
-    if not 0 < abs(scale) < np.inf:
-        raise PatchfemError(f"{path}: the factor of the heights in the header is {scale:g}, which is not possible; "
-                            "export the scan anew")
-    if told is not None and factor_of(told) is None and given is None:
-        raise PatchfemError(f"{path}: the values are in '{shown(told)}', which is not a unit of length; export the "
-                            f"channel of the heights, or {GIVE}")
-    if told is None and given is None:
-        raise PatchfemError(f"{path}: a matrix of heights whose unit is not given; write `# Value units: um` above its "
-                            f"rows, or {GIVE}")
-    unit, notes = _overruled(path, "the heights", told, given and given[1])
-    return scale * factor_of(unit), notes
+    if not 0 < abs(scale) < math.inf:
+        raise PatchfemError(
+            f"{path}: the factor of the heights in the header is {scale:g}, which is not possible; "
+            "export the scan anew"
+        )
+    if units is None and stated is None:
+        raise PatchfemError(
+            f"{path}: a matrix of heights whose unit is not given; write `# Value units: um` above "
+            f"its rows, or {GIVE}"
+        )
+    if units is None and length_unit(stated) is None:
+        raise PatchfemError(
+            f"{path}: the values are in '{shorten(stated)}', which is not a unit of length; export "
+            f"the channel of the heights, or {GIVE}"
+        )
+    unit = _choose_unit(path, "the heights", stated, units and units[1])
+    return Scale(scale * length_unit(unit.name), unit.notes)
 
 
-def _step(path, axis: str, count: int, facts: dict, given: tuple | None) -> tuple:
-    """Step along x or y [m]; notes."""
+def _find_step(path, axis: str, count: int, facts: dict, units: tuple | None) -> Scale:
+    """Find the step along x or y [m]: a pixel, or the size of the scan over its pixels."""
     size, step = ("width", "step_x") if axis == "x" else ("height", "step_y")
-    if given is not None and (pixel := pixel_of(given[0])) is not None:
-        told = (f"{path}: the header gives the size of the scan along {axis}, but the pixel size that you gave, "
-                f"{given[0]}, is used instead")
-        return pixel, () if {size, step}.isdisjoint(facts) else (told,)
+    pixel = None if units is None else pixel_size(units[0])
+    if pixel is not None:
+        note = (
+            f"{path}: the header gives the size of the scan along {axis}, but the pixel size that "
+            f"you gave, {units[0]}, is used instead"
+        )
+        return Scale(pixel, (note,) if size in facts or step in facts else ())
     if axis == "y" and step not in facts and size not in facts:
-        step = "step_x"  # square pixels by a size of one number
-    number, unit = facts.get(step, facts.get(size, (None, "")))
-    if number is None or not 0 < number < np.inf:
-        raise PatchfemError(f"{path}: the rows are a matrix of heights (a map, or more than three numbers in a row), "
-                            f"but the {'width' if axis == 'x' else 'height'} of the scan is not given; {ABOVE}")
-    unit = unit or next((facts[name][1] for name in ("unit_y", "lateral") if axis == "y" or name == "lateral"
-                         if name in facts), None)
-    if not unit and facts.get("format", ("", ""))[1].lower() == "ascii":
-        unit = "nm"  # SPIP writes places in nanometres
-    if given is None and factor_of(unit or "") is None:
-        raise PatchfemError(f"{path}: the unit of the scan's width and height, '{shown(unit or '')}', is not known; "
-                            f"write {SIZE}, or {GIVE}")
-    unit, notes = _overruled(path, f"places along {axis}", unit or None, given and given[0])
-    return number * factor_of(unit) / (1 if step in facts else count), notes
+        step = "step_x"  # a size of one number is that of square pixels
+    number, word = facts.get(step, facts.get(size, UNKNOWN))
+    if number is None or not 0 < number < math.inf:
+        name = "width" if axis == "x" else "height"
+        raise PatchfemError(
+            f"{path}: the rows are a matrix of heights (a map, or more than three numbers in a "
+            f"row), but the {name} of the scan is not given; {ABOVE}"
+        )
+    if not word and axis == "y":
+        word = facts.get("unit_y", UNKNOWN).word
+    word = word or facts.get("lateral", UNKNOWN).word
+    if not word and facts.get("format", UNKNOWN).word.lower() == "ascii":
+        word = "nm"  # SPIP writes places in nanometres
+    if units is None and length_unit(word) is None:
+        raise PatchfemError(
+            f"{path}: the unit of the scan's width and height, '{shorten(word)}', is not known; "
+            f"write {SIZE}, or {GIVE}"
+        )
+    unit = _choose_unit(path, f"places along {axis}", word or None, units and units[0])
+    return Scale(number * length_unit(unit.name) / (1 if step in facts else count), unit.notes)
 
 
-def _overruled(path, what: str, told: str | None, asked: str | None) -> tuple:
-    """The unit that counts, and a note where the one given overrules the one of the file."""
-    if asked is None or told is None or factor_of(asked) == factor_of(told):
-        return asked or told, ()
-    return asked, (f"{path}: the header gives {what} in {shown(told)}, but {asked} is used, as given by --units",)
-
-
-def _table(path, head: Head, body: str) -> np.ndarray:
-    """Rows of numbers (m, n), NaN where a height is missing."""
-    comma = head.delimiter != "," and "," in body
-    plain = body.replace(",", ".") if comma else body
-    if plain.isascii() and "_" not in plain and not (comma and "." in body):
-        try:
-            table = np.loadtxt(io.BytesIO(plain.encode()), delimiter=head.delimiter, comments=None, ndmin=2)
-            if not np.isinf(table).any():
-                return table
-        except ValueError:
-            pass  # the line at fault is found below
-    rows = []
-    for number, line in enumerate(body.split("\n"), head.number + 1):
-        if row := _row(f"{path}:{number}", line, head.delimiter, len(head.row)):
-            rows.append(row)
-    return np.array(rows, float)
-
-
-def _row(at: str, line: str, delimiter: str | None, count: int) -> list:
-    """Heights of a line, [] of a blank one."""
-    line = line.strip("\r\n \t" if delimiter is None else "\r\n ")
-    if not line.strip():
-        return []
-    if line.startswith(COMMENT):
-        if ":" in line or "=" in line:
-            raise PatchfemError(f"{at}: '{shown(line)}' ends the scan or begins another one; keep only one scan per "
-                                "file")
-        return []
-    cells = [cell.strip() for cell in line.split(delimiter)]
-    cells = cells if len(cells) == count else trimmed(cells)
-    if len(cells) != count:
-        raise PatchfemError(f"{at}: {len(cells)} numbers, but the first row of the matrix has {count}; write nan for a "
-                            "missing height, and one row of the scan per line")
-    bad = next((cell for cell in cells if not is_number(cell, delimiter)), None)
-    if bad is not None:
-        raise PatchfemError(f"{at}: '{shown(bad)}' is not a height; write a missing height as nan")
-    return [np.nan if VOID.fullmatch(cell) else float(cell.replace(",", ".") if COMMA.fullmatch(cell) else cell)
-            for cell in cells]
+def _choose_unit(path, what: str, stated: str | None, given: str | None) -> Unit:
+    """Choose the unit that was given, with a note if it differs from that of the file."""
+    if given is None or stated is None or length_unit(given) == length_unit(stated):
+        return Unit(given or stated)
+    note = f"{path}: the header gives {what} in {shorten(stated)}, but {given} is used, as given by --units"
+    return Unit(given, (note,))

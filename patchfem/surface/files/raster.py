@@ -1,4 +1,6 @@
-"""Points x, y, z and grids of heights of a file made areal scans: on one raster, in order, plausible."""
+"""Points with their places as an areal scan, if they lie on the rows and columns of a raster."""
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -6,72 +8,126 @@ from ...core import PatchfemError, frozen_array, say
 from ..areal import Areal
 from ..profile import Profile
 from ..samples import bounded, checked, evened, plausible
-from .raw import POINTS
+from .raw import MAX_POINTS
 
-SPARSE = 4  # cells of the raster for each point: what is emptier is a cloud of points
+MAX_CELLS_PER_POINT = 4  # cells of the raster for each point; more is a cloud of points
+ROUND_OFF = 1e-9  # distance of two places / length of the axis, below which they are one
 
 
-def raster(path, columns: list, at, factors: tuple, stated: str = "") -> Profile | Areal:
-    """Points of a scan along rows or columns as an areal scan; those of one row or column as a trace.
+class Axis(NamedTuple):
+    """Distinct places along an axis in rising order, and the number of the place of each point."""
 
-    columns: x, y, z (k,) in the units of the file, with their factors to metres; at: (k,) their lines, None where there
-    are none; stated: as for `areal`. Cells without a point are missing. PatchfemError for points that lie on no raster
-    or twice at one place.
+    places: np.ndarray
+    numbers: np.ndarray
+
+
+def raster(path, columns: list, lines, factors: tuple, stated: str = "") -> Profile | Areal:
+    """Arrange points along rows or columns as an areal scan.
+
+    Those of a single row or column as a trace.
+
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    columns : list
+        x, y, z (k,) in the units of the file.
+    lines : (k,) array or None
+        Line of each point in the file.
+    factors : tuple
+        Factors of x, y, z to metres.
+    stated : str
+        As for `areal`.
+
+    Returns
+    -------
+    Profile or Areal
+        Cells without a point are missing.
     """
     x, y, z = columns
-    bounded(path, columns, ("x", "y", "z"), at, factors)
-    (xs, column), (ys, row) = _axis(x), _axis(y)
-    if ys.size == 1 or xs.size == 1:
-        return checked(path, y if xs.size == 1 else x, z, at, (factors[xs.size == 1], factors[2]), stated)
-    cells = xs.size * ys.size
-    if cells > max(SPARSE * z.size, 16) or cells > POINTS:
-        raise PatchfemError(f"{path}: {z.size} points with {xs.size} different x and {ys.size} different y do not fill "
-                            "a grid; export the scan as a grid, or one trace of two columns")
-    place = row * xs.size + column
-    if np.unique(place).size < place.size:
-        first = np.setdiff1d(np.arange(place.size), np.unique(place, return_index=True)[1])[0]
-        where = f"{path}:{at[first]}" if at is not None else f"{path}: point {first + 1}"
-        raise PatchfemError(f"{where}: a second height at x = {say(x[first] * factors[0])}, "
-                            f"y = {say(y[first] * factors[1])}; keep one scan per file")
+    bounded(path, columns, ("x", "y", "z"), lines, factors)
+    along_x = _find_axis(x)
+    along_y = _find_axis(y)
+    shape = (along_y.places.size, along_x.places.size)
+    if shape[0] == 1:
+        return checked(path, x, z, lines, (factors[0], factors[2]), stated)
+    if shape[1] == 1:
+        return checked(path, y, z, lines, (factors[1], factors[2]), stated)
+    cells = shape[0] * shape[1]
+    if cells > max(MAX_CELLS_PER_POINT * z.size, 16) or cells > MAX_POINTS:
+        raise PatchfemError(
+            f"{path}: {z.size} points with {shape[1]} different x and {shape[0]} different y do "
+            "not fill a grid; export the scan as a grid, or one trace of two columns"
+        )
+    place = along_y.numbers * shape[1] + along_x.numbers
+    firsts = np.unique(place, return_index=True)[1]
+    if firsts.size < place.size:
+        second = np.setdiff1d(np.arange(place.size), firsts)[0]
+        where = f"{path}: point {second + 1}" if lines is None else f"{path}:{lines[second]}"
+        raise PatchfemError(
+            f"{where}: a second height at x = {say(x[second] * factors[0])}, y = "
+            f"{say(y[second] * factors[1])}; keep one scan per file"
+        )
     heights = np.full(cells, np.nan)
     heights[place] = z
-    return areal(path, xs * factors[0], ys * factors[1], heights.reshape(ys.size, xs.size) * factors[2], stated)
+    heights = heights.reshape(shape) * factors[2]
+    return areal(path, along_x.places * factors[0], along_y.places * factors[1], heights, stated)
 
 
 def areal(path, x, y, z, stated: str = "", notes: tuple = ()) -> Profile | Areal:
-    """Heights z (m, n) [m] at x (n,) [m] and y (m,) [m], rising or falling, as an areal scan; a trace where m is 1.
+    """Make an areal scan of heights on a grid, or a trace if y has one place.
 
-    stated: who says the units, METRES or GIVEN of `samples`, so that steep heights are told and not refused.
-    PatchfemError for axes that turn back and, where not stated, heights that only a wrong unit explains.
+    Parameters
+    ----------
+    path : Path
+        For messages.
+    x, y : (n,), (m,) arrays [m]
+        Rising or falling.
+    z : (m, n) array [m]
+    stated : str
+        Who states the units, METRES or GIVEN of `samples`; then steep heights get a note and are
+        not refused.
+    notes : tuple
+        Sentences on the file.
+
+    Returns
+    -------
+    Profile or Areal
     """
     if len(y) == 1:
-        found = checked(path, x, z[0], None, (1.0, 1.0), stated)
-        return Profile(found.x, found.z, found.source, notes + found.notes)
+        trace = checked(path, x, z[0], None, (1.0, 1.0), stated)
+        return Profile(trace.x, trace.z, trace.source, notes + trace.notes)
     axes = []
-    for axis, (name, values) in enumerate((("y", y), ("x", x))):
-        if len(values) < 2:
-            raise PatchfemError(f"{path}: {len(values)} positions along {name}; a scan needs at least two")
-        bounded(path, (values,), (name,), None, (1.0,))
-        if values[-1] < values[0]:
-            values, z = values[::-1], np.flip(z, axis)
-        values, more = evened(path, values, 1.0, name)
-        if not (np.diff(values) > 0).all():
-            raise PatchfemError(f"{path}: {name} reverses; each coordinate of a scan must only rise or only fall")
-        axes.append(values)
+    for axis, (name, places) in enumerate((("y", y), ("x", x))):
+        if len(places) < 2:
+            raise PatchfemError(
+                f"{path}: {len(places)} positions along {name}; a scan needs at least two"
+            )
+        bounded(path, (places,), (name,), None, (1.0,))
+        if places[-1] < places[0]:
+            places = places[::-1]
+            z = np.flip(z, axis)
+        places, more = evened(path, places, 1.0, name)
+        if not (np.diff(places) > 0).all():
+            raise PatchfemError(
+                f"{path}: {name} reverses; each coordinate of a scan must only rise or only fall"
+            )
+        axes.append(places)
         notes += more
     bounded(path, (z.ravel(),), ("z",), None, (1.0,))
-    there = np.isfinite(z)
-    if there.sum() < 3:
-        raise PatchfemError(f"{path}: {there.sum()} heights; a scan needs at least three")
-    notes += plausible(path, max(axes, key=np.ptp), z[there], stated)
-    return Areal(frozen_array(axes[1]), frozen_array(axes[0]), frozen_array(z), str(path), tuple(notes))
+    known = np.isfinite(z)
+    if known.sum() < 3:
+        raise PatchfemError(f"{path}: {known.sum()} heights; a scan needs at least three")
+    notes += plausible(path, max(axes, key=np.ptp), z[known], stated)
+    return Areal(
+        frozen_array(axes[1]), frozen_array(axes[0]), frozen_array(z), str(path), tuple(notes)
+    )
 
 
-def _axis(values) -> tuple:
-    """Distinct places along an axis, sorted, and the number of each point's; places within round-off are one."""
+def _find_axis(values) -> Axis:
+    """Find the distinct places (k,) along an axis; places within round-off are one."""
     order = np.argsort(values, kind="stable")
-    steps = np.diff(values[order])
-    new = steps > 1e-9 * max(float(np.ptp(values)), 1e-300)
-    number = np.empty(values.size, np.int64)
-    number[order] = np.concatenate([[0], np.cumsum(new)])
-    return values[order][np.concatenate([[True], new])], number
+    is_new = np.diff(values[order]) > ROUND_OFF * max(float(np.ptp(values)), 1e-300)
+    numbers = np.empty(values.size, np.int64)
+    numbers[order] = np.concatenate([[0], np.cumsum(is_new)])
+    return Axis(values[order][np.concatenate([[True], is_new])], numbers)

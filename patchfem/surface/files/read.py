@@ -1,4 +1,4 @@
-"""Any file of a measured surface as a trace or an areal scan; the format is known by its content, then its suffix."""
+"""File of a measured surface of any format as a trace or an areal scan."""
 
 from dataclasses import replace
 from importlib.util import find_spec
@@ -6,53 +6,64 @@ from importlib.util import find_spec
 from ...core import PatchfemError
 from ..areal import Areal
 from ..profile import Profile
-from .arrays import mat, npy
-from .dektak import MARK, dektak
-from .instruments import instrument
-from .raw import PLAIN, Raw, fetch
-from .text import columns
-from .units import ASIDE
-from .x3p import x3p
+from .arrays import read_mat, read_npy
+from .dektak import FIRST_WORDS, read_dektak
+from .instruments import read_instrument
+from .raw import TEXT_SUFFIXES, fetch
+from .text import read_text
+from .units import IGNORED
+from .x3p import read_x3p
 
-KINDS = {"npy": npy, "mat": mat, "binary": instrument}
-TOLD = {"x3p": x3p, "dektak": dektak}  # formats that tell their units
+READERS = {"npy": read_npy, "mat": read_mat, "binary": read_instrument, "text": read_text}
+READERS_WITH_UNITS = {"x3p": read_x3p, "dektak": read_dektak}  # formats that state their units
 WYKO = b"Wyko ASCII"  # first words of heights in wavelengths, which SurfaceTopography reads
 
 
 def read_surface(path, units: tuple | None = None) -> Profile | Areal:
-    """Read the surface in a file: a trace as `Profile`, an areal scan as `Areal`, heights and places in metres.
+    """Read the surface in a file: a trace as `Profile`, an areal scan as `Areal`, in metres.
 
-    units: names of the units of x (and y) and of z, such as ("mm", "um"): they complete a file that names none, and
-    overrule a header of text, with a note; a format that tells its units keeps them, with a note. Heights keep the sign
-    of the file. PatchfemError names file and line of a fault, Missing what is not there.
+    units: units of x (and y) and of z, such as ("mm", "um"): they complete a file that states none,
+    and overrule the header of a text with a note; a format that states its units keeps them, with a
+    note. Heights keep the sign of the file. Raises PatchfemError that names file and line, Missing
+    if there is no file.
     """
-    if units is not None and (isinstance(units, str) or not hasattr(units, "__len__") or len(units) != 2):
-        raise PatchfemError(f'{path}: give two units, of x and of z, such as ("mm", "um"), not {units!r}')
+    if units is not None and (
+        isinstance(units, str) or not hasattr(units, "__len__") or len(units) != 2
+    ):
+        raise PatchfemError(
+            f'{path}: give two units, of x and of z, such as ("mm", "um"), not {units!r}'
+        )
     raw = fetch(path)
-    begins = raw.data[:80].replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \r\n\t") if raw.kind == "text" else b""
-    kind = "dektak" if begins.startswith(MARK) else raw.kind
-    if kind in TOLD:
-        found = TOLD[kind](raw)
-        return found if units is None else replace(found, notes=(*found.notes, f"{path}: {ASIDE}"))
-    if begins.startswith(WYKO):
-        return instrument(raw, units)
-    return _text(raw, units) if kind == "text" else KINDS[kind](raw, units)
+    kind = raw.kind
+    if kind == "text":
+        start = raw.data[:80].replace(b"\0", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \r\n\t")
+        if start.startswith(FIRST_WORDS):
+            kind = "dektak"
+        elif start.startswith(WYKO):
+            kind = "binary"
+    if kind in READERS_WITH_UNITS:
+        surface = READERS_WITH_UNITS[kind](raw)
+        return (
+            surface
+            if units is None
+            else replace(surface, notes=(*surface.notes, f"{path}: {IGNORED}"))
+        )
+    try:
+        return READERS[kind](raw, units)
+    except PatchfemError:
+        is_plain_text = raw.suffix in ("", *TEXT_SUFFIXES)
+        if kind != "text" or is_plain_text or find_spec("SurfaceTopography") is None:
+            raise
+    return read_instrument(raw, units)
 
 
 def read_profile(path, units: tuple | None = None) -> Profile:
-    """Read the one trace in a file (`read_surface`); PatchfemError for an areal scan."""
-    found = read_surface(path, units)
-    if isinstance(found, Areal):
-        raise PatchfemError(f"{path}: an areal scan of {found.z.shape[0]} x {found.z.shape[1]} heights, but a single "
-                            "trace is needed; write one row of the scan to a file with the header `x [um],z [um]`")
-    return found
-
-
-def _text(raw: Raw, units: tuple | None) -> Profile | Areal:
-    try:
-        return columns(raw, units)
-    except PatchfemError:
-        if raw.suffix in PLAIN or find_spec("SurfaceTopography") is None:
-            raise
-    return instrument(raw, units)
-
+    """Read the trace in a file (`read_surface`); raises PatchfemError for an areal scan."""
+    surface = read_surface(path, units)
+    if isinstance(surface, Areal):
+        rows, columns = surface.z.shape
+        raise PatchfemError(
+            f"{path}: an areal scan of {rows} x {columns} heights, but a single trace is needed; "
+            "write one row of the scan to a file with the header `x [um],z [um]`"
+        )
+    return surface

@@ -1,32 +1,56 @@
-"""Names of units of length as files, instruments and users write them."""
+"""Units of length as files, instruments and users write them."""
 
-import numpy as np
+import math
 
-UNITS = {"m": 1.0, "km": 1e3, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9,
-         "in": 0.0254, "ft": 0.3048, "mil": 25.4e-6}
-_WORDS = {"pm": 1e-12, "å": 1e-10, "angstrom": 1e-10, "ångström": 1e-10, "mils": 25.4e-6, "inch": 0.0254,
-          "inches": 0.0254, "micron": 1e-6, "microns": 1e-6, "mikron": 1e-6}
-_WORDS |= {f"{prefix}{end}": factor for prefix, factor in (
-    ("", 1.0), ("milli", 1e-3), ("micro", 1e-6), ("mikro", 1e-6), ("nano", 1e-9))
-    for end in ("meter", "meters", "metre", "metres")}
+UNITS = {
+    "m": 1.0,
+    "km": 1e3,
+    "cm": 1e-2,
+    "mm": 1e-3,
+    "um": 1e-6,
+    "nm": 1e-9,
+    "in": 0.0254,
+    "ft": 0.3048,
+    "mil": 25.4e-6,
+}
+SYNONYMS = {
+    "pm": 1e-12,
+    "å": 1e-10,
+    "angstrom": 1e-10,
+    "ångström": 1e-10,
+    "mils": 25.4e-6,
+    "inch": 0.0254,
+    "inches": 0.0254,
+    "micron": 1e-6,
+    "microns": 1e-6,
+    "mikron": 1e-6,
+}
+PREFIXES = {"": 1.0, "milli": 1e-3, "micro": 1e-6, "mikro": 1e-6, "nano": 1e-9}
+METRES = ("meter", "meters", "metre", "metres")
+SYNONYMS |= {prefix + metre: factor for prefix, factor in PREFIXES.items() for metre in METRES}
 LISTED = ", ".join(UNITS)
 GIVE = 'state the units of x and z by --units "mm,um" (in Python, by units=("mm", "um"))'
 PIXEL = 'give the pixel size in place of the unit of x, as in --units "0.8 um,um"'
+IGNORED = "the file states its own units; the units that you gave are ignored"
 
-ASIDE = "the file states its own units; the units that you gave are ignored"
 
+def length_unit(word: str) -> float | None:
+    """Return the factor to metres of a unit such as um, µm, [mm] or Mikrometer.
 
-def factor_of(word: str) -> float | None:
-    """Factor to metres of a unit as it is written, such as um, µm, [mm] or Mikrometer; None for any other word."""
+    None for any other word.
+    """
     word = word.strip().strip("[]()").strip().replace("µ", "u").replace("μ", "u")
-    return UNITS.get(word) or _WORDS.get(word.lower())
+    return UNITS.get(word) or SYNONYMS.get(word.lower())
 
 
-def pixel_of(word: str) -> float | None:
-    """Size of a pixel [m] that stands in place of the unit of x, such as 0.8 um; None for anything else."""
+def pixel_size(word: str) -> float | None:
+    """Return the size of a pixel [m] that stands in place of a unit, such as 0.8 um.
+
+    None for anything else.
+    """
     number, _, unit = word.strip().partition(" ")
     try:
-        size = float(number) * (factor_of(unit) or np.nan)
+        size = float(number) * (length_unit(unit) or math.nan)
     except ValueError:
         return None
-    return size if 0 < size < np.inf else None
+    return size if 0 < size < math.inf else None

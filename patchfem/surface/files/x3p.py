@@ -1,15 +1,18 @@
-"""X3P of ISO 5436-2 (ISO 25178-72): a zip file with main.xml and heights as binary data or as a list in the XML.
+"""X3P files (ISO 5436-2, ISO 25178-72): a zip file with main.xml and heights.
 
-Lengths are metres. x and y are incremental, or absolute and then stored with each point; every value of an axis is
-raw * Increment + Offset. Missing: NaN, an empty datum, or what the file of valid points leaves out, one bit each.
-Verified before use: sizes by the header, checksums, the data type by the number of bytes (16-bit values are signed).
+Heights are binary data or a list in the XML. Lengths are metres. x and y are incremental, or
+absolute and then stored with each point; every value of an axis is raw * Increment + Offset.
+Missing: NaN, an empty datum, or what the file of valid points leaves out, one bit each. Verified
+before use: sizes by the header, checksums, the data type by the number of bytes (16-bit values are
+signed).
 """
 
 import hashlib
 import posixpath
 import re
-from xml.etree.ElementTree import Element, TreeBuilder
-from xml.parsers import expat
+from typing import NamedTuple
+from xml.etree.ElementTree import Element, ParseError, TreeBuilder, XMLParser
+from zipfile import ZipFile
 
 import numpy as np
 
@@ -18,209 +21,335 @@ from ..areal import Areal
 from ..profile import Profile
 from ..samples import METRES
 from .raster import areal, raster
-from .raw import POINTS, Raw, member, opened, reason, shown
+from .raw import MAX_POINTS, Raw, open_zip, read_member, shorten, shorten_reason
 
-XML = 16 * 2**20  # bytes of main.xml
-DEEPEST, MOST = 50, 500_000  # elements of it inside one another, and in all
+MAX_XML_BYTES = 16 * 2**20  # bytes of main.xml; with its heights as a list it has 30 for each
+MAX_DEPTH = 50  # elements inside one another; the standard has six
+MAX_ELEMENTS = 500_000  # elements; more take over 100 MB
+MAX_CHECKSUM_BYTES = 4096  # bytes of the file with the checksum of main.xml, which has 45
 TYPES = {"I": "<i2", "L": "<i4", "F": "<f4", "D": "<f8"}
-_AXES = ("CX", "CY", "CZ")
+_AXIS_NAMES = ("CX", "CY", "CZ")
 _MD5 = re.compile(r"[0-9a-fA-F]{32}")
 
 
-def x3p(raw: Raw) -> Profile | Areal:
-    """The scan or trace of an X3P file; PatchfemError names what is wrong in it, a wrong checksum included."""
-    path, archive = raw.path, opened(raw)
-    main = [one.filename for one in archive.infolist() if posixpath.basename(one.filename) == "main.xml"]
-    if len(main) != 1:
-        raise PatchfemError(f"{path}: contains {len(main)} files main.xml, but exactly one is needed")
-    text = member(raw, archive, main[0], XML)
-    root = _parsed(path, text)
-    axes = [_axis(path, root, name) for name in _AXES]
-    shape, listed = _shape(path, root)
-    link = root.find("Record3/DataLink")
-    folder = posixpath.dirname(main[0])
-    notes = _main_checksum(raw, archive, root, folder, text)
-    if link is not None:
-        columns = _linked(raw, archive, (link, folder), axes, shape)
+class Axis(NamedTuple):
+    """Axis: whether each point stores its value, data type, increment [m], offset [m]."""
+
+    is_absolute: bool
+    data_type: str
+    increment: float
+    offset: float
+
+    def scale(self, raw_values) -> np.ndarray:
+        """Return raw values in metres."""
+        return raw_values * self.increment + self.offset
+
+
+class Shape(NamedTuple):
+    """Rows, points of a row, and whether the points are a list without a matrix."""
+
+    rows: int
+    columns: int
+    is_list: bool
+
+    @property
+    def count(self) -> int:
+        """Number of points."""
+        return self.rows * self.columns
+
+
+class Package(NamedTuple):
+    """Opened X3P file: the folder of main.xml and its root."""
+
+    raw: Raw
+    archive: ZipFile
+    folder: str
+    root: Element
+
+    def refuse(self, what: str) -> PatchfemError:
+        """Return the exception that states what is wrong in the file."""
+        return PatchfemError(f"{self.raw.path}: {what}")
+
+    def read_linked(self, link: str, checksum: str, max_bytes: int) -> bytes:
+        """Read a binary file by its name in main.xml and verify its checksum.
+
+        Parameters
+        ----------
+        link, checksum : str
+            Elements of Record3/DataLink.
+        max_bytes : int
+
+        Returns
+        -------
+        bytes
+        """
+        node = self.root.find("Record3/DataLink")
+        name = _text(node, link)
+        if not name or name.startswith(("/", "\\")) or ".." in re.split(r"[/\\]", name):
+            raise self.refuse(
+                f"{link} '{shorten(name)}' names a place outside the file; export the surface anew"
+            )
+        data = read_member(
+            self.raw, self.archive, posixpath.join(self.folder, name.removeprefix("./")), max_bytes
+        )
+        stated = _text(node, checksum)
+        if _MD5.fullmatch(stated) and _md5(data) != stated.lower():
+            raise self.refuse(
+                f"the checksum of {shorten(name)} is wrong: the heights were changed after the "
+                "file was written; export the surface anew"
+            )
+        return data
+
+
+def read_x3p(raw: Raw) -> Profile | Areal:
+    """Read the scan or trace of an X3P file.
+
+    Raises PatchfemError that names what is wrong in it.
+    """
+    archive = open_zip(raw)
+    names = [
+        info.filename
+        for info in archive.infolist()
+        if posixpath.basename(info.filename) == "main.xml"
+    ]
+    if len(names) != 1:
+        raise PatchfemError(
+            f"{raw.path}: contains {len(names)} files main.xml, but exactly one is needed"
+        )
+    text = read_member(raw, archive, names[0], MAX_XML_BYTES)
+    package = Package(raw, archive, posixpath.dirname(names[0]), _parse_xml(raw.path, text))
+    axes = [_read_axis(package, name) for name in _AXIS_NAMES]
+    shape = _read_shape(package)
+    if not axes[2].is_absolute:
+        raise package.refuse("the heights (CZ) are incremental; export the surface anew")
+    notes = _verify_main(package, text)
+    if package.root.find("Record3/DataLink") is not None:
+        columns = _read_binary(package, axes, shape)
     else:
-        columns = _listed(path, root, axes, shape)
-    columns = [values * axis[2] + axis[3] for values, axis in zip(columns, [one for one in axes if one[0] == "A"])]
-    if axes[2][0] != "A":
-        raise PatchfemError(f"{path}: the heights (CZ) are incremental; export the surface anew")
-    return _surface(path, columns, axes, shape, listed, notes)
+        columns = _read_list(package, axes, shape)
+    stored = [axis for axis in axes if axis.is_absolute]
+    columns = [axis.scale(values) for axis, values in zip(stored, columns)]
+    if len(stored) == 1 and not shape.is_list:
+        return _make_grid(package, columns[0], axes, shape, notes)
+    return _make_raster(package, columns, axes, shape)
 
 
-def _surface(path, columns: list, axes: list, shape: tuple, listed: bool, notes: tuple) -> Profile | Areal:
-    """Heights on incremental axes as a grid; points with places of their own as a raster."""
-    rows, count = shape
-    kinds = [axis[0] for axis in axes[:2]]
-    if kinds == ["I", "I"] and not listed:
-        places = [np.arange(n) * axis[2] + axis[3] for n, axis in zip((count, rows), axes)]
-        for name, axis, n in zip(_AXES, axes, (count, rows)):
-            if n > 1 and not axis[2] > 0:
-                raise PatchfemError(f"{path}: Increment of {name} is {axis[2]:g}; a length > 0 m is needed")
-        return areal(path, *places, columns[-1].reshape(rows, count), METRES, notes)
-    number = np.arange(rows * count)
-    places, own = [], iter(columns)
-    for axis, index in zip(axes[:2], (number % count, number // count)):
-        places.append(next(own) if axis[0] == "A" else index * axis[2] + axis[3])
-    there = np.isfinite(places[0]) & np.isfinite(places[1])
-    if there.sum() < 2:
-        raise PatchfemError(f"{path}: {there.sum()} points with coordinates; a trace needs at least two")
-    return raster(path, [one[there] for one in (*places, columns[-1])], None, (1.0, 1.0, 1.0), METRES)
+def _make_grid(
+    package: Package, heights, axes: list, shape: Shape, notes: tuple
+) -> Profile | Areal:
+    """Arrange heights on incremental axes as a grid."""
+    counts = (shape.columns, shape.rows)
+    for name, axis, count in zip(_AXIS_NAMES, axes, counts):
+        if count > 1 and not axis.increment > 0:
+            raise package.refuse(
+                f"Increment of {name} is {axis.increment:g}; a length > 0 m is needed"
+            )
+    x, y = (axis.scale(np.arange(count)) for axis, count in zip(axes, counts))
+    return areal(package.raw.path, x, y, heights.reshape(shape.rows, shape.columns), METRES, notes)
 
 
-def _axis(path, root: Element, name: str) -> tuple:
-    """(type "I" or "A", data type, increment [m], offset [m]) of an axis; CY of a profile may be absent."""
-    node = root.find(f"Record1/Axes/{name}")
-    if node is None and name != "CY":
-        raise PatchfemError(f"{path}: main.xml lacks Record1/Axes/{name}; export the surface anew")
-    kind = "I" if node is None else _text(node, "AxisType", "I" if name != "CZ" else "A")
+def _make_raster(package: Package, columns: list, axes: list, shape: Shape) -> Profile | Areal:
+    """Arrange points that store their places as a raster."""
+    numbers = np.arange(shape.count)
+    stored = iter(columns)
+    places = []
+    for axis, index in zip(axes[:2], (numbers % shape.columns, numbers // shape.columns)):
+        places.append(next(stored) if axis.is_absolute else axis.scale(index))
+    known = np.isfinite(places[0]) & np.isfinite(places[1])
+    if known.sum() < 2:
+        raise package.refuse(f"{known.sum()} points with coordinates; a trace needs at least two")
+    points = [values[known] for values in (*places, columns[-1])]
+    return raster(package.raw.path, points, None, (1.0, 1.0, 1.0), METRES)
+
+
+def _read_axis(package: Package, name: str) -> Axis:
+    """Read an axis; CY of a profile may be absent."""
+    node = package.root.find(f"Record1/Axes/{name}")
+    if node is None:
+        if name != "CY":
+            raise package.refuse(f"main.xml lacks Record1/Axes/{name}; export the surface anew")
+        node = Element(name)
+    kind = _text(node, "AxisType", "A" if name == "CZ" else "I")
     if kind not in ("I", "A"):
-        raise PatchfemError(f"{path}: AxisType of {name} is '{shown(kind)}'; I or A is needed")
-    data = "D" if node is None else _text(node, "DataType", "D")
-    if data not in TYPES:
-        raise PatchfemError(f"{path}: DataType of {name} is '{shown(data)}'; one of {', '.join(TYPES)} is needed")
-    numbers = [_number(path, f"{key} of {name}", "" if node is None else _text(node, key), default)
-               for key, default in (("Increment", 1.0), ("Offset", 0.0))]
-    if kind == "A" and not abs(numbers[0]) > 0:
-        raise PatchfemError(f"{path}: Increment of {name} is 0; export the surface anew")
-    return kind, data, *numbers
+        raise package.refuse(f"AxisType of {name} is '{shorten(kind)}'; I or A is needed")
+    data_type = _text(node, "DataType", "D")
+    if data_type not in TYPES:
+        raise package.refuse(
+            f"DataType of {name} is '{shorten(data_type)}'; one of {', '.join(TYPES)} is needed"
+        )
+    increment = _read_number(package, node, "Increment", "1")
+    offset = _read_number(package, node, "Offset", "0")
+    if kind == "A" and increment == 0:
+        raise package.refuse(f"Increment of {name} is 0; export the surface anew")
+    return Axis(kind == "A", data_type, increment, offset)
 
 
-def _number(path, name: str, text: str, default: float) -> float:
+def _read_number(package: Package, node: Element, name: str, default: str) -> float:
+    text = _text(node, name, default)
     try:
-        value = float(text) if text else default
+        value = float(text)
     except ValueError:
         value = np.nan
     if "_" in text or not np.isfinite(value):
-        raise PatchfemError(f"{path}: {name} is '{shown(text)}'; a number is needed")
+        raise package.refuse(f"{name} of {node.tag} is '{shorten(text)}'; a number is needed")
     return value
 
 
-def _shape(path, root: Element) -> tuple:
-    """((rows, points of a row), whether the points are a list without a matrix)."""
-    matrix = root.find("Record3/MatrixDimension")
-    names = ("SizeX", "SizeY", "SizeZ") if matrix is not None else ("ListDimension",)
-    where = matrix if matrix is not None else root.find("Record3")
-    sizes = []
-    for name in names:
-        text = _text(where, name, "1" if name != "SizeX" else "") if where is not None else ""
-        if not re.fullmatch(r"[0-9]{1,18}", text) or not 1 <= int(text) <= POINTS:
-            raise PatchfemError(f"{path}: {name} is '{shown(text)}'; a whole number from 1 to {POINTS:.0e} is needed")
-        sizes.append(int(text))
-    if len(sizes) == 1:
-        return (1, sizes[0]), True
-    if sizes[2] != 1:
-        raise PatchfemError(f"{path}: SizeZ is {sizes[2]}; a surface must have one layer: export each layer to its own "
-                            "file")
-    if sizes[0] * sizes[1] > POINTS:
-        raise PatchfemError(f"{path}: {sizes[0]} x {sizes[1]} heights, more than {POINTS:.0e}; export a part of the "
-                            "scan")
-    return (sizes[1], sizes[0]), False
+def _read_shape(package: Package) -> Shape:
+    matrix = package.root.find("Record3/MatrixDimension")
+    if matrix is None:
+        record = package.root.find("Record3")
+        return Shape(1, _read_size(package, record, "ListDimension", ""), is_list=True)
+    columns = _read_size(package, matrix, "SizeX", "")
+    rows = _read_size(package, matrix, "SizeY", "1")
+    layers = _read_size(package, matrix, "SizeZ", "1")
+    if layers != 1:
+        raise package.refuse(
+            f"SizeZ is {layers}; a surface must have one layer: export each layer to its own file"
+        )
+    if columns * rows > MAX_POINTS:
+        raise package.refuse(
+            f"{columns} x {rows} heights, more than {MAX_POINTS:.0e}; export a part of the scan"
+        )
+    return Shape(rows, columns, is_list=False)
 
 
-def _linked(raw: Raw, archive, link: tuple, axes: list, shape: tuple) -> list:
-    """Raw values of each absolute axis from the binary file, points one after the other."""
-    node, folder = link
-    count, path = shape[0] * shape[1], raw.path
-    record = np.dtype([(name, TYPES[axis[1]]) for name, axis in zip(_AXES, axes) if axis[0] == "A"])
-    data = _file(raw, archive, node, folder, ("PointDataLink", "MD5ChecksumPointData", count * record.itemsize))
-    if len(data) != count * record.itemsize:
-        raise PatchfemError(f"{path}: {len(data)} bytes of heights, but {count} heights of type {axes[2][1]} are "
-                            "needed; export the surface anew")
+def _read_size(package: Package, node: Element | None, name: str, default: str) -> int:
+    text = "" if node is None else _text(node, name, default)
+    if not re.fullmatch(r"[0-9]{1,18}", text) or not 1 <= int(text) <= MAX_POINTS:
+        raise package.refuse(
+            f"{name} is '{shorten(text)}'; a whole number from 1 to {MAX_POINTS:.0e} is needed"
+        )
+    return int(text)
+
+
+def _read_binary(package: Package, axes: list, shape: Shape) -> list:
+    """Read the raw values (k,) of each absolute axis from the binary file, point by point."""
+    fields = [
+        (name, TYPES[axis.data_type]) for name, axis in zip(_AXIS_NAMES, axes) if axis.is_absolute
+    ]
+    record = np.dtype(fields)
+    size = shape.count * record.itemsize
+    data = package.read_linked("PointDataLink", "MD5ChecksumPointData", size)
+    if len(data) != size:
+        raise package.refuse(
+            f"{len(data)} bytes of heights, but {shape.count} heights of type {axes[2].data_type} "
+            "are needed; export the surface anew"
+        )
     points = np.frombuffer(data, record)
     columns = [points[name].astype(float) for name in record.names]
     for values in columns:
         values[np.isinf(values)] = np.nan
-    if _text(node, "ValidPointsLink"):
-        valid = _file(raw, archive, node, folder, ("ValidPointsLink", "MD5ChecksumValidPoints", count + 8))
-        if len(valid) < (count + 7) // 8:
-            raise PatchfemError(f"{path}: {len(valid)} bytes of valid points, but {(count + 7) // 8} bytes are needed")
-        bits = np.unpackbits(np.frombuffer(valid, np.uint8), bitorder="little")[:count]
-        columns[-1][bits == 0] = np.nan
+    if _text(package.root, "Record3/DataLink/ValidPointsLink"):
+        size = (shape.count + 7) // 8
+        valid = package.read_linked("ValidPointsLink", "MD5ChecksumValidPoints", shape.count + 8)
+        if len(valid) < size:
+            raise package.refuse(f"{len(valid)} bytes of valid points, but {size} bytes are needed")
+        bits = np.unpackbits(np.frombuffer(valid, np.uint8), bitorder="little")
+        columns[-1][bits[: shape.count] == 0] = np.nan
     return columns
 
 
-def _file(raw: Raw, archive, node: Element, folder: str, asked: tuple) -> bytes:
-    """A binary file that main.xml names, by its name inside the zip file alone, with its checksum verified."""
-    link, checksum, most = asked
-    name = _text(node, link)
-    if not name or name.startswith(("/", "\\")) or ".." in re.split(r"[/\\]", name):
-        raise PatchfemError(f"{raw.path}: {link} '{shown(name)}' names a place outside the file; export the surface "
-                            "anew")
-    data = member(raw, archive, posixpath.join(folder, name.removeprefix("./")), most)
-    wanted = _text(node, checksum)
-    if _MD5.fullmatch(wanted) and hashlib.md5(data, usedforsecurity=False).hexdigest() != wanted.lower():
-        raise PatchfemError(f"{raw.path}: the checksum of {shown(name)} is wrong: the heights were changed after the "
-                            "file was written; export the surface anew")
-    return data
+def _read_list(package: Package, axes: list, shape: Shape) -> list:
+    """Read the raw values (k,) of each absolute axis from the list in main.xml.
 
-
-def _main_checksum(raw: Raw, archive, root: Element, folder: str, text: bytes) -> tuple:
-    """A note where the checksum file speaks of main.xml and disagrees."""
-    name = posixpath.join(folder, _text(root, "Record4/ChecksumFile", "md5checksum.hex"))
-    if name not in archive.namelist() or ".." in name:
-        return ()
-    said = member(raw, archive, name, 4096).decode("latin-1").split()
-    if len(said) < 2 or posixpath.basename(said[1].lstrip("*")) != "main.xml" or not _MD5.fullmatch(said[0]):
-        return ()
-    if hashlib.md5(text, usedforsecurity=False).hexdigest() == said[0].lower():
-        return ()
-    return (f"{raw.path}: main.xml does not match its checksum in {shown(name)}: main.xml was changed after it was "
-            "written",)
-
-
-def _listed(path, root: Element, axes: list, shape: tuple) -> list:
-    """Raw values of each absolute axis from the list in main.xml; an empty datum is missing."""
-    listed = root.find("Record3/DataList")
-    datums = [] if listed is None else [(one.text or "").strip() for one in listed.findall("Datum")]
-    count, wide = shape[0] * shape[1], sum(axis[0] == "A" for axis in axes)
-    if len(datums) != count:
-        raise PatchfemError(f"{path}: {len(datums)} heights in main.xml, but {count} are needed; export the surface "
-                            "anew")
-    table = np.full((count, wide), np.nan)
+    An empty datum is missing.
+    """
+    datums = [
+        (datum.text or "").strip() for datum in package.root.findall("Record3/DataList/Datum")
+    ]
+    if len(datums) != shape.count:
+        raise package.refuse(
+            f"{len(datums)} heights in main.xml, but {shape.count} are needed; export the surface "
+            "anew"
+        )
+    width = sum(axis.is_absolute for axis in axes)
+    table = np.full((shape.count, width), np.nan)
     for k, text in enumerate(datums):
         cells = [cell.strip() for cell in text.split(";")]
-        cells = cells[-wide:] if len(cells) == 3 else [cell for cell in cells if cell]
-        if cells:
-            try:
+        cells = cells[-width:] if len(cells) == 3 else [cell for cell in cells if cell]
+        try:
+            if cells:
                 table[k] = [float(cell) if cell else np.nan for cell in cells]
-            except ValueError:
-                raise PatchfemError(f"{path}: datum {k + 1} is '{shown(text)}'; {wide} numbers are needed") from None
+        except ValueError:
+            raise package.refuse(
+                f"datum {k + 1} is '{shorten(text)}'; {width} numbers are needed"
+            ) from None
     table[np.isinf(table)] = np.nan
     return list(table.T)
 
 
+def _verify_main(package: Package, text: bytes) -> tuple:
+    """Return a note if the checksum file is about main.xml and disagrees with it."""
+    name = posixpath.join(
+        package.folder, _text(package.root, "Record4/ChecksumFile", "md5checksum.hex")
+    )
+    if name not in package.archive.namelist() or ".." in name:
+        return ()
+    words = (
+        read_member(package.raw, package.archive, name, MAX_CHECKSUM_BYTES)
+        .decode("latin-1")
+        .split()
+    )
+    if len(words) < 2 or posixpath.basename(words[1].lstrip("*")) != "main.xml":
+        return ()
+    if not _MD5.fullmatch(words[0]) or _md5(text) == words[0].lower():
+        return ()
+    return (
+        f"{package.raw.path}: main.xml does not match its checksum in {shorten(name)}: main.xml "
+        "was changed after it was written",
+    )
+
+
+def _md5(data: bytes) -> str:
+    return hashlib.md5(data, usedforsecurity=False).hexdigest()
+
+
 def _text(node: Element, path: str, default: str = "") -> str:
-    """The text at a path of names without blanks around it; the default where there is none."""
+    """Return the text at a path of names without blanks around it; the default if there is none."""
     return (node.findtext(path) or "").strip() or default
 
 
-def _parsed(path, data: bytes) -> Element:
-    """The root of main.xml, names without namespaces; no document type, no entities, no deep nesting, no other file."""
-    parser, tree, count, deep = expat.ParserCreate(), TreeBuilder(), 0, 0
+class _SafeTree(TreeBuilder):
+    """Builder of a tree without namespaces, attributes and document types, of limited size."""
 
-    def refuse(*_):
-        raise PatchfemError(f"{path}: main.xml declares entities or a document type, which no surface needs; export "
-                            "the surface anew")
+    def __init__(self, path) -> None:
+        super().__init__()
+        self.path = path
+        self.depth = 0
+        self.count = 0
 
-    def start(name, _):
-        nonlocal count, deep
-        count, deep = count + 1, deep + 1
-        if deep > DEEPEST or count > MOST:
-            raise PatchfemError(f"{path}: main.xml is nested deeper than {DEEPEST} or has more than {MOST} elements")
-        tree.start(name.rpartition(":")[2], {})
+    def doctype(self, *_) -> None:
+        """Refuse a document type: its entities may fill the memory or name other files."""
+        raise PatchfemError(
+            f"{self.path}: main.xml declares entities or a document type, which no surface needs; "
+            "export the surface anew"
+        )
 
-    def end(name):
-        nonlocal deep
-        deep -= 1
-        tree.end(name.rpartition(":")[2])
+    def start(self, tag: str, _attributes: dict) -> Element:
+        """Open an element."""
+        self.depth += 1
+        self.count += 1
+        if self.depth > MAX_DEPTH or self.count > MAX_ELEMENTS:
+            raise PatchfemError(
+                f"{self.path}: main.xml is nested deeper than {MAX_DEPTH} or has more than "
+                f"{MAX_ELEMENTS} elements"
+            )
+        return super().start(tag.rpartition("}")[2], {})
 
-    parser.StartDoctypeDeclHandler = parser.EntityDeclHandler = parser.ExternalEntityRefHandler = refuse
-    parser.StartElementHandler, parser.EndElementHandler, parser.CharacterDataHandler = start, end, tree.data
+    def end(self, tag: str) -> Element:
+        """Close an element."""
+        self.depth -= 1
+        return super().end(tag.rpartition("}")[2])
+
+
+def _parse_xml(path, data: bytes) -> Element:
+    """Parse main.xml, names without namespaces."""
+    parser = XMLParser(target=_SafeTree(path))
     try:
-        parser.Parse(data, True)
-    except (expat.ExpatError, ValueError, UnicodeError, LookupError) as error:
-        raise PatchfemError(f"{path}: main.xml is damaged ({reason(error)}); export the surface anew") from None
-    return tree.close()
+        parser.feed(data)
+        return parser.close()
+    except (ParseError, ValueError, UnicodeError, LookupError) as error:
+        raise PatchfemError(
+            f"{path}: main.xml is damaged ({shorten_reason(error)}); export the surface anew"
+        ) from None

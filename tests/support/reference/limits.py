@@ -30,7 +30,7 @@ SIZES = {  # constant -> what it bounds and how it is written
     "inputs.matlab.LARGEST_FILE": "bytes of a .mat file",
     "inputs.matlab5.LARGEST": "number of elements of one variable in a .mat file",
     "mesh.files.LARGEST": "bytes of a mesh file",
-    "surface.files.raw.LARGEST": "bytes of the file of a scan, also after decompression",
+    "surface.files.raw.MAX_BYTES": "bytes of the file of a scan, also after decompression",
     "surface.samples.LONGEST": "length of a trace [m]",
     "model.slide.MOST": "steps per cycle of a prescribed slide",
     "runs.rig.costs.MOST_STEPS": "steps per cycle of a time integration, if the tolerance determines the steps",

@@ -93,7 +93,7 @@ def test_exact_the_same_texts_as_surface_topography_reads_them(tmp_path, monkeyp
     monkeypatch.setattr(instruments, "PYTHON", os.environ["PATCHFEM_TOPOGRAPHY_PYTHON"])
     for name in ("spip", "spip with a unit", "attocube", "nova", "pixel size", "sizes of SurfaceTopography"):
         ours = read(tmp_path, HEADS[name][0] + ROWS)
-        theirs = instruments.instrument(fetch(tmp_path / "scan.txt"), None)
+        theirs = instruments.read_instrument(fetch(tmp_path / "scan.txt"), None)
         assert ours.z == pytest.approx(theirs.z, rel=1e-12), name
         assert ours.x == pytest.approx(theirs.x, rel=1e-12) and ours.y == pytest.approx(theirs.y, rel=1e-12), name
 

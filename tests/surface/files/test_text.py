@@ -144,7 +144,7 @@ REFUSED = {
     "x [um],z [um]\n0,0,1,5\n": "{path}:2: '0,0,1,5': two numbers are needed; with a decimal comma, separate the "
                                  "columns by semicolons or tabs",
     "x [um],z [um]\n0,1\n,2\n": "{path}:3: '' is not a number for x; correct the line or delete it",
-    "x [um],z [um]\n0,1\n1,bad\n": "{path}:3: 'bad' is not a height; write a missing height as nan",
+    "x [um],z [um]\n0,1\n1,worn\n": "{path}:3: 'worn' is not a height; write a missing height as nan",
     "x [um],z [um]\n0,1\n1,1_0\n": "{path}:3: '1_0' is not a height; write a missing height as nan",
     "x [um],z [um]\n0,1\n1,\u0663\n": "{path}:3: '\u0663' is not a height; write a missing height as nan",
     "x [um],z [um]\n0,1\nnan,2\n3,1\n": "{path}:3: x is nan; finite numbers are needed",
@@ -185,7 +185,7 @@ def test_refuses_what_is_no_file_and_what_is_too_much(tmp_path, monkeypatch):
         read_profile("a\0b")
     with pytest.raises(PatchfemError, match=r"damaged .*; pack it again"):
         read(tmp_path, gzip.compress(text(X, Z).encode())[:-20])
-    monkeypatch.setattr(raw, "TEXT", 1 << 20)
+    monkeypatch.setattr(raw, "MAX_TEXT_BYTES", 1 << 20)
     bomb = gzip.compress(b"0" * (1 << 22))
     for content in (bomb, b" " * (1 << 21)):
         with pytest.raises(PatchfemError, match="more than 1 MiB of text; thin out the samples"):
@@ -194,7 +194,7 @@ def test_refuses_what_is_no_file_and_what_is_too_much(tmp_path, monkeypatch):
 
 def test_always_hostile_files_are_refused_in_little_memory(tmp_path, monkeypatch):
     """A gzip file of 32 MiB of blanks and a line of a million columns; unpacked or split they take 30 MB and more."""
-    monkeypatch.setattr(raw, "TEXT", 1 << 20)
+    monkeypatch.setattr(raw, "MAX_TEXT_BYTES", 1 << 20)
     columns = b"x [um],z [um]\n0,0\n" + b"," * 10**6 + b"1\n"
     for content, megabytes in ((gzip.compress(b" " * (1 << 25)), 8), (columns, 8)):
         (tmp_path / "before.csv").write_bytes(content)
