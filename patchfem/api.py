@@ -19,8 +19,8 @@ from tempfile import TemporaryDirectory
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
-from .campaigns import backbone as backbones
 from .campaigns import cost as cost_curves
+from .campaigns.backbone import curves as backbones
 from .campaigns.sweeps import ask, executors
 from .campaigns.sweeps import asked as case_models
 from .core import Measure, Missing, NotConverged, Outcome, PatchfemError
@@ -208,10 +208,10 @@ def backbone(scene: str | Path | Scene | Model, /, *, mode: str = "",
     are not positive lengths.
     """
     model = joint.freed(build(scene, **sets))
-    ways = backbones.WAYS if _word(method, "backbone: method") == "all" else (method,)
-    if unknown := set(ways) - set(backbones.WAYS):
+    ways = backbones.METHODS if _word(method, "backbone: method") == "all" else (method,)
+    if unknown := set(ways) - set(backbones.METHODS):
         raise PatchfemError(f"backbone: method {unknown.pop()!r} does not exist; use one of "
-                            f"{', '.join(backbones.WAYS)}, or 'all'")
+                            f"{', '.join(backbones.METHODS)}, or 'all'")
     wanted = None if amplitudes is None else axes.lengths(_lengths(amplitudes), "amplitudes")
     found = backbones.backbone(model, _word(mode, "backbone: mode"), wanted, ways)
     return backbone_files.contents(found, model.source.title).to_xarray()
@@ -275,13 +275,14 @@ class SweepPlots:
         With `ax`, the damping ratio is left out. dataset: the result of `pf.backbone`. Raises PatchfemError for any
         other Dataset, and for one without a curve.
         """
-        ways = [way for way in backbones.WAYS if f"{way.replace('-', '_')}_amplitude" in getattr(dataset, "coords", ())]
+        known = getattr(dataset, "coords", ())
+        ways = [way for way in backbones.METHODS if f"{way.replace('-', '_')}_amplitude" in known]
         if not ways:
             raise PatchfemError("plot.backbone: a Dataset returned by pf.backbone is needed, with at least one curve"
                                 + "".join(f"; {why}" for why in [getattr(dataset, "attrs", {}).get("missing")] if why))
         curves = {way: SimpleNamespace(**{name: dataset[f"{way.replace('-', '_')}_{name}"].values
                                           for name in backbone_files.COLUMNS}) for way in ways}
-        figure = pictures.draw.figure(backbone_files.drawn(SimpleNamespace(curves=curves)), onto=ax)
+        figure = pictures.draw.figure(backbone_files.drawn(curves), onto=ax)
         return figure.axes[0] if ax is None else ax
 
 

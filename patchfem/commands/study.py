@@ -7,8 +7,8 @@ from typing import Annotated, Literal
 
 from cyclopts import Parameter
 
-from ..campaigns import backbone as backbones
 from ..campaigns import cost as cost_curves
+from ..campaigns.backbone import curves as backbones
 from ..export import backbone as backbone_files
 from ..export import cost as cost_files
 from ..export import results
@@ -80,7 +80,7 @@ def backbone(scene: Path, /, *, mode: word("name of the mode, such as axial, or 
     Example: patchfem backbone rig.toml --mode axial --amplitudes "0.1 um..1 mm:25"
     """
     found = joint.freed(model_of(scene, set_))
-    ways = backbones.WAYS if method == ALL else (method,)
+    ways = backbones.METHODS if method == ALL else (method,)
     lengths = axes.lengths(amplitudes, "--amplitudes") if amplitudes else None
     target = placed(out, f"{found.source.path.stem}-backbone")
     with results.Folder(target) as folder:

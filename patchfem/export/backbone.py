@@ -1,11 +1,12 @@
-"""A backbone on disk: backbone.csv, backbone.nc, a picture and a page; its answer as plain numbers and as lines."""
+"""A backbone on disk: backbone.csv, backbone.nc, a picture and a page; its answer as text."""
 
 from html import escape
+from typing import NamedTuple
 
 import numpy as np
 
 from .. import __version__, scales
-from ..campaigns.backbone import Backbone, Curve
+from ..campaigns.backbone.records import Backbone, Curve
 from ..disk.whole import write_rows, write_text
 from .drawing import charts, pictures
 from .netcdf import Contents, write
@@ -14,165 +15,307 @@ from .results import Folder
 from .summary import write_json
 
 COLUMNS = ("amplitude", "frequency", "frequency_error", "damping", "damping_error")
-LEFT_OUT = " Frequencies with errors larger than the frequency itself are left out of the picture, not of the table."
-HEAD = ("method", "amplitude [m]", "frequency [Hz]", "frequency_error [Hz]", "damping", "damping_error")
-WAYS = {"balance": "The curve belongs to the periodic motion that the rig would have without a net loss of energy. A "
-                   "slow decay follows this motion, and so does a test in phase resonance.",
-        "decay": "The curve belongs to a free decay from the largest amplitude; frequency and damping are evaluated "
-                 "from one turning point to the next.",
-        "quasi-static": "The frequency follows from the deflection under a static force that is distributed like the "
-                        "mode with the contact stuck. The damping follows from the loops of the friction law."}
+HEAD = (
+    "method",
+    "amplitude [m]",
+    "frequency [Hz]",
+    "frequency_error [Hz]",
+    "damping",
+    "damping_error",
+)
+VARIABLES = {  # Unit and description of each variable of backbone.nc.
+    "frequency": ("Hz", "frequency"),
+    "frequency_error": ("Hz", "error of the frequency"),
+    "damping": ("1", "damping ratio, structure and friction together"),
+    "damping_error": ("1", "error of the damping ratio"),
+}
+DESCRIPTIONS = {
+    "balance": "The curve belongs to the periodic motion that the rig would have without a net "
+    "loss of energy. A slow decay follows this motion, and so does a test in phase resonance.",
+    "decay": "The curve belongs to a free decay from the largest amplitude; frequency and damping "
+    "are evaluated from one turning point to the next.",
+    "quasi-static": "The frequency follows from the deflection under a static force that is "
+    "distributed like the mode with the contact stuck. The damping follows from the loops of the "
+    "friction law.",
+}
 COLOURS = {"balance": "accent", "decay": "warm", "quasi-static": "#2f9e63"}
-LISTED, MOST_LISTED = 9, 25  # amplitudes in the table on the screen of a curve of more, and the most of others
+LEFT_OUT = (
+    " Frequencies with errors larger than the frequency itself are left out of the picture, not "
+    "of the table."
+)
+MAX_WHOLE = 25  # Amplitudes of a curve that the screen shows in full.
+N_SHOWN = 9  # Amplitudes that the screen shows of a longer curve.
+FLOOR_FACTOR = 0.1  # Lower end of a bar on a logarithmic axis / smallest value.
 
 
 def answer_of(found: Backbone) -> dict:
-    """The object that `patchfem backbone --json` prints, in SI."""
-    return {"mode": found.mode, "free_frequency": found.free, "stuck_frequency": found.stuck,
-            "stuck_frequency_error": found.stuck_error,
-            "curves": {way: {name: getattr(one, name).tolist() for name in COLUMNS}
-                       for way, one in found.curves.items()},
-            "missing": found.missing,
-            "exponent": {"micro": found.micro, "gross": found.gross, "micro_theory": found.expected},
-            "flutter_amplitude": found.flutter, "notes": list(found.notes)}
+    """Return the object that `patchfem backbone --json` prints, in SI units."""
+    frequencies, exponents = found.frequencies, found.exponents
+    curves = {
+        method: {name: getattr(curve, name).tolist() for name in COLUMNS}
+        for method, curve in found.curves.items()
+    }
+    return {
+        "mode": found.mode,
+        "free_frequency": frequencies.free,
+        "stuck_frequency": frequencies.stuck,
+        "stuck_frequency_error": frequencies.stuck_error,
+        "curves": curves,
+        "missing": found.missing,
+        "exponent": {
+            "micro": exponents.micro,
+            "gross": exponents.gross,
+            "micro_theory": exponents.micro_theory,
+        },
+        "flutter_amplitude": found.flutter,
+        "notes": list(found.notes),
+    }
 
 
 def contents(found: Backbone, title: str = "") -> Contents:
-    """backbone.nc: every curve under the name of its way, over amplitudes of its own."""
+    """Return backbone.nc: each curve under the name of its method, over its own amplitudes."""
     variables, coordinates = {}, {}
-    for way, one in found.curves.items():
-        name = way.replace("-", "_")
-        coordinates[f"{name}_amplitude"] = (f"{name}_amplitude", one.amplitude, {
-            "units": "m", "long_name": "half the peak-to-peak motion at the output"})
-        for of, unit, words in (("frequency", "Hz", "frequency"), ("frequency_error", "Hz", "error of the frequency"),
-                                ("damping", "1", "damping ratio, structure and friction together"),
-                                ("damping_error", "1", "error of the damping ratio")):
-            variables[f"{name}_{of}"] = (f"{name}_amplitude", getattr(one, of), {
-                "units": unit, "long_name": f"{words}, by {way}"})
-    numbers = {"free_frequency": found.free, "stuck_frequency": found.stuck, "exponent_micro": found.micro,
-               "exponent_gross": found.gross, "flutter_amplitude": found.flutter,
-               "notes": "; ".join(found.notes) or None}
-    return Contents(variables, coordinates, {"title": title, "patchfem": __version__, "mode": found.mode} | (
-        {"missing": "; ".join(f"{way}: {text}" for way, text in found.missing.items())} if found.missing else {}) | {
-        name: value for name, value in numbers.items() if value is not None})
+    for method, curve in found.curves.items():
+        prefix = method.replace("-", "_")
+        dimension = f"{prefix}_amplitude"
+        description = {"units": "m", "long_name": "half the peak-to-peak motion at the output"}
+        coordinates[dimension] = (dimension, curve.amplitude, description)
+        for name, (unit, text) in VARIABLES.items():
+            description = {"units": unit, "long_name": f"{text}, by {method}"}
+            variables[f"{prefix}_{name}"] = (dimension, getattr(curve, name), description)
+    attributes = {"title": title, "patchfem": __version__, "mode": found.mode}
+    if found.missing:
+        reasons = [f"{method}: {text}" for method, text in found.missing.items()]
+        attributes["missing"] = "; ".join(reasons)
+    numbers = {
+        "free_frequency": found.frequencies.free,
+        "stuck_frequency": found.frequencies.stuck,
+        "exponent_micro": found.exponents.micro,
+        "exponent_gross": found.exponents.gross,
+        "flutter_amplitude": found.flutter,
+        "notes": "; ".join(found.notes) or None,
+    }
+    attributes |= {name: value for name, value in numbers.items() if value is not None}
+    return Contents(variables, coordinates, attributes)
 
 
-def write_into(found: Backbone, title: str, resolved: str, folder: Folder, with_page: bool = True) -> dict:
-    """Write into an open results folder, and return the answer; title: of the scene, resolved: its text in SI."""
+def write_into(
+    found: Backbone, title: str, resolved: str, folder: Folder, with_page: bool = True
+) -> dict:
+    """Write a backbone into an open results folder and return its answer.
+
+    Parameters
+    ----------
+    found : Backbone
+    title : str
+        Title of the scene.
+    resolved : str
+        Text of the scene in SI units.
+    folder : Folder
+    with_page : bool
+    """
     answer = answer_of(found)
-    write_rows(folder.path / "backbone.csv", [HEAD, *(
-        [way, *(repr(float(value)) for value in row)] for way, one in found.curves.items()
-        for row in zip(*(getattr(one, name) for name in COLUMNS)))])
+    rows: list = [HEAD]
+    for method, curve in found.curves.items():
+        columns = np.column_stack([getattr(curve, name) for name in COLUMNS])
+        rows += [[method, *map(repr, row)] for row in columns.tolist()]
+    write_rows(folder.path / "backbone.csv", rows)
     write(contents(found, title), folder.path / "backbone.nc")
     write_json(answer, folder.path / "backbone.json")
     write_text(folder.path / "scene.resolved.toml", resolved)
     if found.curves:
-        write_text(folder.path / "backbone.svg", pictures.draw(drawn(found)))
+        write_text(folder.path / "backbone.svg", pictures.draw(drawn(found.curves)))
     if with_page:
         write_text(folder.path / "report.html", page(found, title))
     return answer
 
 
-def drawn(found: Backbone) -> list:
-    """The two charts: frequency and damping ratio over the amplitude, with their errors; frequencies that their errors
-    exceed would stretch the axis, and stand in the table alone."""
-    unit, scale = scales.axis_unit(np.concatenate([one.amplitude for one in found.curves.values()]), "m")
-    out = []
-    for name, label, of, log in (("frequency", "frequency", "Hz", False), ("damping", "damping ratio", "", True)):
-        log, marks = log and all((one.damping > 0).all() for one in found.curves.values()), []
-        for way, one in found.curves.items():
-            x, y = one.amplitude * scale, getattr(one, name)
-            error = getattr(one, f"{name}_error")
-            shown = (y > 0) | (not log) if name == "damping" else _bounded(one)
-            marks.append(charts.line(x[shown], y[shown], COLOURS[way], way))
-            error = error[shown]
-            marks.append(charts.mark("dots", COLOURS[way], "", x=x[shown], y=y[shown], errors=error, shape="circle",
-                                     **({"floor": 0.1 * float(y[shown].min(initial=1.0))} if log else {})))
-        out.append(charts.chart(label.capitalize(), charts.axis("amplitude at the output", unit, True),
-                                charts.axis(label, of, log), marks))
-    return out
+def drawn(curves: dict) -> list:
+    """Return the charts of frequency and damping ratio against amplitude, with errors.
+
+    A frequency whose error is larger than itself would stretch the axis, so it is left out.
+    """
+    amplitudes = np.concatenate([curve.amplitude for curve in curves.values()])
+    unit, scale = scales.axis_unit(amplitudes, "m")
+    along = charts.axis("amplitude at the output", unit, True)
+    is_log = all((curve.damping > 0).all() for curve in curves.values())
+    frequency = []
+    damping = []
+    for method, curve in curves.items():
+        x = curve.amplitude * scale
+        shown = _has_small_error(curve)
+        frequency += _marks(
+            method, x[shown], curve.frequency[shown], curve.frequency_error[shown], False
+        )
+        damping += _marks(method, x, curve.damping, curve.damping_error, is_log)
+    return [
+        charts.chart("Frequency", along, charts.axis("frequency", "Hz"), frequency),
+        charts.chart("Damping ratio", along, charts.axis("damping ratio", "", is_log), damping),
+    ]
 
 
-def _bounded(one: Curve) -> np.ndarray:
-    """Which points of a curve (k,) have a frequency that its error does not exceed; all, where none has."""
-    found = one.frequency_error <= one.frequency
+def _marks(method: str, x, y, errors, is_log: bool) -> list:
+    """Return a line through the points of a method, and their error bars."""
+    style = {"shape": "circle", "errors": errors}
+    if is_log:
+        style["floor"] = FLOOR_FACTOR * float(y.min(initial=1.0))
+    colour = COLOURS[method]
+    return [charts.line(x, y, colour, method), charts.dots(x, y, colour, **style)]
+
+
+def _has_small_error(curve: Curve) -> np.ndarray:
+    """Whether the frequency of each point (k,) exceeds its error; all if none does."""
+    found = curve.frequency_error <= curve.frequency
     return found | (not found.any())
 
 
 def page(found: Backbone, title: str) -> str:
-    """The HTML page of a backbone."""
-    made = [one | {"anchor": f"chart{number}"} for number, one in enumerate(drawn(found))] if found.curves else []
-    cells = "".join(f'<div id="{one["anchor"]}" class=chart role=img aria-label="{escape(one["title"])}"></div>'
-                    for one in made)
+    """Return the HTML page of a backbone."""
+    made = []
+    if found.curves:
+        made = [one | {"anchor": f"chart{k}"} for k, one in enumerate(drawn(found.curves))]
     first, *more = sentences(found)
-    told = f"<div class=verdict><b>{prose(first)}</b>{''.join(f'<p>{prose(text)}</p>' for text in more)}</div>"
-    sections = [Section("curves", "Frequency and damping against amplitude",
-                        f"<figure><div class=row>{cells}</div><figcaption>The bars show the numerical "
-                        f"errors.{LEFT_OUT * (not all(_bounded(one).all() for one in found.curves.values()))}"
-                        "</figcaption>"
-                        "</figure>" if made else "<p>No curve was found.</p>"),
-                Section("ways", "How the curves were computed", table(("", ""), [
-                    [escape(way), prose(text if way in found.curves else f"not known: {found.missing[way]}")]
-                    for way, text in WAYS.items() if way in found.curves or way in found.missing]) + "".join(
-                        f"<p>{prose(text[0].upper() + text[1:])}.</p>" for text in found.notes)),
-                Section("values", "Values", _values(found))]
-    title = f"Mode {found.mode}: frequency and damping against amplitude" + f": {title}" * bool(title)
-    return document(title, told, sections, {"charts": made} if made else None,
-                    ("figures.js", "curves.js") if made else ())
+    paragraphs = "".join(f"<p>{prose(text)}</p>" for text in more)
+    lead = f"<div class=verdict><b>{prose(first)}</b>{paragraphs}</div>"
+    sections = [
+        Section("curves", "Frequency and damping against amplitude", _figure(found, made)),
+        Section("ways", "How the curves were computed", _methods(found)),
+        Section("values", "Values", _values_table(found)),
+    ]
+    heading = f"Mode {found.mode}: frequency and damping against amplitude"
+    if title:
+        heading = f"{heading}: {title}"
+    data = {"charts": made} if made else None
+    scripts = ("figures.js", "curves.js") if made else ()
+    return document(heading, lead, sections, data, scripts)
 
 
-def _values(found: Backbone) -> str:
-    heads = ("method", ">amplitude", ">frequency", ">damping ratio")
-    rows = [[way, *(escape(text) for text in _told(one, k))] for way, one in found.curves.items()
-            for k in range(one.amplitude.size)]
-    return table(heads, rows)
+def _figure(found: Backbone, made: list) -> str:
+    """Return the places of the charts on the page, with a caption."""
+    if not made:
+        return "<p>No curve was found.</p>"
+    cells = "".join(
+        f'<div id="{one["anchor"]}" class=chart role=img aria-label="{escape(one["title"])}"></div>'
+        for one in made
+    )
+    caption = "The bars show the numerical errors."
+    if not all(_has_small_error(curve).all() for curve in found.curves.values()):
+        caption += LEFT_OUT
+    return f"<figure><div class=row>{cells}</div><figcaption>{caption}</figcaption></figure>"
 
 
-def _told(one, k: int) -> tuple:
-    """(amplitude, frequency, damping ratio) of a point of a curve in words, with errors."""
-    return (scales.short(one.amplitude[k], "m", 3), scales.told(one.frequency[k], one.frequency_error[k], unit="Hz"),
-            scales.told(one.damping[k], one.damping_error[k]))
+def _methods(found: Backbone) -> str:
+    """Return the description of each method, or why it has no curve, and the notes."""
+    rows = []
+    for method, text in DESCRIPTIONS.items():
+        if method in found.curves:
+            rows.append([escape(method), prose(text)])
+        elif method in found.missing:
+            rows.append([escape(method), prose(f"not known: {found.missing[method]}")])
+    notes = "".join(f"<p>{prose(text[0].upper() + text[1:])}.</p>" for text in found.notes)
+    return table(("", ""), rows) + notes
 
 
-def _held(found: Backbone) -> str:
-    """Frequency with the contact held in words, with its error where one is known."""
-    return scales.told(found.stuck, found.stuck_error, unit="Hz") if found.stuck_error else \
-        scales.short(found.stuck, "Hz", 5)
+def _values_table(found: Backbone) -> str:
+    rows = []
+    for method, curve in found.curves.items():
+        for k in range(curve.amplitude.size):
+            rows.append([method, *(escape(text) for text in _format_point(curve, k))])
+    return table(("method", ">amplitude", ">frequency", ">damping ratio"), rows)
+
+
+class FormattedPoint(NamedTuple):
+    """Amplitude, frequency and damping ratio of a point as text, with errors."""
+
+    amplitude: str
+    frequency: str
+    damping: str
+
+
+def _format_point(curve: Curve, k: int) -> FormattedPoint:
+    return FormattedPoint(
+        scales.short(curve.amplitude[k], "m", 3),
+        scales.told(curve.frequency[k], curve.frequency_error[k], unit="Hz"),
+        scales.told(curve.damping[k], curve.damping_error[k]),
+    )
+
+
+def _format_stuck(found: Backbone) -> str:
+    """Format the frequency with a sticking contact, with its error where it is known."""
+    _, stuck, error = found.frequencies
+    if error:
+        return scales.told(stuck, error, unit="Hz")
+    return scales.short(stuck, "Hz", 5)
 
 
 def sentences(found: Backbone) -> list:
-    """The answer in sentences: frequency and damping ratio at both ends of the amplitudes first."""
-    held = "" if found.stuck is None else f", and {_held(found)} while the contact sticks"
-    free = scales.short(found.free, "Hz", 5)
-    out = [f"The natural frequency of mode {found.mode} is {free} without the contact{held}."]
-    best = next((found.curves[way] for way in ("balance", "quasi-static", "decay") if way in found.curves), None)
-    if best is not None:
-        ends = [_told(best, k) for k in sorted({0, best.amplitude.size - 1})]
-        said = "; at ".join(f"{place}: {frequency}, damping ratio {damping}" for place, frequency, damping in ends)
-        out.insert(0, f"Mode {found.mode} at {said}.")
-        if (count := best.amplitude.size) > 1:
-            k = int(np.argmax(best.damping))
-            out.append(f"Among these {count} amplitudes the damping ratio is largest at "
-                       f"{scales.short(best.amplitude[k], 'm', 3)}: {best.damping[k]:.3g}, with a frequency of "
-                       f"{scales.short(best.frequency[k], 'Hz', 5)}.")
-    theory = "" if found.expected is None else f" (theory: {found.expected:.3g})"
-    powers = [f"to the power {value:.3g} {where}" for value, where in (
-        (found.micro, f"in micro-slip{theory}"), (found.gross, "in gross slip (theory: 1)")) if value is not None]
+    """Return the answer in sentences: first both ends of the best curve."""
+    free = scales.short(found.frequencies.free, "Hz", 5)
+    stuck = ""
+    if found.frequencies.stuck is not None:
+        stuck = f", and {_format_stuck(found)} while the contact sticks"
+    out = [f"The natural frequency of mode {found.mode} is {free} without the contact{stuck}."]
+    ordered = [found.curves.get(method) for method in ("balance", "quasi-static", "decay")]
+    curve = next((one for one in ordered if one is not None), None)
+    if curve is not None:
+        out = [_describe_ends(found.mode, curve), *out, *_describe_largest_damping(curve)]
+    exponents = found.exponents
+    theory = ""
+    if exponents.micro_theory is not None:
+        theory = f" (theory: {exponents.micro_theory:.3g})"
+    powers = []
+    if exponents.micro is not None:
+        powers.append(f"to the power {exponents.micro:.3g} in micro-slip{theory}")
+    if exponents.gross is not None:
+        powers.append(f"to the power {exponents.gross:.3g} in gross slip (theory: 1)")
     if powers:
-        out.append(f"The energy that the contact dissipates per cycle grows with the amplitude {' and '.join(powers)}.")
+        out.append(
+            "The energy that the contact dissipates per cycle grows with the amplitude "
+            f"{' and '.join(powers)}."
+        )
     if found.flutter is not None:
-        out.append(f"At amplitudes above {scales.short(found.flutter, 'm', 3)} the mode gains energy, because "
-                   "friction dissipates less than the negative damping supplies.")
+        out.append(
+            f"At amplitudes above {scales.short(found.flutter, 'm', 3)} the mode gains energy, "
+            "because friction dissipates less than the negative damping supplies."
+        )
     return out
 
 
+def _describe_ends(mode: str, curve: Curve) -> str:
+    """Return a sentence on frequency and damping at the smallest and the largest amplitude."""
+    ends = [_format_point(curve, k) for k in sorted({0, curve.amplitude.size - 1})]
+    parts = [f"{one.amplitude}: {one.frequency}, damping ratio {one.damping}" for one in ends]
+    return f"Mode {mode} at {'; at '.join(parts)}."
+
+
+def _describe_largest_damping(curve: Curve) -> list:
+    """Return a sentence on the largest damping ratio of several amplitudes."""
+    count = curve.amplitude.size
+    if count < 2:
+        return []
+    k = int(np.argmax(curve.damping))
+    amplitude = scales.short(curve.amplitude[k], "m", 3)
+    frequency = scales.short(curve.frequency[k], "Hz", 5)
+    return [
+        f"Among these {count} amplitudes the damping ratio is largest at {amplitude}: "
+        f"{curve.damping[k]:.3g}, with a frequency of {frequency}."
+    ]
+
+
 def lines_of(found: Backbone) -> list:
-    """The answer in lines for the screen: sentences, a table of some amplitudes, what is missing."""
-    out = [*sentences(found), f"{'method':<13}{'amplitude':>12}{'frequency':>26}{'damping ratio':>26}"]
-    for way, one in found.curves.items():
-        count = one.amplitude.size
-        pick = np.unique(np.linspace(0, count - 1, count if count <= MOST_LISTED else LISTED).round().astype(int))
-        out += [f"{way:<13}{cells[0]:>12}{cells[1]:>26}{cells[2]:>26}" for cells in (_told(one, k) for k in pick)]
-        if pick.size < count:
-            out.append(f"{way}: {pick.size} of {count} amplitudes are shown; backbone.csv has all")
-    return [*out, *(f"{way}: not known: {text}" for way, text in found.missing.items())]
+    """Return the answer in lines for the screen: sentences, a table, what is missing."""
+    head = f"{'method':<13}{'amplitude':>12}{'frequency':>26}{'damping ratio':>26}"
+    out = [*sentences(found), head]
+    for method, curve in found.curves.items():
+        count = curve.amplitude.size
+        n_shown = count if count <= MAX_WHOLE else N_SHOWN
+        shown = np.unique(np.linspace(0, count - 1, n_shown).round().astype(int))
+        for k in shown:
+            amplitude, frequency, damping = _format_point(curve, k)
+            out.append(f"{method:<13}{amplitude:>12}{frequency:>26}{damping:>26}")
+        if shown.size < count:
+            out.append(
+                f"{method}: {shown.size} of {count} amplitudes are shown; backbone.csv has all"
+            )
+    out += [f"{method}: not known: {text}" for method, text in found.missing.items()]
+    return out

@@ -167,7 +167,8 @@ def damper_rows(path) -> tuple:
     out, fits = [], damper.main(path, LOOP_LAWS)
     for row in fits:
         out.append(Row("banded damper", f"{row.law}: work of a cycle", row.measured, row.work, np.nan, "J"))
-        for free, value, ends in zip(row.fitted.free, row.fitted.found.values, row.fitted.found.intervals):
+        for free, value, ends in zip(
+                row.fitted.keys.ranges, row.fitted.keys.fit.values, row.fitted.keys.fit.intervals):
             half = float(np.ptp(ends)) / 2
             out.append(Row("banded damper", f"{row.law}: {free.key}", np.nan, value, half, free.unit))
     return out, fits

@@ -9,9 +9,16 @@ from scipy.integrate import solve_ivp
 from scipy.interpolate import CubicSpline
 
 import patchfem as pf
-from patchfem.campaigns import backbone as backbone_module
-from patchfem.campaigns.backbone import backbone
-from patchfem.core import ModalBasis
+from patchfem.campaigns.backbone import balance as balance_module
+from patchfem.campaigns.backbone.balance import half_range
+from patchfem.campaigns.backbone.bench_loops import run_loop, settle_loop
+from patchfem.campaigns.backbone.curves import backbone
+from patchfem.campaigns.backbone.joint import build_joint
+from patchfem.campaigns.backbone.notes import note_differences
+from patchfem.campaigns.backbone.records import Curve
+from patchfem.core import ModalBasis, NotConverged
+from patchfem.dynamics.harmonic.backbone import FreeBalance
+from patchfem.runs.rig.engines import ENGINES
 
 PLASTIC = 'law = "elastic-plastic"\nbond_length = "1 mm"'
 OMEGA = 200 * np.pi
@@ -31,9 +38,9 @@ def segalman(u):
 def test_exact_methods_that_differ_by_more_than_their_value_differ_by_a_factor():
     """"by 9.6e+03 %" stood there for a damping ratio that was 97 times as large."""
     a, f, z, none = np.array([1e-6, 1e-5]), np.array([100.0, 90.0]), np.array([1e-3, 2e-3]), np.zeros(2)
-    balance = backbone_module.Curve(a, f, none, z, none, none)
+    balance = Curve(a, f, none, z, none, none)
     decay = balance._replace(frequency=f * [1, 1.5], damping=z * [97, 1])
-    frequency, damping = backbone_module._differences({"balance": balance, "decay": decay})
+    frequency, damping = note_differences({"balance": balance, "decay": decay})
     assert "frequency by decay and by balance differ most at the amplitude 10 um, by 50 %: a decay" in frequency
     assert "differ most at the amplitude 1 um, where the value by decay is 97 times the value by" in damping
 
@@ -45,8 +52,9 @@ def test_exact_the_static_curve_of_an_iwan_joint_is_segalmans():
     omega = np.sqrt(OMEGA**2 + force / (0.5 * a))
     assert one.frequency == pytest.approx(omega / (2 * np.pi), rel=1e-12)
     assert one.damping == pytest.approx(0.002 * OMEGA / omega + loss / (np.pi * (omega * a)**2), rel=1e-9)
-    assert found.micro == pytest.approx(2.5, abs=1e-6) and found.gross is None
-    assert found.free == pytest.approx(100) and found.stuck == pytest.approx(np.sqrt(OMEGA**2 + 4e4) / (2 * np.pi))
+    assert found.exponents.micro == pytest.approx(2.5, abs=1e-6) and found.exponents.gross is None
+    assert found.frequencies.free == pytest.approx(100)
+    assert found.frequencies.stuck == pytest.approx(np.sqrt(OMEGA**2 + 4e4) / (2 * np.pi))
 
 
 def test_the_balance_of_an_iwan_joint_keeps_its_bars_and_the_decay_follows_it():
@@ -66,7 +74,7 @@ def test_the_balance_of_an_iwan_joint_keeps_its_bars_and_the_decay_follows_it():
 def test_exact_an_amplitude_lies_between_samples():
     for turned in (0.0, 0.3, 0.5):
         motion = np.array([0.0, 1e-6, 0.0, 1e-9]) * np.exp(2j * np.pi * turned / 4096 * np.arange(4))
-        assert backbone_module._largest(motion) / 1.001e-6 == pytest.approx(1, rel=1e-11)
+        assert half_range(motion) / 1.001e-6 == pytest.approx(1, rel=1e-11)
 
 
 def test_exact_a_motion_of_the_amplitude_asked_for_comes_back_after_a_cycle():
@@ -108,7 +116,7 @@ def test_exact_rigid_friction_by_balance_and_by_decay():
     first = 2 * h / (np.pi * balance.amplitude) + 0.002
     assert balance.damping == pytest.approx(first, rel=2e-2)
     assert decay.damping == pytest.approx(np.interp(decay.amplitude, balance.amplitude, balance.damping), rel=2e-2)
-    assert found.micro is None and found.gross == pytest.approx(1)
+    assert found.exponents.micro is None and found.exponents.gross == pytest.approx(1)
 
 
 def test_exact_a_cubic_spring_has_duffings_backbone():
@@ -145,8 +153,8 @@ slide = 0.1
     one = pf.build(scene)
     found = backbone(one, "axial", [1e-8], ("balance",))
     k = np.diag([OMEGA**2, (160 * np.pi)**2]) + 30e6 / 0.5 * np.outer([1, 0.1], [1, 0.1])
-    assert found.stuck == pytest.approx(np.sqrt(np.linalg.eigvalsh(k)[-1]) / (2 * np.pi))
-    assert found.curves["balance"].frequency == pytest.approx(found.stuck, rel=1e-6)
+    assert found.frequencies.stuck == pytest.approx(np.sqrt(np.linalg.eigvalsh(k)[-1]) / (2 * np.pi))
+    assert found.curves["balance"].frequency == pytest.approx(found.frequencies.stuck, rel=1e-6)
     low = backbone(one, "yaw", [1e-9], ("quasi-static",))
     first = np.sqrt(np.linalg.eigvalsh(k)[0]) / (2 * np.pi)
     assert low.curves["quasi-static"].frequency == pytest.approx(first, rel=1e-6)
@@ -180,7 +188,7 @@ def test_exact_a_rig_in_which_no_friction_acts_has_level_curves(scene):
     for way, f in (("balance", 100.0), ("decay", 100 * np.sqrt(1 - 4e-6)), ("quasi-static", 100.0)):
         assert found.curves[way].frequency == pytest.approx(f, rel=1e-12)
         assert found.curves[way].damping == pytest.approx(0.002, rel=1e-9)
-    assert not found.missing and found.micro is None and len(found.notes) == ("coulomb" in scene)
+    assert not found.missing and found.exponents.micro is None and len(found.notes) == ("coulomb" in scene)
 
 
 def test_exact_a_damper_between_masses_has_the_damping_that_keeps_a_motion_up():
@@ -216,10 +224,10 @@ def test_a_decay_behind_a_stiff_contact_lasts_some_swings_in_slip():
 
 def test_a_long_decay_is_told_before_it_begins(monkeypatch):
     """50 cycles that take a second tell 40 s of the further ones; nothing is told of a short one."""
-    told, run = [], backbone_module.ENGINES["piecewise"].run
+    told, run = [], ENGINES["piecewise"].run
     backbone(model(PLASTIC, **{"structure.mode.axial.damping": 1e-3}), "", [1e-5, 1e-3], ("decay",), told.append)
     assert told == ["decay"]
-    monkeypatch.setattr(type(backbone_module.ENGINES["piecewise"]), "run", property(lambda engine: lambda *given: (
+    monkeypatch.setattr(type(ENGINES["piecewise"]), "run", property(lambda engine: lambda *given: (
         replace(run(*given), seconds=given[0].rig.cycles / 50))))
     told.clear()
     backbone(model(PLASTIC, **{"structure.mode.axial.damping": 1e-3}), "", [1e-5, 1e-3], ("decay",), told.append)
@@ -269,7 +277,7 @@ load = "100 N"
     a = np.array([2e-6, 9e-6, 12e-6, 30e-6])
     found = backbone(pf.build("[structure]\n" + structure + rig[rig.index("[drive]"):]), "", a, ("balance",))
     one = found.curves["balance"]
-    assert one.amplitude == pytest.approx(a[:2]) and one.frequency == pytest.approx(found.stuck, rel=1e-6)
+    assert one.amplitude == pytest.approx(a[:2]) and one.frequency == pytest.approx(found.frequencies.stuck, rel=1e-6)
     assert "without a result" in found.notes[0] and "did not converge at these amplitudes; the curve" in found.notes[0]
 
 
@@ -302,15 +310,15 @@ def test_beyond_a_fold_the_curve_goes_on():
 
 def test_what_lies_below_the_first_motion_is_found_from_it(monkeypatch):
     """Where nothing is found upwards until an amplitude, those before it are found downwards from it."""
-    a, plain = np.geomspace(1e-3, 3e-3, 3), backbone_module._begun
+    a, plain = np.geomspace(1e-3, 3e-3, 3), balance_module._solve_from_stuck
     straight = backbone(model(PLASTIC), "", a, ("balance",)).curves["balance"]
 
     def far(equations, first, small, here):
         if here < 0.9 * a[-1]:
-            raise backbone_module.NotConverged("too far")
+            raise NotConverged("too far")
         return plain(equations, first, small, here)
 
-    monkeypatch.setattr(backbone_module, "_begun", far)
+    monkeypatch.setattr(balance_module, "_solve_from_stuck", far)
     found = backbone(model(PLASTIC), "", a, ("balance",)).curves["balance"]
     assert found.frequency == pytest.approx(straight.frequency, rel=1e-9)
 
@@ -404,7 +412,7 @@ def test_a_decay_in_which_another_mode_rings_is_not_given_as_that_of_this_mode()
     found = backbone(pf.build(NEAR), "axial", a := np.geomspace(2e-3, 6e-2, 7), ("balance", "decay"))
     balance, decay = found.curves["balance"], found.curves["decay"]
     assert balance.amplitude.size == a.size and decay.amplitude == pytest.approx(a[4:])
-    assert decay.damping == pytest.approx(balance.damping[4:], rel=0.04) and (decay.others > 0.01).all()
+    assert decay.damping == pytest.approx(balance.damping[4:], rel=0.04) and (decay.other_modes > 0.01).all()
     assert any("fallen to 11 mm, the motion of other modes is more than 10 % of its am" in one for one in found.notes)
     found = backbone(pf.build(NEAR), "yaw", a[2:], ("balance", "decay"))
     assert any("is not known at 5 of 5 amplitudes" in one for one in found.notes)
@@ -421,9 +429,9 @@ def test_a_damped_decay_begins_above_the_largest_amplitude_asked_for():
 
 def test_exponents_only_where_both_points_lie_in_a_regime_and_the_loss_is_no_round_off():
     sparse = backbone(model(IWAN), "", [1e-8, 1e-2], ("quasi-static",))
-    assert sparse.micro is None and sparse.gross is None
+    assert sparse.exponents.micro is None and sparse.exponents.gross is None
     held = backbone(model(PLASTIC.replace("1 mm", "1 um")), "", [1e-9, 2e-9], ("balance",))
-    assert held.micro is None
+    assert held.exponents.micro is None
 
 
 CROWNED = """\
@@ -452,7 +460,8 @@ def test_always_the_mesh_is_in_the_bars_of_micro_slip():
         assert np.mean(off <= bar + getattr(other, f"{name}_error")) >= 0.95, name
     own = one.damping[0] * one.frequency[0] / 100
     assert own == pytest.approx(0.002, rel=1e-9) and one.damping_error[0] > 1e-6 * one.damping[0]  # no slip is seen
-    assert fine.micro == pytest.approx(3, abs=0.3) and fine.expected == 3 and coarse.micro is None
+    assert fine.exponents.micro == pytest.approx(3, abs=0.3) and fine.exponents.micro_theory == 3
+    assert coarse.exponents.micro is None
     assert any("the exponent of micro-slip cannot be determined" in note for note in coarse.notes)
     assert any("higher than the frequencies by balance" in note for note in fine.notes)
 
@@ -482,7 +491,8 @@ def test_the_held_frequency_is_that_of_the_stiffness_which_a_run_prints():
     told = pf.run(CROWNED[:CROWNED.index("[structure]")] + '[slide]\nkind = "sine"\namplitude = "1 um"\n'
                   'frequency = "1 Hz"\n').measures["tangential_stiffness"]
     stuck = np.sqrt(OMEGA**2 + told.value / 0.5) / (2 * np.pi)
-    assert abs(found.stuck - stuck) <= found.stuck_error + stuck * told.error / told.value / 2 < 1e-3 * stuck
+    error = found.frequencies.stuck_error + stuck * told.error / told.value / 2
+    assert abs(found.frequencies.stuck - stuck) <= error < 1e-3 * stuck
     assert "above the range of micro-slip" in " ".join(found.notes)
 
 
@@ -495,25 +505,25 @@ def test_amplitudes_unless_given_end_where_the_mode_is_nearly_free(slide):
     deflected = 30 * slide / (0.5 * OMEGA**2)  # by the largest friction
     top = max(deflected, 1.5e-3 / slide)
     assert found.curves["quasi-static"].amplitude[-1] == pytest.approx(15 * top, rel=1e-6)
-    assert found.curves["quasi-static"].frequency[-1] < 1.05 * found.free
+    assert found.curves["quasi-static"].frequency[-1] < 1.05 * found.frequencies.free
 
 
 def test_the_balance_finds_its_first_motion_by_way_of_a_small_one(monkeypatch):
     """Where the held mode is too far a start, the motion is followed from where nothing slips."""
-    a, plain = np.array([2e-3]), backbone_module.FreeBalance.solve
+    a, plain = np.array([2e-3]), FreeBalance.solve
     straight = backbone(model(PLASTIC), "", a, ("balance",)).curves["balance"]
     refused = []  # the objects themselves: the id of one that is gone may be given to another
 
     def near(self, x, amplitude):
         if not any(one is self for one in refused):
             refused.append(self)
-            raise backbone_module.NotConverged("too far")
+            raise NotConverged("too far")
         return plain(self, x, amplitude)
 
-    monkeypatch.setattr(backbone_module.FreeBalance, "solve", near)
+    monkeypatch.setattr(FreeBalance, "solve", near)
     found = backbone(model(PLASTIC), "", a, ("balance",)).curves["balance"]
     assert len(refused) > 1 and found.frequency == pytest.approx(straight.frequency, rel=1e-6)
-    monkeypatch.setattr(backbone_module, "_begun", lambda one, first, small, here: one.solve(first, here)[0])
+    monkeypatch.setattr(balance_module, "_solve_from_stuck", lambda one, first, small, here: one.solve(first, here)[0])
     lost = backbone(model(PLASTIC), "", a, ("balance",))
     assert lost.missing == {"balance": "no free motion of these amplitudes was found"}
 
@@ -521,12 +531,12 @@ def test_the_balance_finds_its_first_motion_by_way_of_a_small_one(monkeypatch):
 def test_a_loop_that_remembers_is_read_when_it_has_settled():
     """Three cycles of bonds of order 2 are not their loop yet: the curve is that of thirty, within both bars."""
     bonds = 'law = "nonlocal"\nreading = "stretch"\norder = 2\nbond_length = "1 um"'
-    joint = backbone_module._joint(model(bonds), "")
-    few, many = (backbone_module._loop(joint, 3e-7, 400.0, cycles)[0].values for cycles in (3.0, 96.0))
-    *_, found = (backbone_module._settled(joint, 3e-7, 400.0),)
+    joint = build_joint(model(bonds), "")
+    few, many = (run_loop(joint.model, joint.patch, 3e-7, 400.0, cycles).run.values for cycles in (3.0, 96.0))
+    found = settle_loop(joint.model, joint.patch, 3e-7, 400.0)
     name = "secant_stiffness"
     assert abs(few[name] / many[name] - 1) > 1e-3
-    assert abs(found[0].values[name] / many[name] - 1) < 2e-3
+    assert abs(found.run.values[name] / many[name] - 1) < 2e-3
 
 
 def test_bonds_without_a_closed_loop_name_the_method_that_works():
@@ -542,7 +552,7 @@ def test_a_static_curve_ends_where_its_force_falls():
     scene = shaken(PLASTIC)[shaken(PLASTIC).index("[structure]"):].replace("[[structure.mode]]", bonded, 1)
     found = backbone(pf.build(scene), "", np.array([5e-6, 1e-5, 1.5e-5, 5e-5]), ("quasi-static",))
     assert found.curves["quasi-static"].amplitude.size == 3 and "curve does not reach these" in found.notes[0]
-    assert found.free == pytest.approx(np.sqrt(OMEGA**2 + 9.2e6) / (2 * np.pi))
+    assert found.frequencies.free == pytest.approx(np.sqrt(OMEGA**2 + 9.2e6) / (2 * np.pi))
 
 
 def test_a_linear_mode_that_does_not_swing_has_no_curve():

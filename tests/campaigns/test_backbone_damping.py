@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import patchfem as pf
-from patchfem.campaigns.backbone import WAYS, backbone
+from patchfem.campaigns.backbone.curves import backbone
+from patchfem.campaigns.backbone.records import METHODS
 from patchfem.export import backbone as backbone_files
 from patchfem.export.drawing import pictures
 from patchfem.runs import joint
@@ -56,7 +57,7 @@ cycles = 20
 def written(found) -> str:
     """The page of a backbone, after its picture, its table and its netCDF contents have been made."""
     if found.curves:
-        pictures.draw(backbone_files.drawn(found))
+        pictures.draw(backbone_files.drawn(found.curves))
     backbone_files.contents(found)
     backbone_files.lines_of(found)
     return backbone_files.page(found, "title")
@@ -81,7 +82,7 @@ def test_every_sign_of_damping_ends_well(law, damping):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("other_mode", ("", OTHER_MODE))
-@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("way", METHODS)
 @pytest.mark.parametrize("damping", DAMPING)
 @pytest.mark.parametrize("law", LAWS)
 def test_every_law_sign_of_damping_and_method_ends_well(law, damping, way, other_mode):

@@ -10,7 +10,7 @@ from scene_texts import IWAN, shaken
 
 from patchfem import scales
 from patchfem.__main__ import main
-from patchfem.campaigns.backbone import Backbone, Curve
+from patchfem.campaigns.backbone.records import Backbone, Curve, LossExponents, ModeFrequencies
 from patchfem.export.backbone import drawn, page
 
 COLUMNS = ["method", "amplitude [m]", "frequency [Hz]", "frequency_error [Hz]", "damping", "damping_error"]
@@ -84,8 +84,8 @@ def test_exact_a_frequency_that_its_error_exceeds_is_in_the_table_alone():
     a, none = np.array([1e-6, 2e-6, 3e-6]), np.full(3, np.nan)
     one = Curve(a, np.array([100.0, 90.0, 3.6e3]), np.array([1.0, 1.0, 9.8e3]), np.array([1e-4, 2e-3, 0.28]),
                 np.array([2e-4, 1e-4, 0.34]), none)
-    found = Backbone("first", 50.0, 100.0, {"decay": one}, {}, None, None, None, ())
-    frequency, damping = drawn(found)
+    found = Backbone("first", ModeFrequencies(50.0, 100.0), {"decay": one}, {}, LossExponents(), None, ())
+    frequency, damping = drawn(found.curves)
     assert [list(each["x"]) for each in frequency["marks"]] == [[1.0, 2.0]] * 2
     assert [list(each["x"]) for each in damping["marks"]] == [[1.0, 2.0, 3.0]] * 2
     assert "9.8 kHz" in page(found, "") and "left out of the picture" in page(found, "")

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 import patchfem as pf
-from patchfem.campaigns.backbone import backbone
+from patchfem.campaigns.backbone.curves import backbone
 from patchfem.campaigns.fits.curve import fit_curve, read_curve
 from patchfem.core import PatchfemError
 from patchfem.export.lab import imported

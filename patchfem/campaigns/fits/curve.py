@@ -26,7 +26,7 @@ from ...model.source import placed
 from ...response.errors import error_of_change
 from ...scene.changed import Base
 from ...scene.scene import Scene
-from ..backbone import backbone
+from ..backbone.curves import backbone
 from .problem import FittedKeys, Problem, model_without_joint, parse_ranges
 
 UNITS = {

@@ -1,0 +1,271 @@
+"""Curve of a mode by the periodic motion that a negative damping keeps up (Krack 2015).
+
+The motion is found by harmonic balance; under rigid friction it is exact from reversal to reversal.
+"""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import NotConverged, PatchfemError
+from ...core import say as format_length
+from ...dynamics import limit_cycles
+from ...dynamics.harmonic.backbone import FreeBalance
+from ...dynamics.harmonic.forces import Group
+from ...dynamics.harmonic.harmonic import pack
+from ...dynamics.harmonic.laws import synthesis
+from ...dynamics.harmonic.point import balance_of, top
+from ...response.errors import error_of_change
+from .joint import MIN_AMPLITUDE_FACTOR, Joint
+from .records import Curve
+
+HARMONICS = (
+    9,
+    19,
+    39,
+)  # Tried in turn, each with four times the samples per cycle of the one before.
+MAX_SAMPLES = 65536  # Samples per cycle: more take too long, and 39 harmonics need fewer.
+N_SAMPLES = 4096  # Samples of a cycle from which its largest motion is read.
+ROUND = 1e-9  # Relative error of a value by round-off.
+AMPLITUDE_TOL = 1e-7  # Relative tolerance of an amplitude, if the steps do not reach ROUND.
+MAX_STEPS = 8  # Secant steps to the motion that has the wanted amplitude at the output.
+MIN_SLOPE = (
+    0.1  # Least slope of the logarithms of both amplitudes with which a secant step is taken.
+)
+
+
+class FreeMotion(NamedTuple):
+    """A `harmonic.backbone.Free`, its unknowns (N,), and amplitude at the output / coordinate."""
+
+    free: object
+    unknowns: np.ndarray
+    reach: float
+
+
+def compute_balance_curve(joint: Joint, amplitudes) -> Curve:
+    """Return the curve by harmonic balance, or exactly under rigid friction."""
+    joint.require_steady_loops("balance")
+    if joint.is_rigid:
+        return _compute_rigid_curve(joint, amplitudes)
+    laws = joint.steady_laws()
+    tolerance = joint.model.accuracy.tolerance
+    found = _read_motions(laws, joint, amplitudes, HARMONICS[0])
+    for harmonics in HARMONICS[1:]:
+        count = 1 + int(np.isfinite(found[0]).nonzero()[0].max(initial=-1))
+        if not count:
+            raise NotConverged("no free motion of these amplitudes was found")
+        better = _read_motions(laws, joint, amplitudes, harmonics, count)
+        error = error_of_change(better - found) + ROUND * np.abs(better)
+        found = better
+        known = np.isfinite(error[0])
+        if (error[:2] <= tolerance * np.abs(found[:2]))[:, known].all():
+            break
+    error += joint.space_errors(lambda group: _read_motions(group, joint, amplitudes, HARMONICS[0]))
+    known = np.isfinite(found + error).all(axis=0)
+    if not known.any():
+        raise NotConverged("no free motion of these amplitudes was found")
+    oscillates = known & (found[1] < 1)
+    if not oscillates.any():
+        raise NotConverged(
+            "the mode does not oscillate at these amplitudes: its damping ratio is above 1"
+        )
+    curve = Curve(
+        amplitude=amplitudes,
+        frequency=found[0],
+        frequency_error=error[0],
+        damping=found[1],
+        damping_error=error[1],
+        loss=found[2],
+    )
+    return curve.at(oscillates)
+
+
+def _read_motions(group: Group, joint: Joint, amplitudes, harmonics: int, count=None) -> np.ndarray:
+    """Return frequency [Hz], damping and loss [J] (3, k) of the free motions.
+
+    NaN where none is found, and from the amplitude number `count` on.
+    """
+    order = np.arange(harmonics + 1)
+    out = np.full((3, len(amplitudes)), np.nan)
+    motions = find_free_motions(group, joint, amplitudes[:count], harmonics)
+    for column, motion in enumerate(motions):
+        if motion is not None:
+            work = (np.conj(motion.slides) * motion.forces).imag
+            loss = np.pi * float(np.sum(order * work))
+            out[:, column] = motion.omega / (2 * np.pi), motion.zeta, loss
+    return out
+
+
+def find_free_motions(group: Group, joint: Joint, amplitudes, harmonics: int) -> list:
+    """Find the free motions at amplitudes (k,) [m] of the output.
+
+    Each is sought from the one before. Without one, as beyond a fold of the curve, it is sought from
+    the sticking mode, the first also by way of a small amplitude. Those that are missing are then
+    sought from the next larger one that was found.
+
+    Parameters
+    ----------
+    group : Group
+        Steady loops of the laws.
+    joint : Joint
+    amplitudes : (k,) array
+        Rising [m].
+    harmonics : int
+
+    Returns
+    -------
+    list of Free or None
+        `dynamics.harmonic.backbone.Free`; None where no motion is found.
+    """
+    search = _FreeMotionSearch(group, joint, amplitudes, harmonics)
+    out: list = [None] * len(amplitudes)
+    for k, amplitude in enumerate(amplitudes):
+        before = out[k - 1] if k else None
+        is_first = not any(out)
+        out[k] = search.continue_from(before, amplitude) or search.begin(amplitude, is_first)
+    for k in range(len(amplitudes) - 2, -1, -1):
+        out[k] = out[k] or search.continue_from(out[k + 1], amplitudes[k])
+    return [motion and motion.free for motion in out]
+
+
+class _FreeMotionSearch:
+    """The equations of the free motion, and the sticking mode from which a search begins."""
+
+    def __init__(self, group: Group, joint: Joint, amplitudes, harmonics: int):
+        modes = joint.modes
+        omega, shape = modes.held(group.rows, group.stiffness(), joint.mode)
+        self.joint = joint
+        self.reach = abs(float(modes.output @ shape))
+        widest = np.abs(group.rows @ shape) * amplitudes[-1] / self.reach
+        samples = group.samples or group.samples_for(harmonics, widest)
+        samples = min(samples * (harmonics // HARMONICS[0]) ** 2, MAX_SAMPLES)
+        balance = balance_of(modes, group, samples)
+        self.equations = FreeBalance(balance, joint.mode, harmonics, omega)
+        balance = self.equations.balance
+        faces = np.zeros((balance.lift.shape[1], harmonics + 1), complex)
+        faces[:, 1] = balance.faces @ shape
+        self.first = np.append(pack(faces), [1.0, 0.0])
+        self.small = MIN_AMPLITUDE_FACTOR * float(joint.slip_amplitude) / self.reach
+
+    def continue_from(self, near: FreeMotion | None, amplitude: float) -> FreeMotion | None:
+        """Return the motion at an amplitude [m], from that at another one; None without it."""
+        if near is None:
+            return None
+        here = amplitude / near.reach
+        try:
+            x = self.equations.towards(near.unknowns, near.free.amplitude, here)
+            return _reach_amplitude(self.equations, self.joint, x, here, amplitude)
+        except NotConverged:
+            return None
+
+    def begin(self, amplitude: float, is_first: bool) -> FreeMotion | None:
+        """Return the motion at an amplitude [m], from the sticking mode; None without it."""
+        here = amplitude / self.reach
+        try:
+            if is_first:
+                x = _solve_from_stuck(self.equations, self.first, self.small, here)
+            else:
+                x = self.equations.solve(self.first, here)[0]
+            return _reach_amplitude(self.equations, self.joint, x, here, amplitude)
+        except NotConverged:
+            return None
+
+
+def _reach_amplitude(
+    equations: FreeBalance, joint: Joint, x, here: float, amplitude: float
+) -> FreeMotion:
+    """Return the motion that has an amplitude [m] at the output, by secant steps.
+
+    x: unknowns (N,) at an amplitude `here` [m] of the coordinate. The steps end at ROUND, or at
+    AMPLITUDE_TOL if they lead no further.
+    """
+    slope = 1.0
+    before = None
+    best = None
+    best_distance = np.inf
+    for _ in range(MAX_STEPS):
+        try:
+            x, free = equations.solve(x, here)
+        except NotConverged:
+            if best is None:
+                raise
+            break
+        largest = half_range(free.modal @ joint.modes.output)
+        distance = float(np.log(largest / amplitude))
+        if best is not None and abs(distance) >= best_distance:
+            break
+        if abs(distance) < AMPLITUDE_TOL:
+            best_distance = abs(distance)
+            best = FreeMotion(free, x, amplitude / here)
+        if abs(distance) < ROUND:
+            break
+        if before is not None:
+            last_here, last_distance = before
+            slope = (distance - last_distance) / np.log(here / last_here)
+        slope = slope if slope > MIN_SLOPE else 1.0
+        before = (here, distance)
+        here *= np.exp(-distance / slope)
+    if best is not None:
+        return best
+    raise NotConverged(
+        f"no free motion has an amplitude of {format_length(amplitude, 3)} at the output"
+    )
+
+
+def _solve_from_stuck(equations: FreeBalance, first, small: float, here: float) -> np.ndarray:
+    """Solve at an amplitude `here` [m] from the sticking mode, at once or by way of a small one."""
+    try:
+        return equations.solve(first, here)[0]
+    except NotConverged:
+        if not small < here:
+            raise
+        return equations.towards(equations.solve(first, small)[0], small, here)
+
+
+def half_range(harmonics) -> float:
+    """Return (maximum - minimum)/2 of a motion with harmonics (H + 1,)."""
+    motion = synthesis(harmonics, N_SAMPLES)
+    return (top(motion) + top(-motion)) / 2
+
+
+def _compute_rigid_curve(joint: Joint, amplitudes) -> Curve:
+    """Return the curve under rigid friction; it begins where the motion no longer stops on the way."""
+    model, modes = joint.model, joint.modes
+    if model.rig.bends or not modes.omega.all():
+        raise PatchfemError(
+            "with rigid friction the free motion cannot be computed if the rig has a nonlinear "
+            "spring or a mode of 0 Hz"
+        )
+    static = joint.friction_limit
+    friction = model.friction
+    kinetic = static
+    if friction.kinetic is not None:
+        kinetic = static * friction.kinetic / friction.static
+    row = modes.interfaces[0]
+    found = limit_cycles.relay_backbone(modes, row, (kinetic, static), amplitudes, joint.mode)
+    known = np.array([motion is not None for motion in found])
+    if not known.any():
+        raise NotConverged(
+            "at these amplitudes rigid friction stops the motion in each cycle, and only a motion "
+            "that always slides can be computed; give larger amplitudes"
+        )
+    amplitude = np.asarray(amplitudes)[known]
+    cycles, ratios = zip(*(motion for motion in found if motion is not None))
+    frequency = np.array([cycle.omega / (2 * np.pi) for cycle in cycles])
+    damping = np.array(ratios)
+    loss = np.full(amplitude.size, np.nan)
+    if modes.omega.size == 1:
+        loss = 4 * kinetic * amplitude * abs(row[joint.mode] / modes.output[joint.mode])
+    relative_error = np.array([cycle.error / cycle.amplitude for cycle in cycles])
+    # The damping of the structure does not depend on the amplitude, so only that of friction takes
+    # its error.
+    own_rate = modes.dampers[joint.mode, joint.mode]
+    friction_damping = damping - own_rate / (4 * np.pi * frequency)
+    return Curve(
+        amplitude=amplitude,
+        frequency=frequency,
+        frequency_error=(relative_error + ROUND) * frequency,
+        damping=damping,
+        damping_error=relative_error * np.abs(friction_damping) + ROUND * np.abs(damping),
+        loss=loss,
+    )

@@ -1,0 +1,59 @@
+"""Steady friction loops of the contact of a rig alone, driven by a sine on a bench."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+from ...model.model import Model
+from ...model.slide import SlidePath
+from ...runs.bench import bench
+from ...runs.bench.engine import steps_of
+from ...runs.rig import decays
+
+FIRST_CYCLES = 3.0  # Cycles of the first loop, of which the last is read.
+MAX_CYCLES = 192.0  # Most laws are steady after a few cycles; growing bonds take tens.
+LOOP_MEASURES = ("secant_stiffness", "loop_area")
+
+
+class BenchLoop(NamedTuple):
+    """A run on a bench, its model and its steps."""
+
+    run: object
+    model: Model
+    steps: int
+
+
+class SettledLoop(NamedTuple):
+    """A steady run on a bench, its model and its steps.
+
+    change: by which the later half of its cycles changed each of LOOP_MEASURES.
+    """
+
+    run: object
+    model: Model
+    steps: int
+    change: list
+
+
+def run_loop(model: Model, patch, slide: float, frequency: float, cycles: float) -> BenchLoop:
+    """Run cycles of the contact alone under a sine of amplitude `slide` [m]; patch: pressed."""
+    path = SlidePath("sine", slide, frequency, None, 0.0, cycles, None, None)
+    alone = replace(decays.steadily(model), kind="bench", rig=None, slide=path)
+    steps = steps_of(alone)
+    return BenchLoop(bench.run(alone, patch, steps), alone, steps)
+
+
+def settle_loop(model: Model, patch, slide: float, frequency: float) -> SettledLoop:
+    """Double the cycles until the loop changes within the tolerance, up to MAX_CYCLES."""
+    tolerance = model.accuracy.tolerance
+    cycles = FIRST_CYCLES
+    found = run_loop(model, patch, slide, frequency, cycles)
+    while True:
+        cycles *= 2
+        before = found.run.values
+        found = run_loop(model, patch, slide, frequency, cycles)
+        values = found.run.values
+        change = [abs(values[name] - before[name]) for name in LOOP_MEASURES]
+        limits = [tolerance * abs(values[name]) for name in LOOP_MEASURES]
+        is_steady = all(off <= limit for off, limit in zip(change, limits))
+        if cycles >= MAX_CYCLES or is_steady:
+            return SettledLoop(*found, change)

@@ -1,0 +1,261 @@
+"""Backbone of a mode: its curves by all methods, exponents of the loss, amplitude of flutter."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import brentq
+
+from ...core import NotConverged, PatchfemError
+from ...core import say as format_length
+from ...effects import has
+from ...model.model import Model
+from ...model.source import placed
+from ...response.errors import finer_errors
+from ...runs.joint import held_patch
+from . import notes
+from .balance import compute_balance_curve
+from .decay import compute_decay_curve
+from .joint import Joint, build_joint
+from .linear import compute_level_curve
+from .quasi_static import compute_static_curve
+from .records import METHODS, Backbone, Curve, LossExponents, ModeFrequencies
+
+ROUND = 1e-9  # Relative error of a value by round-off.
+AMPLITUDE_TOL = 1e-7  # Relative tolerance of the ends of two curves.
+GROSS_SLIP_BEGIN = (
+    3.0  # Amplitude / that at which all of the contact slips, above which it is gross slip.
+)
+FLUTTER_TOL = 1e-8  # Relative error of the amplitude of flutter, below the digits that are printed.
+
+
+def backbone(
+    model: Model,
+    mode: str = "",
+    amplitudes=None,
+    methods=METHODS,
+    progress=None,
+    errors: bool = True,
+) -> Backbone:
+    """Compute frequency and damping of a mode of a rig against amplitude.
+
+    Parameters
+    ----------
+    model : Model
+        Of a rig.
+    mode : str
+        Name of the mode; "" for the first.
+    amplitudes : (k,) array, optional
+        Rising, at the output [m]. By default from a hundredth of the amplitude at which all of the
+        contact slips to 15 times this amplitude, or to where the mode moves as if it were free.
+    methods : sequence of str
+        Of METHODS.
+    progress : callable, optional
+        Takes the name of a method that begins, and a sentence on the time of a long decay.
+    errors : bool
+        Whether the errors of the mesh, of the cells of a law and of modes left out are computed; the
+        values are the same without, in less than half the time.
+
+    Returns
+    -------
+    Backbone
+
+    Raises
+    ------
+    PatchfemError
+        For a scene that has no rig or no such mode.
+    """
+    with placed(model.source):
+        joint = build_joint(model, mode)._replace(has_errors=errors)
+        wanted = joint.default_amplitudes()
+        if amplitudes is not None:
+            wanted = np.unique(np.asarray(amplitudes, float))
+        if wanted[-1] > joint.model.rig.travel:
+            raise PatchfemError(
+                f"the largest amplitude, {format_length(wanted[-1], 3)}, is larger than the travel "
+                "of the flexure; give smaller amplitudes with --amplitudes",
+                "structure.travel",
+            )
+        richer = None
+        if errors and model.rig.richer is not None:
+            richer = build_joint(replace(model, rig=model.rig.richer), mode)
+        curves = {}
+        missing = {}
+        for method in methods:
+            if progress is not None:
+                progress(method)
+            try:
+                curve = compute_curve(joint, wanted, method, progress)
+                if richer is not None:
+                    other = compute_curve(richer, wanted, method, progress)
+                    curve = _widen_by_missing_modes(curve, other)
+                curves[method] = curve
+            except (NotConverged, PatchfemError) as reason:
+                missing[method] = str(reason).removeprefix("backbone: ")
+    return _summarise(joint, wanted, curves, missing)
+
+
+def compute_curve(joint: Joint, amplitudes, method: str, progress=None) -> Curve:
+    """Compute the curve by a method; NotConverged or PatchfemError if there is none."""
+    if joint.is_linear:
+        return compute_level_curve(joint, amplitudes, method)
+    if method == "decay":
+        return compute_decay_curve(joint, amplitudes, progress)
+    if method == "balance":
+        return compute_balance_curve(joint, amplitudes)
+    return compute_static_curve(joint, amplitudes)
+
+
+def _widen_by_missing_modes(curve: Curve, richer: Curve) -> Curve:
+    """Add the error of modes that a reduced structure lacks; richer: the curve with more of them."""
+    low, high = richer.amplitude[[0, -1]] * [1 - AMPLITUDE_TOL, 1 + AMPLITUDE_TOL]
+    curve = curve.at((curve.amplitude >= low) & (curve.amplitude <= high))
+    if not curve.amplitude.size:
+        raise NotConverged(
+            "the check by a computation with more modes of the structure found no free motion at "
+            "these amplitudes; raise structure.reduced.modes"
+        )
+    own = curve.interpolate(curve.amplitude)
+    added = finer_errors(own, richer.interpolate(curve.amplitude))
+    return curve._replace(
+        frequency_error=curve.frequency_error + added["frequency"],
+        damping_error=curve.damping_error + added["damping"],
+    )
+
+
+def _summarise(joint: Joint, wanted, curves: dict, missing: dict) -> Backbone:
+    """Return the backbone of the curves at the amplitudes (k,) [m] that were asked for."""
+    exponents = LossExponents()
+    first = curves.get("quasi-static", curves.get("balance"))
+    remarks = [*notes.note_linear_rig(joint), *notes.note_gaps(wanted, curves)]
+    if not joint.is_linear:
+        exponents = _fit_exponents(joint, first)
+        remarks += notes.note_differences(curves)
+        if exponents.micro_theory is not None and exponents.micro is None:
+            remarks += notes.note_micro_slip(joint, wanted)
+    remarks += notes.note_missing_mesh(joint)
+    remarks += [note for curve in curves.values() for note in curve.notes]
+    remarks += [
+        *notes.note_secant_stiffness(joint, wanted, curves),
+        *notes.note_wear(joint.model),
+    ]
+    flutter = None
+    for method, curve in curves.items():
+        if flutter is None:
+            flutter = _flutter_amplitude(joint, method, curve)
+    return Backbone(
+        mode=_mode_name(joint),
+        frequencies=_mode_frequencies(joint),
+        curves=curves,
+        missing=missing,
+        exponents=exponents,
+        flutter=flutter,
+        notes=tuple(remarks),
+    )
+
+
+def _mode_name(joint: Joint) -> str:
+    """Return the name of the mode that moves most in the coordinate."""
+    modes = joint.modes
+    if not joint.model.rig.by_modes:
+        return f"{joint.mode + 1}"
+    shapes = np.eye(modes.omega.size) if modes.shapes is None else np.abs(modes.shapes)
+    return modes.names[int(np.argmax(shapes[:, joint.mode]))]
+
+
+def _mode_frequencies(joint: Joint) -> ModeFrequencies:
+    """Return the frequencies [Hz] without the contact and with a contact that sticks.
+
+    The first includes a bonded spring, with its stiffness at rest if it is nonlinear. The second
+    uses the stiffness that a run of the patch prints, extrapolated over its meshes, if the pieces
+    alone are elastic.
+    """
+    model, modes = joint.model, joint.modes
+    spring = model.rig.interlock
+    free = float(modes.omega[joint.mode])
+    if spring is not None:
+        free = modes.held(modes.interfaces[:1], np.array([spring[0]]), joint.mode)[0]
+    free = free / (2 * np.pi)
+    if joint.held[0] is None:
+        return ModeFrequencies(free, None)
+    measure = held_patch(model, joint.patch, joint.coarser)
+    # Modes that were measured with the joint have the stiffness of the joint in them.
+    if measure is None or len(modes.interfaces) > 1 or model.rig.taken is not None:
+        return ModeFrequencies(free, joint.held[0] / (2 * np.pi))
+    stuck, high = (
+        modes.held(modes.interfaces, np.array([stiffness]), joint.mode)[0] / (2 * np.pi)
+        for stiffness in (measure.value, measure.value + measure.error)
+    )
+    return ModeFrequencies(free, stuck, high - stuck)
+
+
+def _fit_exponents(joint: Joint, curve: Curve | None) -> LossExponents:
+    """Return the slopes of ln(loss) over ln(amplitude) in micro-slip and in gross slip.
+
+    In micro-slip it is the slope from the first to the last point, in gross slip that of the last two
+    points. A loss counts if it is MIN_LOSS_RATIO times its error and no round-off of the energy.
+    """
+    theory = _theoretical_exponent(joint)
+    if curve is None or curve.amplitude.size < 2 or not joint.friction_limit:
+        return LossExponents(micro_theory=theory)
+    amplitude, loss = curve.amplitude, curve.loss
+    speed = 2 * np.pi * curve.frequency * amplitude / joint.reach
+    energy = joint.modes.mass * speed**2
+    relative_error = notes.MIN_LOSS_RATIO * 2 * np.pi * curve.damping_error
+    known = loss > np.maximum(ROUND, relative_error) * energy
+    slip = joint.slip_amplitude
+    micro = np.flatnonzero(known & (amplitude < notes.MICRO_SLIP_END * slip))
+    gross = np.flatnonzero(known & (amplitude > GROSS_SLIP_BEGIN * slip))[-2:]
+
+    def slope(points) -> float | None:
+        if points.size < 2:
+            return None
+        i, j = points[0], points[-1]
+        return float(np.log(loss[j] / loss[i]) / np.log(amplitude[j] / amplitude[i]))
+
+    return LossExponents(slope(micro), slope(gross), theory)
+
+
+def _theoretical_exponent(joint: Joint) -> float | None:
+    """Return the exponent of the loss in micro-slip by theory, if one applies.
+
+    It is chi + 3 of sliders (Segalman 2005), 3 of bonds and of pieces whose pressure falls to 0 at its
+    edges (Cattaneo, Mindlin).
+    """
+    friction = joint.model.friction
+    if friction is None or not joint.friction_limit:
+        return None
+    if has(friction.law, "cells"):
+        return friction.chi + 3
+    is_elastic = joint.model.soft or joint.model.rig.soft
+    return 3.0 if has(friction.law, "bonds") or is_elastic else None
+
+
+def _flutter_amplitude(joint: Joint, method: str, curve: Curve) -> float | None:
+    """Find the largest amplitude [m] at which the damping falls through zero.
+
+    The curve gives the two amplitudes between which the root lies. Brent's method on damping × amplitude,
+    which is a straight line under Coulomb friction, computes further points of the same curve. None
+    without such a root.
+    """
+    falls = np.flatnonzero((curve.damping[:-1] > 0) & (curve.damping[1:] <= 0))
+    if not falls.size:
+        return None
+    bracket = slice(falls[-1], falls[-1] + 2)
+    low, high = np.log(curve.amplitude[bracket])
+    loss_low, loss_high = (curve.damping * curve.amplitude)[bracket]
+    known = {low: loss_low, high: loss_high}
+
+    def net_loss(log_amplitude: float) -> float:
+        if log_amplitude not in known:
+            amplitude = np.array([np.exp(log_amplitude)])
+            point = compute_curve(joint._replace(has_errors=False), amplitude, method)
+            known[log_amplitude] = float(point.damping[0] * amplitude[0])
+        return known[log_amplitude]
+
+    try:
+        return float(np.exp(brentq(net_loss, low, high, xtol=FLUTTER_TOL)))
+    except (NotConverged, PatchfemError):
+        # No further point is known, so the root is that of the chord between the two points.
+        amplitudes = curve.amplitude[bracket]
+        share = loss_low / (loss_low - loss_high)
+        return float(amplitudes[0] + share * (amplitudes[1] - amplitudes[0]))

@@ -1,0 +1,481 @@
+"""Curve of a mode by a release from the largest amplitude, read from reversal to reversal."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from scipy.interpolate import CubicHermiteSpline
+
+from ...core import NotConverged, PatchfemError, Start
+from ...core import say as format_length
+from ...dynamics.harmonic.forces import Group
+from ...dynamics.harmonic.laws import synthesis
+from ...effects import NO_WAVEFORM
+from ...model.model import Model
+from ...response.decay_curve import DecayCurve, curve_of, of_turns, turns, turns_from_outside
+from ...runs.rig import decays, numerics
+from ...runs.rig.engines import ENGINES, PIECES, SMOOTH
+from ...structure import drives
+from ...structure.drive_sizes import decay_rate
+from .balance import HARMONICS, find_free_motions
+from .joint import MIN_AMPLITUDE_FACTOR, RELEASE_FACTOR, Joint
+from .records import Curve
+
+ROUND = 1e-9  # Relative error of a value by round-off.
+N_SAMPLES = 4096  # Samples of a cycle of a free motion.
+FIRST_CYCLES = 50  # Cycles of the first decay; longer ones follow until it has come down.
+MAX_CYCLES_ONE_MODE = 12800  # A longer decay takes minutes.
+MAX_CYCLES = 3200  # The same for several modes, each cycle of which takes longer.
+MAX_CYCLES_TURNS = 102400  # For one mode with elastic elements, of which only reversals are stored.
+N_START_STEPS = 12  # Amplitudes on the way to the free motion in which a release begins.
+MAX_RAISED = 3  # Releases from a higher amplitude than the one before.
+MAX_RAISE_FACTOR = 8.0  # Largest ratio of two such amplitudes.
+END_FACTOR = 0.8  # End of a decay / smallest amplitude, so that coarser runs reach it, too.
+N_FREE_SWINGS = 3.0  # Periods of the free mode within which a decay shows its first swings.
+MAX_DOUBLINGS = 3  # Doublings of the time steps.
+MAX_OTHER_MODES = 0.1  # Motion of other modes / amplitude, above which it is no decay of this mode.
+N_BEAT_SWINGS = 8  # Half swings on both sides, among which the effect of other modes is largest.
+EQUAL_SWINGS_TOL = 1e-7  # Relative difference of two half swings, up to which nothing slips.
+STUCK_FRACTION = 0.999  # Stiffness / stiffness without slip, above which a contact sticks.
+ANNOUNCED_SECONDS = 20.0  # CPU seconds of a decay, above which it is announced.
+COARSER_RUNS_FACTOR = 2.0  # CPU seconds of a decay with its coarser runs / without.
+
+
+class Release(NamedTuple):
+    """A run of a release: its model, its numerics and its Solution."""
+
+    model: Model
+    numerics: object
+    solution: object
+
+
+class DecayReading(NamedTuple):
+    """Frequency [Hz] and damping (2, k) of a release, with the errors of reading and of coarser runs."""
+
+    value: np.ndarray
+    reading_error: np.ndarray
+    run_error: np.ndarray
+
+    def known(self) -> np.ndarray:
+        """Return at which amplitudes (k,) a value and its errors are known."""
+        return np.isfinite(self.value + self.run_error).all(axis=0)
+
+
+class _GrowingRelease(NotConverged):
+    """A release whose swings grow: a negative damping supplies more than friction dissipates."""
+
+
+def compute_decay_curve(joint: Joint, amplitudes, progress=None) -> Curve:
+    """Return the curve of a release from the largest amplitude, as far as it comes down.
+
+    progress: takes a sentence on the time that a long decay takes.
+    """
+    n_decaying, release = _release_from_largest_decaying(joint, amplitudes, progress)
+    release, reading = _refine(joint, release, amplitudes)
+    known = reading.known()
+    if not known.any():
+        raise NotConverged("the free decay gave no frequency and damping at these amplitudes")
+    motion = _measure_other_modes(joint, release.solution, np.where(known, amplitudes, np.nan))
+    last_mixed = amplitudes[motion > MAX_OTHER_MODES].max(initial=0.0)
+    mixed = known & (motion > 0) & (amplitudes <= last_mixed)
+    known &= ~mixed
+    if not known.any():
+        raise NotConverged(
+            "at these amplitudes the free decay is no longer a motion of this mode alone: the "
+            f"motion of other modes is more than {100 * MAX_OTHER_MODES:.0f} % of its amplitude"
+        )
+    mesh_error, reason = decays.left_by_mesh(
+        joint.model, joint.patch, joint.coarse, amplitudes, lambda laws: joint.mode
+    )
+    error = np.fmax(reading.run_error, mesh_error) + reading.reading_error
+    engine = ENGINES[release.numerics.engine]
+    notes = [
+        *decays.without_slip_between_nodes(
+            {"method decay": reason},
+            lambda: engine.in_space(
+                release.model, release.numerics, joint.patch, joint.coarse, release.solution
+            ),
+        ),
+        *_note_mixed(amplitudes[mixed]),
+        *_note_growing(amplitudes[n_decaying:]),
+        *_note_unknown_modes(joint, known, motion),
+    ]
+    curve = Curve(
+        amplitude=amplitudes,
+        frequency=reading.value[0],
+        frequency_error=error[0],
+        damping=reading.value[1],
+        damping_error=error[1],
+        loss=np.full(amplitudes.size, np.nan),
+        notes=tuple(notes),
+        other_modes=motion,
+    )
+    return curve.at(known)
+
+
+def _note_mixed(amplitudes) -> list:
+    """Return a sentence on amplitudes (k,) [m] at which other modes move too much."""
+    count = amplitudes.size
+    if not count:
+        return []
+    plural = "s" if count > 1 else ""
+    return [
+        f"method decay: when the decay has fallen to {format_length(amplitudes[-1], 3)}, the motion "
+        f"of other modes is more than {100 * MAX_OTHER_MODES:.0f} % of its amplitude; from there on "
+        f"the values with slip are left out ({count} amplitude{plural}), because they do not "
+        "describe this mode alone"
+    ]
+
+
+def _note_growing(amplitudes) -> list:
+    """Return a sentence on amplitudes (k,) [m] above those from which a release decays."""
+    if not amplitudes.size:
+        return []
+    return [
+        f"method decay: a release from {format_length(amplitudes[0], 3)} grows, because the "
+        "negative damping supplies more energy than friction dissipates"
+    ]
+
+
+def _note_unknown_modes(joint: Joint, known, motion) -> list:
+    """Return a sentence on amplitudes at which the motion of other modes is not known."""
+    unknown = known & np.isnan(motion)
+    if joint.modes.omega.size == 1 or not unknown.any():
+        return []
+    reason = "harmonic balance gave no free motion to compare with"
+    if joint.is_rigid:
+        reason = "with rigid friction it is not computed"
+    return [
+        "method decay: how much other modes move in the decay is not known at "
+        f"{unknown.sum()} of {known.sum()} amplitudes, because {reason}"
+    ]
+
+
+class RefinedRelease(NamedTuple):
+    """A release with time steps that meet the tolerance, or the finest ones, and its reading."""
+
+    release: Release
+    reading: DecayReading
+
+
+def _refine(joint: Joint, release: Release, amplitudes) -> RefinedRelease:
+    """Double the time steps until the errors of coarser runs meet the tolerance."""
+    model, how, _ = release
+    engine = ENGINES[how.engine]
+    tolerance = joint.model.accuracy.tolerance
+    for doublings in range(MAX_DOUBLINGS + 1):
+        reading = _read_with_errors(joint, release, amplitudes)
+        known = reading.known()
+        limit = np.maximum(tolerance * np.abs(reading.value), reading.reading_error)
+        is_small = (reading.run_error <= limit).all(axis=0)
+        is_met = known.any() and is_small[known].all()
+        has_steps = engine.in_time(model, how, joint.patch) and "steps_per_cycle" not in how.pinned
+        if is_met or doublings == MAX_DOUBLINGS or not has_steps:
+            break
+        how = how.finer()
+        found = engine.run(model, how, joint.patch, 0, None, None)
+        release = Release(model, how, found)
+    return RefinedRelease(release, reading)
+
+
+def _read_with_errors(joint: Joint, release: Release, amplitudes) -> DecayReading:
+    """Read a release at amplitudes (k,) [m], with what coarser runs change."""
+    model, how, found = release
+    engine = ENGINES[how.engine]
+    read = _read(joint, found)
+    if how.engine == SMOOTH.name:
+        read = read.unsampled(_read(joint, found, turns_from_outside))
+    read = read.over(amplitudes)
+    value = np.array([read.frequency, read.damping])
+    reading_error = np.array([read.frequency_error, read.damping_error])
+    error = ROUND * np.abs(value)
+    known: dict = {}
+
+    def curve(variant) -> np.ndarray:
+        if variant not in known:
+            whole = replace(variant.numerics, whole=True)
+            run = engine.run(model, whole, variant.patch, 0, None, None)
+            other = _read(joint, run).over(amplitudes)
+            known[variant] = np.array([other.frequency, other.damping])
+        return known[variant]
+
+    coarser = [
+        *engine.in_time(model, how, joint.patch),
+        *engine.in_space(model, how, joint.patch, joint.coarse, found),
+    ]
+    for one in coarser:
+        if one.runs:
+            beside = value if one.beside is None else curve(one.beside)
+            runs = one.runs if one.of == "cells" else one.runs[:1]
+            # NaN where one of the runs does not come down so far.
+            error += np.max([np.abs(curve(run) - beside) for run in runs], axis=0)
+    return DecayReading(value, reading_error, error)
+
+
+def _measure_other_modes(joint: Joint, found, amplitudes) -> np.ndarray:
+    """Return the motion of other modes in a Solution / its amplitude (k,), at amplitudes (k,) [m].
+
+    It is the distance of the modal coordinates, and of their rates / omega, from those of the balance's
+    free motion of that amplitude, at a reversal, both relative to the motion along the shape of the
+    sticking mode. It is 0 where all contacts stick: the motion along this shape is then free of other
+    modes, as long as no displacement is larger than one in which the balance finds no slip. NaN where
+    one of the two is not known.
+    """
+    out = np.full(amplitudes.size, np.nan)
+    motion, shape = found.response, joint.shape
+    asked = np.flatnonzero(np.isfinite(amplitudes))
+    if shape.size == 1 or joint.is_rigid:
+        return out
+    try:
+        joint.require_steady_loops("balance")
+        group = joint.steady_laws()
+        free = find_free_motions(group, joint, amplitudes[asked], HARMONICS[0])
+    except (NotConverged, PatchfemError):
+        return out
+    stuck = [
+        np.where(_sticks(group, one), np.abs(one.slides[:, 1]), 0.0)
+        for one in free
+        if one is not None
+    ]
+    max_stuck = np.max(stuck or [np.zeros(len(group.rows))], axis=0)
+    read = _read(joint, found)
+    times, _ = turns(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
+    for column, one in zip(asked, free):
+        if one is None:
+            continue
+        wanted = np.interp(-np.log(amplitudes[column]), -np.log(read.amplitude), read.time)
+        time = times[np.argmin(np.abs(times - wanted))]
+        k = int(np.clip(np.searchsorted(motion.time, time), 1, motion.time.size - 1))
+        step = slice(k - 1, k + 1)
+        cubic = CubicHermiteSpline(motion.time[step], motion.modal[step], motion.modal_rate[step])
+        place = cubic(time)
+        rate = cubic(time, 1) / one.omega
+        if (np.hypot(group.rows @ place, group.rows @ rate) <= max_stuck).all():
+            out[column] = 0.0
+        else:
+            out[column] = _distance_to_free_motion(one, shape, place, rate)
+    return out
+
+
+def _distance_to_free_motion(free, shape, place, rate) -> float:
+    """Return the distance of modal coordinates (n,) and rates / omega (n,) from a free motion.
+
+    Each is divided by its own part along the shape (n,) of the sticking mode.
+    """
+    order = np.arange(free.modal.shape[0])[:, None]
+    free_place = np.apply_along_axis(synthesis, 0, free.modal, N_SAMPLES)
+    free_rate = np.apply_along_axis(synthesis, 0, 1j * order * free.modal, N_SAMPLES)
+    own = place @ shape
+    side = np.sign(own)
+    reversal = int(np.argmax(side * (free_place @ shape)))
+    size = side * float(free_place[reversal] @ shape)
+    return np.hypot(
+        np.linalg.norm(place / abs(own) - free_place[reversal] / size),
+        np.linalg.norm(rate / abs(own) - free_rate[reversal] / size),
+    )
+
+
+def _sticks(group: Group, free) -> np.ndarray:
+    """Whether each interface (i,) has its stiffness without slip in a free motion."""
+    force, slide = free.forces[:, 1], free.slides[:, 1]
+    stiffness = STUCK_FRACTION * group.stiffness()
+    return np.real(force * np.conj(slide)) >= stiffness * np.abs(slide) ** 2
+
+
+def _release_from_largest_decaying(joint: Joint, amplitudes, progress=None) -> tuple:
+    """Release from the largest of rising amplitudes (k,) [m] whose release does not grow.
+
+    Returns the number of amplitudes up to that one, and the Release.
+    """
+    for count in range(amplitudes.size, 0, -1):
+        try:
+            return count, _release_to_smallest(joint, amplitudes[:count], progress)
+        except _GrowingRelease:
+            continue
+    raise NotConverged(
+        f"a release from {format_length(amplitudes[0], 3)} grows, because the negative damping "
+        "supplies more energy than friction dissipates; give smaller amplitudes with --amplitudes"
+    )
+
+
+def _grows(joint: Joint, found) -> bool:
+    """Whether the swings of a Solution become larger along the shape of the sticking mode."""
+    motion, shape = found.response, joint.shape
+    _, places = turns(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
+    swings = np.abs(np.diff(places))
+    return decay_rate(joint.modes) < 0 and swings.size > 2 and swings[-1] > swings[0]
+
+
+def _release_to_smallest(joint: Joint, amplitudes, progress=None) -> Release:
+    """Release the mode for so many cycles that it comes down from the largest to the smallest amplitude.
+
+    The release begins so high that its first reading lies above the largest amplitude. Each longer run
+    is announced by the time per cycle of the one before.
+    """
+    travel = joint.model.rig.travel
+    omega = joint.modes.omega
+    has_several_modes = omega.size > 1
+    begin = min(RELEASE_FACTOR * float(amplitudes[-1]), travel)
+    cycles = FIRST_CYCLES
+    n_raised = 0
+    seconds_per_cycle = 0.0
+    free_swings = np.inf
+    if omega[joint.mode]:
+        free_swings = N_FREE_SWINGS * 2 * np.pi / omega[joint.mode]
+    while True:
+        model, how = _choose_numerics(joint, begin, cycles)
+        max_cycles = MAX_CYCLES if has_several_modes else MAX_CYCLES_ONE_MODE
+        if how.engine == PIECES.name and not has_several_modes:
+            max_cycles = MAX_CYCLES_TURNS
+        expected = COARSER_RUNS_FACTOR * seconds_per_cycle * cycles
+        if progress is not None and expected > ANNOUNCED_SECONDS:
+            progress(f"decay over {cycles} cycles: about {expected:.2g} s of computing time")
+        found = ENGINES[how.engine].run(model, how, joint.patch, 0, None, None)
+        release = Release(model, how, found)
+        seconds_per_cycle = found.seconds / cycles
+        if _grows(joint, found):
+            raise _GrowingRelease("the release grows")
+        read = _read(joint, found)
+        end = found.response.time[-1]
+        if not read.time.size:
+            if cycles >= max_cycles or end >= free_swings:
+                return release
+            # Cycles are those of the sticking mode; a swing in slip can last hundreds of them.
+            cycles = min(8 * cycles, max_cycles)
+            continue
+        high, low = read.amplitude[0], read.amplitude[-1]
+        rests = read.time[-1] < end - 3 / read.frequency[-1]
+        lowest = END_FACTOR * amplitudes[0]
+        if high < amplitudes[-1] and begin < travel and n_raised < MAX_RAISED:
+            begin = _raise_release(joint, begin, high, amplitudes[-1])
+            n_raised += 1
+        elif low <= lowest or cycles >= max_cycles or rests:
+            return release
+        else:
+            damping = read.damping[-1]
+            more = np.inf
+            if damping > 0:
+                more = np.log(low / lowest) / (2 * np.pi * damping)
+            cycles = int(min(np.clip(cycles + more, 2 * cycles, 8 * cycles), max_cycles))
+
+
+def _choose_numerics(joint: Joint, begin: float, cycles: int) -> tuple:
+    """Return the model of a release from an amplitude [m], and its numerics."""
+    model = release_model(joint, begin)
+    model = replace(model, rig=replace(model.rig, cycles=float(cycles)))
+    how = numerics.choose(model)
+    stores_reversals = joint.is_rigid or how.engine == PIECES.name
+    if joint.modes.omega.size > 1 or not stores_reversals:
+        how = replace(how, window=int(cycles))
+    return model, how
+
+
+def _raise_release(joint: Joint, begin: float, high: float, largest: float) -> float:
+    """Return a higher amplitude [m] of a release whose first reading `high` lies below `largest`."""
+    # Friction takes two static deflections per half swing.
+    rest = joint.amplitude_at(joint.deflection) if joint.friction_limit else 0.0
+    limit = max(MAX_RAISE_FACTOR * begin, RELEASE_FACTOR * (begin + 2 * rest))
+    raised = begin * RELEASE_FACTOR * largest / high
+    return min(raised, limit, joint.model.rig.travel)
+
+
+def release_model(joint: Joint, amplitude: float) -> Model:
+    """Return the model of a mode that is released at an amplitude [m] of the output."""
+    model = decays.steadily(joint.model)
+    period = 2 * np.pi / (joint.held[0] or joint.modes.omega[joint.mode])
+    rig = replace(
+        model.rig,
+        drive=drives.release(period),
+        start=_start(joint, amplitude),
+        kind="free",
+        waveform=NO_WAVEFORM,
+        frequency=None,
+        levels=(),
+        level_cycles=0.0,
+        force=None,
+    )
+    return replace(model, rig=rig)
+
+
+def _start(joint: Joint, amplitude: float) -> Start:
+    """Return the start of a release at an amplitude [m] of the output.
+
+    It is the free motion by balance, in which no other mode moves by itself. Where this is not known, it
+    is the shape of the mode: with the contact stuck, or free once all of the contact slips.
+    """
+    modes = joint.modes
+    at_rest = np.zeros(modes.omega.size)
+    if at_rest.size > 1:
+        try:
+            joint.require_steady_loops("balance")
+            first = float(joint.amplitude_at(MIN_AMPLITUDE_FACTOR * joint.slip_displacement))
+            first = min(first or amplitude, amplitude)
+            path = np.unique(np.geomspace(first, amplitude, N_START_STEPS))
+            free = find_free_motions(joint.steady_laws(), joint, path, HARMONICS[0])[-1]
+            if free is not None:
+                order = np.arange(HARMONICS[0] + 1)[:, None]
+                rates = 1j * free.omega * order * free.modal
+                return Start(free.modal.real.sum(axis=0), rates.real.sum(axis=0))
+        except (NotConverged, PatchfemError):
+            pass
+    output = float(modes.output[joint.mode])
+    if amplitude > joint.slip_amplitude and output:
+        own = np.eye(at_rest.size)[joint.mode]
+        return Start(own * amplitude / abs(output), at_rest)
+    return Start(joint.shape * amplitude / joint.reach, at_rest)
+
+
+def _read(joint: Joint, found, turns=turns) -> DecayCurve:
+    """Read a Solution from reversal to reversal.
+
+    With several modes, the reversals are those of the motion along the shape of the sticking mode, in
+    which other modes move least. Where consecutive swings last equally long, nothing slips: the motion
+    along this shape is then the mode's own, whatever else moves the output.
+
+    Parameters
+    ----------
+    joint : Joint
+    found : Solution
+    turns : callable
+        Of `response.decay_curve`: finds the reversals between samples.
+    """
+    motion, shape = found.response, joint.shape
+    if shape.size == 1:
+        return curve_of(of_turns(*turns(motion.time, motion.output, motion.output_rate)))
+    times, places = turns(motion.time, motion.modal @ shape, motion.modal_rate @ shape)
+    if times.size < 3:
+        return curve_of(of_turns(times, places))
+    output = CubicHermiteSpline(motion.time, motion.output, motion.output_rate)(times)
+    sizes = np.abs(np.diff(output))
+    lengths = np.diff(times)
+    equal = np.abs(np.diff(lengths)) <= EQUAL_SWINGS_TOL * lengths[1:]
+    sticks = np.append(True, equal) & np.append(equal, True)
+    at_output = curve_of(of_turns(times, places, sizes))
+    own = joint.reach / (shape @ shape) * np.abs(np.diff(places))
+    curve = curve_of(of_turns(times, places, np.where(sticks, own, sizes)))
+    change = _coupling(joint) * np.abs(curve.damping - at_output.damping)
+    if change.size:
+        padded = np.pad(change, N_BEAT_SWINGS)
+        change = sliding_window_view(padded, 2 * N_BEAT_SWINGS + 1).max(axis=1)
+    return curve._replace(
+        damping_error=curve.damping_error + change,
+        frequency_error=curve.frequency_error + change * curve.frequency,
+    )
+
+
+def _coupling(joint: Joint) -> float:
+    """Return the effect of other modes along the shape of the sticking mode / that at the output.
+
+    They are coupled by dampers; the ratio is at most 1.
+    """
+    modes = joint.modes
+    omega = joint.held[0] or modes.omega[joint.mode]
+    others = np.delete(modes.omega, joint.mode)
+    shape = joint.shape / np.linalg.norm(joint.shape)
+    damper_force, output = (
+        part - shape * (shape @ part) for part in (modes.dampers @ shape, modes.output)
+    )
+    distance = np.abs(others - omega**2 / np.maximum(others, omega)).min()
+    seen = np.linalg.norm(output) / joint.reach
+    return float(np.clip(np.linalg.norm(damper_force) / max(distance * seen, 1e-300), 0.0, 1.0))

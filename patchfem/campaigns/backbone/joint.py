@@ -1,0 +1,350 @@
+"""A mode with its contact: its shape while the contact sticks, and the scales of its amplitudes."""
+
+from collections.abc import Callable
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import PatchfemError
+from ...dynamics.events.elements import JOINED, cells_joined
+from ...dynamics.harmonic.forces import Group
+from ...effects import has, unbuilt
+from ...model.model import Model
+from ...response.errors import error_of_change
+from ...runs.patch import result as patch_result
+from ...runs.plan import plan
+from ...runs.rig import decays
+from ...runs.rig.plan import held_by
+from .bench_loops import settle_loop
+
+AMPLITUDES_PER_DECADE = 8  # Of the default amplitudes.
+MIN_AMPLITUDE_FACTOR = 1e-2  # Smallest amplitude / that at which all of the contact slips.
+MAX_AMPLITUDE_FACTOR = 15.0  # Largest amplitude / that at which all of the contact slips.
+MIN_RIGID_FACTOR = (
+    2.0  # Smallest amplitude under rigid friction / the static deflection by friction.
+)
+SOFTENING_END = (
+    0.7  # Largest amplitude / that at which a softening spring no longer turns the block.
+)
+HARDENING_END = 3.0  # Largest amplitude / that at which a hardening spring is as stiff as the mode.
+RELEASE_FACTOR = 1.15  # Release of a decay / largest amplitude: its first swings show the release.
+LINEAR_AMPLITUDES = (1e-6, 1e-3, 4)  # First [m], last [m] and number for a linear rig.
+STUCK_FRACTION = 1e-5  # Of the amplitude at which all of the contact slips: nothing slips here.
+ALL_METHODS_CURE = "; use --method quasi-static"
+NO_CLOSED_FORM = (
+    "the friction loop of bonds has a closed form only with reading = "
+    '"stretch", order = 1, a constant bond length, breakaway = 0 and pieces that are rigid in shear'
+)
+
+
+class Joint(NamedTuple):
+    """A mode of a rig with its contact.
+
+    Attributes
+    ----------
+    model : Model
+    patch : Patch or None
+        Pressed patch of [contact].
+    coarser : tuple
+        Patches on coarser meshes, or None.
+    mode : int
+        Number of the coordinate of the mode.
+    held : tuple
+        Angular frequency [rad/s], None if nothing gives way, and shape (n,) of the mode with the
+        contact stuck.
+    stiffness : (i,) array
+        Tangential stiffness [N/m] of each interface while nothing slips.
+    has_errors : bool
+        Whether the errors of the mesh and of the cells of a law are computed.
+    """
+
+    model: Model
+    patch: object
+    coarser: tuple
+    mode: int
+    held: tuple
+    stiffness: np.ndarray
+    has_errors: bool = True
+
+    @property
+    def modes(self):
+        """The ModalBasis of the rig."""
+        return self.model.rig.modes
+
+    @property
+    def coarse(self):
+        """The patch on the first coarser mesh, or None."""
+        return self.coarser[0]
+
+    @property
+    def shape(self) -> np.ndarray:
+        """Shape (n,) of the mode with the contact stuck."""
+        return self.held[1]
+
+    @property
+    def reach(self) -> float:
+        """Motion at the output per unit of `shape`."""
+        return abs(float(self.modes.output @ self.shape))
+
+    @property
+    def face(self) -> int:
+        """Number of the interface whose force on the mode rises most with the amplitude."""
+        slides = np.abs(self.modes.interfaces @ self.shape)
+        is_elastic = np.isfinite(self.stiffness) & (self.stiffness > 0)
+        return int(np.argmax(slides * np.where(is_elastic, self.stiffness, 1)))
+
+    @property
+    def face_slide(self) -> float:
+        """Relative displacement of that interface per unit of `shape`."""
+        return float(self.modes.interfaces[self.face] @ self.shape)
+
+    @property
+    def friction_limit(self) -> float:
+        """Largest friction force of that interface [N]; 0 without friction."""
+        model = self.model
+        if len(model.rig.interfaces) > 1 and self.patch is None:
+            interface = model.rig.interfaces[self.face]
+            return interface.numbers.static * interface.load
+        if model.friction is None:
+            return 0.0
+        load = model.nominal_load if self.patch is None else self.patch.pressure.load
+        return model.friction.static * load
+
+    @property
+    def is_linear(self) -> bool:
+        """Whether neither friction acts nor a spring is nonlinear."""
+        interfaces = self.model.rig.interfaces
+        others = 0.0
+        if len(interfaces) > 1:
+            others = sum(one.numbers.static * (one.load or 0.0) for one in interfaces)
+        return not (self.friction_limit or others or self.model.rig.bends)
+
+    @property
+    def is_rigid(self) -> bool:
+        """Whether friction sticks without any elastic displacement."""
+        interfaces = self.model.rig.interfaces
+        return not self.model.soft and any(
+            has(one.numbers.law, "set-valued") and not one.soft for one in interfaces
+        )
+
+    @property
+    def spring(self) -> float:
+        """Stiffness of the mode without the contact [N/m], per unit of its coordinate."""
+        return self.modes.mass * float(self.modes.omega[self.mode] or self.held[0]) ** 2
+
+    @property
+    def deflection(self) -> float:
+        """Relative displacement [m] by which the largest friction deflects the free mode."""
+        return self.friction_limit * self.face_slide**2 / self.spring
+
+    @property
+    def slip_displacement(self) -> float:
+        """Relative displacement [m] at which all of the contact slips.
+
+        Of rigid friction it is the static deflection by friction; of springs alone, the displacement
+        at which a cubic spring doubles the mode's stiffness, or which an interlock has.
+        """
+        rig = self.model.rig
+        if not self.friction_limit:
+            if rig.cubic is None:
+                return rig.interlock[1]
+            return float(np.sqrt(self.spring / abs(rig.cubic)))
+        stiffness = float(self.stiffness[self.face])
+        return self.friction_limit / stiffness if stiffness else self.deflection
+
+    def amplitude_at(self, slide):
+        """Return the amplitude at the output [m] whose interface has the displacement `slide` [m]."""
+        return self.reach / (abs(self.face_slide) or 1.0) * slide
+
+    @property
+    def slip_amplitude(self) -> float:
+        """Amplitude at the output [m] at which all of the contact slips."""
+        return self.amplitude_at(self.slip_displacement)
+
+    def default_amplitudes(self) -> np.ndarray:
+        """Return amplitudes (k,) [m] from a sticking contact to a mode that moves as if it were free."""
+        rig = self.model.rig
+        if self.is_linear:
+            return np.geomspace(*LINEAR_AMPLITUDES) * min(1.0, rig.travel / LINEAR_AMPLITUDES[1])
+        low, high = self.amplitude_at(np.array(self._default_slides()))
+        high = min(high, self._max_amplitude())
+        low = min(low, MIN_AMPLITUDE_FACTOR * high)
+        count = 1 + int(np.ceil(AMPLITUDES_PER_DECADE * np.log10(high / low)))
+        return np.geomspace(low, high, count)
+
+    def _default_slides(self) -> tuple:
+        """Return the smallest and largest displacement [m] of the default amplitudes."""
+        stiffness = float(self.stiffness[self.face])
+        deflection = self.deflection if self.friction_limit else 0.0
+        if 0 < stiffness < np.inf or not deflection:
+            slip = self.slip_displacement
+            return MIN_AMPLITUDE_FACTOR * slip, MAX_AMPLITUDE_FACTOR * max(slip, deflection)
+        return MIN_RIGID_FACTOR * deflection, MAX_AMPLITUDE_FACTOR**2 * deflection
+
+    def _max_amplitude(self) -> float:
+        """Return the largest default amplitude [m] by the stop and by a cubic spring."""
+        rig, modes = self.model.rig, self.modes
+        travel = rig.travel / RELEASE_FACTOR
+        if not rig.cubic:
+            return travel
+        output = abs(float(modes.output[self.mode])) or self.reach
+        own = np.sqrt(self.spring / abs(rig.cubic)) / output
+        return min(travel, own * (SOFTENING_END if rig.cubic < 0 else HARDENING_END))
+
+    def steady_laws(self) -> Group:
+        """Return the steady loops of all laws; PatchfemError if a law has none of its own."""
+        try:
+            return decays.laws_on(self.model, self.patch)
+        except PatchfemError:
+            has_bench = not self.model.rig.bends and len(self.model.rig.interfaces) < 2
+            cure = ALL_METHODS_CURE if has_bench else ""
+            raise PatchfemError(NO_CLOSED_FORM + cure) from None
+
+    def require_steady_loops(self, method: str) -> None:
+        """Raise PatchfemError for a contact whose steady loops do not give the free motion."""
+        model = self.model
+        reason = ""
+        if model.grooves is not None:
+            reason = "on grooves"
+        elif model.rig.load_varies:
+            reason = "with a load that changes with the motion"
+        elif model.rig.strips_slide_apart:
+            reason = "for strips that slide independently of one another"
+        elif self.is_rigid and len(model.rig.interfaces) > 1:
+            reason = "for several interfaces with rigid friction"
+        if reason:
+            raise PatchfemError(f"{method} cannot be computed {reason}")
+
+    def space_errors(self, read: Callable) -> np.ndarray | float:
+        """Return the errors of read(Group) by the mesh and by the cells of a density of sliders."""
+        model = self.model
+        has_cells = any(has(one.numbers.law, "cells") for one in model.rig.interfaces)
+        slips_in_parts = model.soft or model.rig.soft
+        error = 0.0
+        if not self.has_errors or not (has_cells or slips_in_parts):
+            return error
+        fine = self.steady_laws()
+        if slips_in_parts:
+            error = error + decays.mesh_error(fine, decays.rough_laws(model, self.coarse), read)
+        if has_cells:
+            best = read(fine)
+            changes = [
+                np.abs(read(fine.remade(partial(cells_joined, *cells))) - best) for cells in JOINED
+            ]
+            error = error + error_of_change(np.max(changes, axis=0), ratio=4.0, order=2.0)
+        return error
+
+
+def build_joint(model: Model, name: str) -> Joint:
+    """Press the patch of a rig and hold the contact of one of its modes.
+
+    Parameters
+    ----------
+    model : Model
+        Of a rig.
+    name : str
+        Name of the mode, or its number from 1 in a rig of masses; "" for the first mode.
+
+    Raises
+    ------
+    PatchfemError
+        For a scene without a rig, and for a mode that has no backbone.
+    """
+    if model.rig is None:
+        raise PatchfemError(
+            "a backbone needs the scene of a rig; add the tables [structure] and [drive]",
+            "structure",
+        )
+    modes, number = model.rig.modes, _find_mode(model.rig, name)
+    if modes.lateral_faces is not None:
+        key = next(one.key for one in model.rig.interfaces if one.lateral)
+        refusal = unbuilt("a backbone with interfaces that slide in a plane", "out")
+        raise PatchfemError(refusal, f"{key}.lateral")
+    patch = None
+    coarser: tuple = (None,)
+    if model.patch is not None:
+        patch, *others = patch_result.solve_all(model.patch, model.accuracy.tolerance)
+        coarser = (*others, None)
+    own = np.eye(modes.omega.size)[number]
+    joint = Joint(model, patch, coarser, number, (None, own), np.zeros(len(modes.interfaces)))
+    if not joint.is_linear:
+        planned = joint._replace(stiffness=held_by(model.rig, plan(model).chain))
+        stiffness = _stuck_stiffness(planned)
+        held = modes.held(modes.interfaces, stiffness, number)
+        joint = joint._replace(held=held, stiffness=stiffness)
+    _refuse_mode(joint)
+    return joint
+
+
+def _refuse_mode(joint: Joint) -> None:
+    """Raise PatchfemError for a mode that has no backbone."""
+    model, modes = joint.model, joint.modes
+    rig = model.rig
+    has_friction = model.friction is not None or bool(rig.interfaces)
+    if not joint.friction_limit and rig.bends and has_friction:
+        raise PatchfemError(
+            "the load or the coefficient of friction is 0, so no friction acts; for the backbone "
+            "without friction leave out [friction] and the normal load",
+            "friction.static",
+        )
+    if not (modes.omega[joint.mode] or joint.held[0]):
+        raise PatchfemError(
+            "this mode has 0 Hz and rigid friction acts on it, so the mode has no natural frequency"
+        )
+    moves_contact = np.abs(modes.interfaces @ joint.shape).max(initial=0.0) > 0
+    if not (joint.is_linear or rig.bends or moves_contact):
+        raise PatchfemError(
+            "the mode does not move the contact, so no friction acts on the mode; choose another "
+            "mode with --mode, or give this mode the key `slide`"
+        )
+    if not joint.reach > 0:
+        raise PatchfemError(
+            "the mode does not move the point of the output, so its amplitude there is 0; give the "
+            "mode the key `output`, or choose another mode with --mode"
+        )
+
+
+def _find_mode(rig, name: str) -> int:
+    """Return the number of the coordinate of a mode; "" is the first mode of the scene."""
+    modes, names = rig.modes, list(rig.modes.names)
+    count = modes.omega.size
+    if not rig.by_modes:
+        if not name:
+            return int(np.argmax(modes.omega > 0))
+        if not (name.isdecimal() and 1 <= int(name) <= count):
+            plural = "s" if count != 1 else ""
+            raise PatchfemError(
+                f"backbone --mode {name}: the rig has {count} mode{plural}, counted from 1", ""
+            )
+        return int(name) - 1
+    if name and name not in names:
+        raise PatchfemError(
+            f"backbone --mode {name}: no mode has this name; the modes of the rig are "
+            f"{', '.join(names)}",
+            "",
+        )
+    k = names.index(name) if name else 0
+    return k if modes.shapes is None else int(np.argmax(np.abs(modes.shapes[k])))
+
+
+def _stuck_stiffness(joint: Joint) -> np.ndarray:
+    """Return the tangential stiffness (i,) [N/m] of each interface while nothing slips.
+
+    It is that of the laws' loops where they have a closed form, that of a small loop on a bench if
+    there is one interface, else the one of the plan (`joint.stiffness`).
+    """
+    model, planned = joint.model, joint.stiffness
+    load_changes = model.rig.load_varies or model.rig.strips_slide_apart
+    if joint.is_rigid or model.friction is None or model.grooves is not None or load_changes:
+        return planned
+    if not np.isfinite(planned).all() or not planned.all():
+        return planned
+    try:
+        return joint.steady_laws().stiffness()[: planned.size]
+    except PatchfemError:
+        if planned.size > 1:
+            return planned
+        small = STUCK_FRACTION * joint.friction_limit / planned[0]
+        settled = settle_loop(model, joint.patch, small, model.rig.own_frequency)
+        return np.array([settled.run.values["secant_stiffness"]])

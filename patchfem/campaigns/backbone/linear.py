@@ -1,0 +1,53 @@
+"""Curves of a mode in a linear rig: frequency and damping are the same at all amplitudes."""
+
+import numpy as np
+
+from ...core import NotConverged
+from .joint import Joint
+from .records import Curve
+
+ROUND = 1e-9  # Relative error of a value by round-off.
+N_STEPS = (
+    8  # Fixed-point steps to the negative damping that keeps the motion up; they converge fast.
+)
+
+
+def compute_level_curve(joint: Joint, amplitudes, method: str) -> Curve:
+    """Return the level curve of a linear rig.
+
+    By decay, frequency and damping ratio are those of the damped mode. By the other methods, a
+    negative damping g of every coordinate keeps the motion up: the frequency is that of this motion,
+    and the damping ratio is g/(2 omega).
+    """
+    negative_damping = 0.0
+    for _ in range(N_STEPS):
+        negative_damping -= 2 * _find_root(joint, negative_damping).real
+    omega = abs(_find_root(joint, negative_damping))
+    own = _find_root(joint, 0.0)
+    if not (own.imag and negative_damping < 2 * omega):
+        raise NotConverged("the mode does not oscillate: its damping ratio is 1 or more")
+    damping = negative_damping / (2 * omega)
+    if method == "decay":
+        omega = abs(own.imag)
+        damping = -own.real / abs(own)
+    frequency = np.full(amplitudes.size, omega / (2 * np.pi))
+    damping = np.full(amplitudes.size, damping)
+    return Curve(
+        amplitude=amplitudes,
+        frequency=frequency,
+        frequency_error=ROUND * frequency,
+        damping=damping,
+        damping_error=ROUND * np.abs(damping),
+        loss=np.full(amplitudes.size, np.nan),
+    )
+
+
+def _find_root(joint: Joint, negative_damping: float) -> complex:
+    """Return the root of z'' + (D - g) z' + Omega^2 z = 0 in which the mode moves most."""
+    modes = joint.modes
+    n = modes.omega.size
+    damping = negative_damping * np.eye(n) - modes.dampers
+    matrix = np.block([[np.zeros((n, n)), np.eye(n)], [-np.diag(modes.omega**2), damping]])
+    values, vectors = np.linalg.eig(matrix)
+    size = np.abs(vectors[joint.mode]) / np.linalg.norm(vectors[:n], axis=0)
+    return values[np.argmax(size)]

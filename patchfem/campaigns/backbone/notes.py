@@ -1,0 +1,151 @@
+"""Sentences on the curves of a backbone: what they lack, and where the methods differ."""
+
+import numpy as np
+
+from ...core import say as format_length
+from ...model.model import Model
+from ...runs.patch import faces
+from .joint import MIN_AMPLITUDE_FACTOR, Joint
+
+MICRO_SLIP_END = (
+    0.3  # Amplitude / that at which all of the contact slips, below which it is micro-slip.
+)
+MIN_LOSS_RATIO = 4.0  # Loss / error of the loss, from which a loss counts for an exponent.
+MAX_LISTED = 6  # Amplitudes that a sentence lists one by one.
+REPORT_OTHER_MODES = 1e-3  # Motion of other modes / amplitude, above which a sentence states it.
+MIN_RATIO = 2.0  # Ratio of two values, from which a sentence gives the ratio and not a percentage.
+MISSING_ERRORS = (
+    "the errors of the curves do not account for the mesh, because no coarser mesh was computed: "
+)
+REASONS_OF_GAPS = {
+    "balance": "harmonic balance did not converge at these amplitudes; the curve may turn back to "
+    "smaller amplitudes, or the mode may stop oscillating",
+    "quasi-static": "the static curve does not reach these amplitudes",
+    "decay": "at these amplitudes the free decay, or a coarser decay computed as a check, gave no "
+    "frequency and damping, or the decay was no longer a motion of this mode alone",
+}
+REASONS_OF_DIFFERENCES = {
+    "decay": "a decay gives mean values over a cycle, and at this amplitude one cycle reduces the "
+    "amplitude by the fraction {:.2g}",
+    "quasi-static": "the static curve uses the secant stiffness under a force of fixed shape; "
+    "harmonic balance uses the first harmonic of the force",
+}
+
+
+def note_linear_rig(joint: Joint) -> list:
+    """Return a sentence on a rig with a law or interfaces in which no friction acts."""
+    has_friction = joint.model.friction is not None or joint.model.rig.interfaces
+    if joint.is_linear and has_friction:
+        return ["no friction acts, so frequency and damping are the same at all amplitudes"]
+    return []
+
+
+def note_wear(model: Model) -> list:
+    """Return a sentence on a scene with wear."""
+    return [] if model.wear is None else ["these curves are for unworn pieces: [wear] is ignored"]
+
+
+def note_missing_mesh(joint: Joint) -> list:
+    """Return a sentence on a contact that slips in parts and has no coarser mesh."""
+    model = joint.model
+    if joint.is_linear:
+        return []
+    if not model.soft or joint.coarse is not None:
+        has_errors = not model.rig.soft or faces.known(model)
+        return [] if has_errors else [MISSING_ERRORS + faces.UNKNOWN]
+    cure = "leave out contact.element_size"
+    if model.patch.mesh is not None:
+        cure = "split the elements of contact.mesh"
+    return [f"{MISSING_ERRORS}the interface has too few elements for a coarser mesh; {cure}"]
+
+
+def note_micro_slip(joint: Joint, wanted) -> list:
+    """Return a sentence on amplitudes (k,) [m] that do not determine the exponent of micro-slip."""
+    edge = MICRO_SLIP_END * joint.slip_amplitude
+    if wanted[0] > edge:
+        begin = format_length(MIN_AMPLITUDE_FACTOR / MICRO_SLIP_END * edge, 2)
+        return [
+            f"the smallest amplitude, {format_length(wanted[0], 3)}, lies above the range of "
+            f"micro-slip, which ends at about {format_length(edge, 2)}; to get the exponent of "
+            f"micro-slip, begin --amplitudes at {begin}"
+        ]
+    return [
+        "the exponent of micro-slip cannot be determined: fewer than two amplitudes below "
+        f"{format_length(edge, 2)} have an energy loss of at least {MIN_LOSS_RATIO:g} times the "
+        f"error of the loss; give amplitudes up to {format_length(edge, 2)}, or a smaller "
+        "accuracy.tolerance"
+    ]
+
+
+def note_gaps(wanted, curves: dict) -> list:
+    """Return sentences on the amplitudes (k,) [m] that a curve does not have."""
+    out = []
+    for method, curve in curves.items():
+        lacks = wanted[~np.isin(wanted, curve.amplitude)]
+        count = curve.amplitude.size
+        if not lacks.size or count == wanted.size:
+            continue
+        if lacks.size > MAX_LISTED:
+            ends = [format_length(lacks[k], 3) for k in (0, -1)]
+            places = f"lie from {ends[0]} to {ends[1]}"
+        else:
+            places = f"are {', '.join(format_length(one, 3) for one in lacks)}"
+        out.append(
+            f"method {method}: {count} of {wanted.size} amplitudes have a result; the amplitudes "
+            f"without a result {places}: {REASONS_OF_GAPS[method]}"
+        )
+    return out
+
+
+def note_secant_stiffness(joint: Joint, wanted, curves: dict) -> list:
+    """Return a sentence on a static curve in slip without a balance to compare with."""
+    if joint.is_linear or not joint.friction_limit:
+        return []
+    slips = wanted[-1] > MICRO_SLIP_END * joint.slip_amplitude
+    if not slips or "quasi-static" not in curves or "balance" in curves:
+        return []
+    return [
+        "--method quasi-static takes the stiffness from the two turning points of the motion under "
+        "a force of fixed shape; --method balance takes the stiffness from the first harmonic of "
+        "the force, and this stiffness is lower once the contact slips. The frequencies by "
+        "quasi-static are therefore higher than the frequencies by balance"
+    ]
+
+
+def note_differences(curves: dict) -> list:
+    """Return sentences on where a curve differs from the balance by more than both errors."""
+    if "balance" not in curves:
+        return []
+    balance = curves["balance"]
+    out = []
+    for method, reason in REASONS_OF_DIFFERENCES.items():
+        if method not in curves:
+            continue
+        _, here, there = np.intersect1d(
+            curves[method].amplitude, balance.amplitude, return_indices=True
+        )
+        curve, other = curves[method].at(here), balance.at(there)
+        for name in ("frequency", "damping"):
+            value, beside = getattr(curve, name), getattr(other, name)
+            errors = getattr(curve, f"{name}_error") + getattr(other, f"{name}_error")
+            difference = np.abs(value - beside)
+            share = np.where(difference > errors, difference / np.abs(beside), 0.0)
+            if not share.size or not share.max() > 0:
+                continue
+            k = int(np.argmax(share))
+            ratio = value[k] / beside[k]
+            size = f"by {100 * share[k]:.2g} %"
+            if ratio >= MIN_RATIO:
+                size = f"where the value by {method} is {ratio:.2g} times the value by balance"
+            also = ""
+            if curve.other_modes is not None and curve.other_modes[k] > REPORT_OTHER_MODES:
+                also = (
+                    "; the motion of other modes in the decay is "
+                    f"{100 * curve.other_modes[k]:.2g} % of its amplitude"
+                )
+            lost = -np.expm1(-2 * np.pi * curve.damping[k])
+            out.append(
+                f"the values of {name} by {method} and by balance differ most at the amplitude "
+                f"{format_length(curve.amplitude[k], 3)}, {size}: {reason.format(lost)}{also}"
+            )
+    return out

@@ -1,0 +1,136 @@
+"""Curve of a mode by one static force with the shape of the mode whose contact sticks."""
+
+import numpy as np
+
+from ...core import NotConverged, PatchfemError
+from ...dynamics.harmonic import quasi_static
+from ...friction.record import loop_from
+from ...response.errors import with_errors
+from ...runs.bench.errors import errors_of
+from ...runs.rig import decays
+from .bench_loops import LOOP_MEASURES, settle_loop
+from .joint import Joint
+from .records import Curve
+
+ROUND = 1e-9  # Relative error of a value by round-off.
+AMPLITUDE_TOL = 1e-7  # Relative tolerance of an amplitude.
+N_SAMPLES = 4096  # Samples of a cycle of a loop; half as many give the error.
+MAX_STEPS = 60  # Corrections of the displacement until the amplitude is the wanted one.
+MIN_FLOOR = 1e-10  # Least relative error of a loop on a bench.
+
+
+def compute_static_curve(joint: Joint, amplitudes) -> Curve:
+    """Return the curve by a static force; loops without a closed form are run on a bench."""
+    joint.require_steady_loops("static curve")
+    if joint.is_rigid:
+        raise PatchfemError(
+            "rigid friction has no finite stiffness, so a static curve cannot be computed for the "
+            "mode of the sticking contact"
+        )
+    known = _by_closed_form(joint, amplitudes)
+    if known is not None:
+        return known
+    try:
+        laws = joint.steady_laws()
+    except PatchfemError:
+        if len(joint.model.rig.interfaces) > 1 or joint.model.rig.bends:
+            raise
+        return _by_bench_loops(joint, amplitudes)
+
+    def read(group, samples: int) -> np.ndarray:
+        return decays.static_rows(joint.modes, group, joint.mode, amplitudes, samples)
+
+    best = read(laws, N_SAMPLES)
+    is_wanted = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
+    best[0] = np.where(is_wanted, amplitudes, best[0])
+    error = np.abs(best - read(laws, N_SAMPLES // 2)) + ROUND * np.abs(best)
+    error += joint.space_errors(lambda group: read(group, N_SAMPLES))
+    return _rising_part(best, error)
+
+
+def _rising_part(best, error) -> Curve:
+    """Return the curve as far as its force rises: beyond that, no equilibrium is stable.
+
+    Parameters
+    ----------
+    best, error : (4, k) array
+        Amplitude [m], frequency [Hz], damping ratio, loss [J], and their errors.
+    """
+    force = best[1] ** 2 * best[0]
+    whole = np.isfinite(best + error).all(axis=0) & (np.diff(force, prepend=0.0) > 0)
+    count = whole.size if whole.all() else int(np.argmin(whole))
+    if not count:
+        raise NotConverged(
+            "no static force with the shape of the mode holds the rig in equilibrium at these "
+            "amplitudes; use --method balance"
+        )
+    curve = Curve(
+        amplitude=best[0],
+        frequency=best[1],
+        frequency_error=error[1],
+        damping=best[2],
+        damping_error=error[2],
+        loss=best[3],
+    )
+    return curve.at(slice(count))
+
+
+def _by_closed_form(joint: Joint, amplitudes) -> Curve | None:
+    """Return the curve of one interface whose law has its loop in closed form, else None."""
+    model, modes = joint.model, joint.modes
+    is_soft = model.soft or model.rig.soft or model.rig.bends
+    if model.friction is None or is_soft or len(model.rig.interfaces) > 1:
+        return None
+    load = joint.friction_limit / model.friction.static
+    slides = np.abs(modes.interfaces[0] @ joint.shape) * amplitudes / joint.reach
+    for _ in range(MAX_STEPS):
+        loops = [loop_from(model.friction, load, float(slide)) for slide in slides]
+        if None in loops:
+            return None
+        best = _read_loops(joint, slides, [quasi_static.Loops(*loop) for loop in loops])
+        is_wanted = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
+        if is_wanted.all():
+            break
+        # The shape at the output is another one than that of the sticking mode.
+        slides = slides * amplitudes / best[0]
+    is_wanted = np.abs(best[0] / amplitudes - 1) < AMPLITUDE_TOL
+    best = np.where(is_wanted, best, np.nan)
+    best[0] = amplitudes
+    relative = ROUND + (AMPLITUDE_TOL if modes.omega.size > 1 else 0.0)
+    return _rising_part(best, relative * np.abs(best))
+
+
+def _read_loops(joint: Joint, slides, loops: list) -> np.ndarray:
+    """Return amplitude, frequency, damping and loss (4, k) by the loops at displacements (k,) [m]."""
+    modes = joint.modes
+    statics = quasi_static.through(modes, modes.interfaces[0], joint.held, slides, loops)
+    return decays.rows_of(modes, statics)
+
+
+def _by_bench_loops(joint: Joint, amplitudes) -> Curve:
+    """Return the curve by loops of the contact on a bench at the frequency of the mode."""
+    slides = np.abs(joint.modes.interfaces[0] @ joint.shape) * amplitudes / joint.reach
+    patches = [joint.patch]
+    if joint.coarse is not None:
+        patches.append(joint.coarse)
+    loops = []
+    errors = []
+    for slide in slides:
+        frequency = joint.held[0] / (2 * np.pi)
+        settled = settle_loop(joint.model, joint.patch, float(slide), frequency)
+        changes = errors_of(settled.model, patches, settled.run, settled.steps)[0]
+        measures = with_errors(settled.run.values, *changes, least=MIN_FLOOR)
+        stiffness, area = (settled.run.values[name] for name in LOOP_MEASURES)
+        stiffness_error, area_error = (
+            measures[name].error + change for name, change in zip(LOOP_MEASURES, settled.change)
+        )
+        loops.append(quasi_static.Loops(stiffness * slide, area))
+        errors.append(quasi_static.Loops(stiffness_error * slide, area_error))
+    best = _read_loops(joint, slides, loops)
+    error = ROUND * np.abs(best)
+    pairs = list(zip(loops, errors))
+    moved_tips = [loop._replace(tip=loop.tip + off.tip) for loop, off in pairs]
+    moved_areas = [loop._replace(area=loop.area + off.area) for loop, off in pairs]
+    for moved in (moved_tips, moved_areas):
+        error += np.abs(_read_loops(joint, slides, moved) - best)
+    return _rising_part(best, error)
