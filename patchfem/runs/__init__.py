@@ -10,7 +10,7 @@ module imports its own entry of this list and the entries before it:
 5.  `joint`  a pressed patch taken off modes that were measured with it
 6.  `rig`  a driven structure that rubs
 7.  `wear`  a patch worn by a bench or a rig over many cycles
-8.  `remedies`  the measures that miss the tolerance, and what cures them
+8.  `accuracy_warnings`  the measures whose errors exceed the tolerance, and the setting that helps
 9.  `memory`  the memory that a run may take
 10. `tolerance_forecast`  whether a tolerance will be missed, before anything runs
 11. `plan`  what would run: engine, sizes, cost

@@ -64,7 +64,9 @@ class Cost:
         def merge(mine: dict, others: dict) -> dict:
             return mine | {name: mine.get(name, 0) + value for name, value in others.items()}
 
-        summed = map(add, (self.parts, self.words, self.steps), (other.parts, other.words, other.steps))
+        summed = map(
+            add, (self.parts, self.words, self.steps), (other.parts, other.words, other.steps)
+        )
         return Cost(
             merge(self.times, other.times),
             *summed,
@@ -88,7 +90,9 @@ class EngineCode(NamedTuple):
 
 
 NO_CODE = EngineCode(0.0, 0.0)
-LINEAR_CODE = EngineCode(58e6, 0.0)  # of a linear motion in closed form: the library of LLVM is loaded
+LINEAR_CODE = EngineCode(
+    58e6, 0.0
+)  # of a linear motion in closed form: the library of LLVM is loaded
 SHORT_CODE = EngineCode(58e6, 0.15, 2.0)  # of the slide of a bench, which has few kernels
 MARCH_CODE = EngineCode(58e6, 0.15, 3.5)
 SHEAR_MARCH_CODE = EngineCode(58e6, 0.15, 7.0)  # of a march with shear modes of a patch

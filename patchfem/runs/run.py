@@ -16,10 +16,10 @@ from ..dynamics import resume
 from ..model.model import Model
 from ..model.source import placed
 from . import joint
+from .accuracy_warnings import Finding, tolerance_warnings
 from .patch import faces, strength
 from .patch import result as patch_result
 from .plan import Plan, compiled_kind, plan, refuse_size
-from .remedies import Finding, beyond_tolerance
 from .results.patch_rows import unknown_measures
 from .results.result import Result, with_meanings, without_folders
 from .rig import engines
@@ -131,7 +131,7 @@ def _whole(result: Result, notes: list, begin: float, coarse=(), climbed=(), sti
     measures, where these are others."""
     result.seconds["total"], model = perf_counter() - begin, result.plan.model
     apart = "strip" if model.patch is not None else "interface"
-    wide = beyond_tolerance(Finding(model, result.measures, result.patch, result.extra, climbed), coarse, still)
+    wide = tolerance_warnings(Finding(model, result.measures, result.patch, result.extra, climbed), coarse, still)
     warned, noted = result.warnings + wide, [*notes, *result.extra.get("notes", [])]
     warned, noted = (without_folders(texts, model.source.path) for texts in (warned, noted))
     faces = _yielding_faces(result)

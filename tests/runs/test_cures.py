@@ -10,9 +10,9 @@ from scene_texts import DRIVE, JOINT, JOINT_SHAKEN, MODE, NONLOCAL, POINT, SMALL
 
 from patchfem.core import Measure
 from patchfem.model.model import build
+from patchfem.runs.accuracy_warnings import Finding, tolerance_warnings
 from patchfem.runs.patch import ladder
 from patchfem.runs.plan import plan
-from patchfem.runs.remedies import Finding, beyond_tolerance
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
@@ -71,8 +71,8 @@ def test_always_a_mesh_at_its_cap_is_not_refined_by_a_tolerance(monkeypatch):
     wide = {name: one.error / abs(one.value) for name, one in found.measures.items() if one.value and one.error}
     assert max(wide, key=wide.get) != "contact_fraction"  # and yet that is what a patch answers first
     assert len(said) == 1 and said[0].startswith("contact_fraction has an estimated error of ")
-    assert said[0].endswith(f"a mesh finer than {found.patch.x.size} interface nodes would take too long; use "
-                            "these values with their stated errors")
+    assert f"the mesh ({found.patch.x.size} interface nodes) causes this error; the next mesh would take" in said[0]
+    assert said[0].endswith("; no accuracy.tolerance leads to a finer mesh; use the value with its stated error")
 
 
 def test_exact_a_mesh_that_no_tolerance_refines_is_told_with_the_seconds_of_the_next(monkeypatch):
@@ -83,9 +83,9 @@ def test_exact_a_mesh_that_no_tolerance_refines_is_told_with_the_seconds_of_the_
     found = run(plan(loads(flat)))
     said = [text for text in found.warnings if "interface nodes) causes this" in text]
     seconds = ladder.next_seconds(found.patch)
-    assert len(said) == 1 and 0.001 < seconds < 5
-    told = re.search(r"would take about (\S+) CPU s, and a bench spends at most 0.001 CPU s", said[0])
-    assert float(told[1]) == pytest.approx(seconds, rel=0.05) and "too long" not in said[0]
+    told = [float(re.search(r"would take about (\S+) CPU s, and at most 0.001 CPU s are spent", text)[1])
+            for text in said]  # of the ladder of the static measures, and of that of the motion
+    assert 0.001 < seconds < 5 and told[-1] == pytest.approx(seconds, rel=0.05) and len(told) == 2
 
 
 def test_always_steps_that_are_left_out_cure_what_few_steps_do_not_show():
@@ -112,7 +112,7 @@ def test_exact_what_a_run_answers_first_is_named_first(wide, first):
     measures = {name: Measure(1.0, "1", error) for name, error in wide.items()}
     left = {"parts": {"steps": wide}, "orders": dict.fromkeys(wide, 2.0)}
     seen = Finding(build(loads(SHAKEN + FEW)), measures, None, {"steps_per_cycle": 16, "left_open": left})
-    assert beyond_tolerance(seen) == [first]
+    assert tolerance_warnings(seen) == [first]
 
 
 @pytest.mark.parametrize("steps", [400, 1600])

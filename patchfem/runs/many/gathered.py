@@ -28,8 +28,8 @@ from ...response.errors import coarser_errors, step_errors
 from ...response.measures import energy_balance
 from ...response.reasons import SHARED
 from ...response.ringing import LEAST_PERIODS, SHORT
+from ..accuracy_warnings import Finding, tolerance_warnings
 from ..patch import result as of_patch
-from ..remedies import Finding, beyond_tolerance
 from ..results.result import without_folders
 from ..results.travel import outcome_on_piece, travelled
 from ..rig.costs import MOST_STEPS
@@ -288,7 +288,7 @@ def _tell(found: Answers, case: int, model: Model, one: _Pressed, reads: tuple, 
         runs = [{name: float(column[case]) for name, column in read.values.items()} for read in reads]
         extra = found.numerics[case] | {"cycles": model.rig.cycles, "left_open": left_open(
             ("steps", "mesh", "modes", "own"), parts, runs)}
-        warned = beyond_tolerance(Finding(model, measures, one.patch, extra))
+        warned = tolerance_warnings(Finding(model, measures, one.patch, extra))
     drift = {name: m for name, m in known.items() if name == "drift_per_cycle"}
     warned = without_folders([*one.warnings, *model.rig.notes, *law_warnings(model, outcome, drift, 0.0),
                               *travelled(one.patch, reach), *warned], model.source.path)

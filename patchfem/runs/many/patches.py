@@ -13,11 +13,11 @@ from ...core import Outcome, allowed
 from ...elasticity.lapack import one_thread
 from ...model.alike import Alike, some
 from ...model.model import Model
+from ..accuracy_warnings import Finding, tolerance_warnings
 from ..patch import result as of_patch
 from ..patch import static, store
 from ..patch.meshes import geometry_of
 from ..patch.strength import yielding_faces
-from ..remedies import Finding, beyond_tolerance
 from ..results.patch_rows import POSITIVE, TABLE
 from ..results.result import without_folders, without_folders_of
 from . import one_by_one
@@ -111,7 +111,7 @@ def _solved(models: Sequence[Model], say: Callable | None) -> Answers:
         model, measures = models[case], found.measures(case, floors)
         warned = [*model.source.remarks,
                   *of_patch.strained_by(model.patch, float(found.top[case]), float(found.approach[case])),
-                  *beyond_tolerance(Finding(model, measures, _Nodes(found.levels[0].x)))]
+                  *tolerance_warnings(Finding(model, measures, _Nodes(found.levels[0].x)))]
         if warned:
             out.warnings[case] = without_folders(warned, model.source.path)
     for case in np.flatnonzero(good).tolist():

@@ -17,7 +17,7 @@ from ....response.reasons import CYCLIC, SETTLES, STOPS, UNSEEN, without_value
 from ....response.rows import TABLE, floor_of, larger_term
 from ....response.settling import CLASSES, STEADY, steady_amplitudes, windows_of
 from ....structure.drive_sizes import largest, slowest
-from ...remedies import Finding, beyond_tolerance
+from ...accuracy_warnings import Finding, tolerance_warnings
 from ...results.notes import BOOKS
 from ...results.result import without_folders
 from ...rig.engines import knobs_idle
@@ -229,7 +229,7 @@ def warned(model, outcome, found: Answers, case: int, wide: bool, rings=()) -> l
         return list(rings)
     known = known_of(found, case)
     drift = {name: one for name, one in known.items() if name == "drift_per_cycle"}
-    return [*law_warnings(model, outcome, drift, 0.0), *rings, *beyond_tolerance(Finding(model, known))]
+    return [*law_warnings(model, outcome, drift, 0.0), *rings, *tolerance_warnings(Finding(model, known))]
 
 
 def _by_law(models: Alike, found: Answers) -> np.ndarray:

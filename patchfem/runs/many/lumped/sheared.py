@@ -17,8 +17,8 @@ from ....effects import has
 from ....model.model import Model
 from ....model.source import placed
 from ....response.errors import coarser_errors
+from ...accuracy_warnings import Finding, tolerance_warnings
 from ...patch import result as of_patch
-from ...remedies import Finding, beyond_tolerance
 from ...results.result import without_folders
 from ...results.travel import outcome_on_piece, travelled
 from ...rig.engines import PIECES, engine_of
@@ -140,7 +140,7 @@ def tell(found: Answers, case: int, model: Model, one: Pressed, reach: float) ->
     known = known_of(found, case)
     found.fill(case, one.measures)
     seen = Finding(model, one.measures | {name: m for name, m in known.items() if name != "normal_load"}, one.patch)
-    warned = without_folders([*one.warnings, *model.rig.notes, *travelled(one.patch, slide), *beyond_tolerance(seen)],
+    warned = without_folders([*one.warnings, *model.rig.notes, *travelled(one.patch, slide), *tolerance_warnings(seen)],
                              model.source.path)
     found.warnings.pop(case, None)
     if warned:

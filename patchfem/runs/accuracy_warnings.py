@@ -1,0 +1,343 @@
+"""Warnings about measures whose error exceeds the tolerance, each with the setting that makes them more accurate.
+
+The error of a measure is `safety * change / (ratio**order - 1)` (`response.errors`). So an error that exceeds what is
+allowed `excess` times needs a resolution that is `excess ** (1 / order)` times as fine. Read `tolerance_warnings`
+first, then `_motion_remedy`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import ceil, log2, pi
+from types import MappingProxyType
+from typing import NamedTuple
+
+from ..effects import has
+from ..response import rows
+from ..scales import plain
+from .patch import faces, ladder, press
+from .results import notes, patch_rows
+from .rig import costs, engines
+
+MAX_EXCESS = 1e9  # error over what is allowed; a larger one belongs to a value that is zero
+TIGHTER = 0.1  # ratio of a proposed tolerance to that of the scene, which gives a mesh of one halving more at least
+MAX_HALVINGS = 4  # halvings of the steps for which an order that was seen at two of them is trusted
+MIN_STEP_SHARE = (
+    0.2  # fraction of an allowed error that is left to the steps where other causes take all of it
+)
+MAX_STRIPS = 64  # number of strips proposed; four times the strips take about twenty times as long
+FIRST_ORDER = (
+    "pressure_peak",
+    "loaded_fraction",
+)  # measures that converge with the first power of the strips
+SAMPLED = (
+    "stick_fraction",
+    "slip_start_phase",
+)  # measures read off samples, however many harmonics there are
+RING = "ring_"  # prefix of the measures of a ring, which an engine without steps need not have
+STEADY = "relative_displacement_amplitude_steady"
+USE_ERROR = "use the value with its stated error"
+NO_REMEDY = f"no known setting makes this value more accurate; {USE_ERROR}"
+ELEMENT_SIZE = "contact.element_size"
+# measures that a run answers first: those among them that exceed the tolerance are named before all others
+MAIN = (
+    "relative_displacement_amplitude",
+    "absolute_acceleration_peak",
+    "loop_area",
+    "friction_ratio_peak",
+    "pressure_peak",
+    "contact_fraction",
+)
+
+
+class Finding(NamedTuple):
+    """Part of a result that the warnings depend on.
+
+    Attributes
+    ----------
+    model : Model
+    measures : dict
+        Measure by name.
+    patch : Patch, optional
+    extra : Mapping
+        As in a `Result`.
+    climbed : tuple
+        The patch before wear on the meshes of its ladder, fine to coarse, if it chose the mesh of a worn patch.
+    """
+
+    model: object
+    measures: dict
+    patch: object = None
+    extra: Mapping = MappingProxyType({})
+    climbed: tuple = ()
+
+
+def tolerance_warnings(found: Finding, coarse=(), still=()) -> list[str]:
+    """Return a warning about the static measures and one about those of the motion that exceed the tolerance.
+
+    Parameters
+    ----------
+    found : Finding
+    coarse : sequence of Patch
+        The patch on the coarser meshes of its ladder, if they are at hand.
+    still : sequence of Patch
+        The patch on the ladder of its static measures, fine to coarse, if that is another one.
+    """
+    model = found.model
+    tolerance = model.accuracy.tolerance
+    excess = {
+        name: min(measure.beyond(tolerance), MAX_EXCESS) for name, measure in found.measures.items()
+    }
+    excess = {name: times for name, times in excess.items() if times > 1}
+    has_faces = found.patch is None and model.faced
+    pressed = (
+        faces.measured(model) if has_faces else patch_rows.TABLE if found.patch is not None else ()
+    )
+    static = {name: times for name, times in excess.items() if name in pressed}
+    moving = {name: times for name, times in excess.items() if name not in pressed}
+    warnings = []
+    if has_faces:
+        warnings = faces.together(
+            model, lambda face: tolerance_warnings(_finding_of(found, face), face.patches[1:])
+        )
+    elif static:
+        at_rest, meshes = found, coarse
+        if still:
+            at_rest = found._replace(
+                model=replace(model, patch=replace(model.patch, still=True, slip=None)),
+                patch=still[0],
+            )
+            meshes = still[1:] or coarse
+        warnings = [_warning(found, static, _static_remedy(at_rest, static, meshes))]
+    if moving:
+        warnings.append(_warning(found, moving, _motion_remedy(found, moving, coarse)))
+    return warnings
+
+
+def _finding_of(found: Finding, face) -> Finding:
+    """Return the static measures of the patch of an interface, without the number behind their names."""
+    numbered = {
+        name: found.measures.get(rows.of_number(name, face.number)) for name in patch_rows.TABLE
+    }
+    own = {name: measure for name, measure in numbered.items() if measure is not None}
+    return Finding(face.model, own, face.patch)
+
+
+def _named_measures(found: Finding, excess: dict) -> list[str]:
+    """Return the main measures with an excess that are not zero within their error, else the one with the largest."""
+    known = found.measures
+    main = [name for name in MAIN if name in excess and known[name].error < abs(known[name].value)]
+    others = {name: times for name, times in excess.items() if not name.startswith(RING)} or excess
+    return main or [max(others, key=others.get)]
+
+
+def _warning(found: Finding, excess: dict, remedy: str) -> str:
+    """Return the warning that names the errors of the main measures, the tolerance and the remedy."""
+    names = _named_measures(found, excess)
+    first, *more = (f"of {_error_words(found.measures[name])}" for name in names)
+    listed = "".join(f", {name} {words}" for name, words in zip(names[1:], more, strict=True))
+    count = len(excess) - len(names)
+    others = ""
+    if count:
+        others = f" ({count} other measure{'s' * (count > 1)} also exceed{'s' * (count < 2)} the tolerance)"
+    tolerance = found.model.accuracy.tolerance
+    return f"{names[0]} has an estimated error {first}{listed}; the tolerance is {tolerance:g}{others}; {remedy}"
+
+
+def _error_words(measure) -> str:
+    if abs(measure.error) < abs(measure.value):
+        return f"{abs(measure.error / measure.value):.2g} of its value"
+    return f"at least its value ({measure})"
+
+
+def _static_remedy(found: Finding, excess: dict, coarse) -> str:
+    """Return what makes static measures more accurate: strips, or a mesh."""
+    asked, peak = found.model.patch, found.measures.get("pressure_peak")
+    is_wear_unbounded = (
+        "worn_depth_max" in _named_measures(found, excess)
+        and peak is not None
+        and peak.value is None
+    )
+    if is_wear_unbounded or max(excess.values()) >= MAX_EXCESS:
+        return NO_REMEDY
+    if asked.mesh is None and asked.strips is not None and asked.strips[0] > 1:
+        return _strip_remedy(asked, excess)
+    # the ladder of meshes ends where all decisive measures meet the tolerance, or at its limit
+    return _mesh_remedy(
+        found.model, [(found, coarse)], is_at_limit=excess.keys() <= set(patch_rows.DECISIVE)
+    )
+
+
+def _strip_remedy(asked, excess: dict) -> str:
+    """Return the number of strips that meets the tolerance.
+
+    The peak of the outermost strip is taken in its middle, so its error is of first order in the width of a strip. The
+    errors of all other measures are of second order, as those of the mesh.
+    """
+    ratio = max(times if name in FIRST_ORDER else times**0.5 for name, times in excess.items())
+    count = ceil(asked.strips[0] * ratio)
+    if count > MAX_STRIPS:
+        return NO_REMEDY
+    return f"set contact.strips.count = {count}" + (
+        "" if asked.chosen else f" and leave out {ELEMENT_SIZE}"
+    )
+
+
+def _mesh_remedy(model, places: list, *, is_at_limit: bool = False) -> str:
+    """Return what refines the mesh of each place, a pair of a Finding and its coarser patches."""
+    asked = [found.model.patch for found, _ in places]
+    cause = f"the mesh ({max(found.patch.x.size for found, _ in places)} interface nodes) causes this error"
+    if any(patch.mesh is not None for patch in asked):
+        return faces.in_scene(model, f"{cause}; split the elements of contact.mesh")
+    if not all(patch.chosen for patch in asked):
+        return faces.in_scene(model, f"{cause}; leave out {ELEMENT_SIZE}")
+    tolerances = [] if is_at_limit else [_refining_tolerance(*place) for place in places]
+    tolerances = [tolerance for tolerance in tolerances if tolerance is not None]
+    if tolerances:
+        return f"{cause}; set accuracy.tolerance = {min(tolerances):.3g} for a finer mesh"
+    seconds = max(
+        (
+            ladder.next_seconds(found.patch)
+            for found, _ in places
+            if isinstance(found.patch, press.Patch)
+        ),
+        default=0.0,
+    )
+    limit = ladder.most_seconds(asked[0])
+    if seconds > limit:
+        cause += (
+            f"; the next mesh would take about {plain(seconds, 2)} CPU s, and at most {limit:g} CPU s are spent "
+            "on a mesh of this scene"
+        )
+    return f"{cause}; no accuracy.tolerance leads to a finer mesh; {USE_ERROR}"
+
+
+def _refining_tolerance(found: Finding, coarse) -> float | None:
+    """Return the tolerance for which a patch takes a finer mesh; None if the ladder of its meshes has ended.
+
+    If the coarser meshes are not at hand, it is the tolerance of one halving more.
+    """
+    asked, tolerance = found.model.patch, found.model.accuracy.tolerance
+    if asked.meshes is not None and isinstance(found.patch, press.Patch):
+        if ladder.next_seconds(found.patch) > ladder.most_seconds(asked):
+            return None
+    if not any(coarse) or asked.meshes is not None:
+        return TIGHTER * tolerance
+    return ladder.climbs_at(
+        asked, found.climbed or [found.patch, *coarse], asked.mesh_tolerance or tolerance
+    )
+
+
+def _motion_remedy(found: Finding, excess: dict, coarse) -> str:
+    """Return what makes the main measure of a motion more accurate, by the largest part of its error.
+
+    A looser tolerance is no remedy: it chooses coarser steps and meshes.
+    """
+    model, extra = found.model, found.extra
+    name = max(_named_measures(found, excess), key=excess.get)
+    steps = extra.get("steps_per_cycle") or extra.get("steps")
+    cause = _main_cause(found, name)
+    if cause == "steps" and steps is not None:
+        return _step_remedy(found, name, excess, int(steps))
+    if cause == "end":
+        return _end_remedy(extra["cycles"], int(steps))
+    if cause == "mesh" and found.patch is not None:
+        return _mesh_remedy(model, [(found, coarse)])
+    if cause == "mesh":
+        soft = [face for face in faces.faces_of(model) if face.soft]
+        return _mesh_remedy(model, [(_finding_of(found, face), face.patches[1:]) for face in soft])
+    if cause == "reduced":  # the error falls with the square of the number of modes
+        ratio = min(max(2.0, excess[name] ** 0.5), 16.0)
+        return f"set structure.reduced.modes = {min(ceil(model.rig.modes.omega.size * ratio), model.rig.most)}"
+    if cause == "modes" and extra["shear_modes"] < found.patch.x.size:
+        return f"set accuracy.shear_modes = {min(4 * extra['shear_modes'], found.patch.x.size)}"
+    if cause == "bonds":
+        pinned = [
+            f"accuracy.{key}"
+            for key in ("tail", "merge")
+            if getattr(model.accuracy, key) is not None
+        ]
+        if pinned:
+            return f"leave out {' and leave out '.join(pinned)}"
+        return f"set accuracy.tolerance = {TIGHTER * model.accuracy.tolerance:.3g} to refine the sum over bonds"
+    if name == STEADY:  # the transient dies out in a longer run
+        return "more drive cycles make this value more accurate; raise drive.cycles"
+    if extra.get("harmonics") is None or name.startswith(SAMPLED):
+        return NO_REMEDY
+    return notes.more_harmonics(extra["harmonics"], _harmonics_of_friction(found))
+
+
+def _main_cause(found: Finding, name: str) -> str:
+    """Return the largest part of the error of a measure: one of the kinds of `response.coarser.left_open`."""
+    parts = found.extra.get("left_open")
+    if parts is not None:
+        return max(
+            parts["parts"], key=lambda kind: parts["parts"][kind].get(name, 0.0), default="own"
+        )
+    # a batch, which has no steps, or a run without an estimate
+    if found.extra.get("steps_per_cycle") or found.extra.get("steps"):
+        return "steps"
+    return "own" if found.patch is None else "mesh"
+
+
+def _step_remedy(found: Finding, name: str, excess: dict, steps: int) -> str:
+    """Return the steps per cycle that the order of convergence of a measure asks for, or what helps without one."""
+    model = found.model
+    parts = found.extra.get("left_open") or {"parts": {"steps": {name: 1.0}}, "orders": {name: 2.0}}
+    order = parts["orders"].get(name)
+    exact = ""
+    if model.kind == "rig" and model.accuracy.method != "exact" and not engines.inexact(model):
+        pinned = (
+            ""
+            if model.accuracy.steps_per_cycle is None
+            else "leave out accuracy.steps_per_cycle and "
+        )
+        exact = f'{pinned}set accuracy.method = "exact", which has no steps'
+    if order is None:
+        return f"{_no_order(name, steps)}; {exact or _default_steps(model, steps, excess)}"
+    total = sum(part.get(name, 0.0) for part in parts["parts"].values())
+    of_steps = parts["parts"].get("steps", {}).get(name, 1.0)
+    allowed = total / excess[name]
+    target = max(allowed - (total - of_steps), MIN_STEP_SHARE * allowed)
+    halvings = max(1, ceil(log2(of_steps / target) / order))
+    if exact and halvings > MAX_HALVINGS and not name.startswith(RING):
+        return exact
+    return f"set accuracy.steps_per_cycle = {steps * 2 ** min(halvings, notes.FARTHEST)}"
+
+
+def _no_order(name: str, steps: int) -> str:
+    return (
+        f"the steps per cycle were doubled twice, up to {steps}, and the second doubling changed {name} at least as "
+        "much as the first, so more steps may not help"
+    )
+
+
+def _default_steps(model, steps: int, excess: dict) -> str:
+    """Return that a run chooses its steps, which are doubled until the displacement meets the tolerance, if it may."""
+    is_pinned = model.kind == "rig" and model.accuracy.steps_per_cycle is not None
+    if is_pinned and 2 * steps <= costs.MOST_STEPS and "relative_displacement_amplitude" in excess:
+        return (
+            "leave out accuracy.steps_per_cycle, so that patchfem doubles the number of steps until the displacement "
+            "meets the tolerance"
+        )
+    return USE_ERROR
+
+
+def _end_remedy(cycles: float, steps: int) -> str:
+    """Return the steps per cycle, up to twice as many, that end a run closest to the end that was asked for.
+
+    They are a multiple of four, so that there are runs at half and at a quarter of them.
+    """
+    counts = range(4 * ceil(steps / 4), 2 * steps + 4, 4)
+    best = min(counts, key=lambda count: abs(cycles * count - round(cycles * count)))
+    return (
+        f"the run ends between two samples; set accuracy.steps_per_cycle = {best}, so that a sample lies closer to "
+        "the end of the run"
+    )
+
+
+def _harmonics_of_friction(found: Finding) -> float:
+    """Return the harmonics of a friction force that follows the speed: the largest speed over that of the law."""
+    law, slip = found.model.friction, found.measures.get("slip_amplitude")
+    if law is None or slip is None or not has(law.law, "creeps"):
+        return 0.0
+    return 2 * pi / found.extra["period"] * slip.value / law.reference_speed
