@@ -10,6 +10,7 @@ the errors of random scenes holds.
 """
 
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -152,6 +153,43 @@ def merged_cell_errors(fine: dict, *coarse: dict) -> dict:
     the square of its width. `dynamics.events.elements.JOINED` states where the merging begins.
     """
     return coarser_errors(fine, *coarse, ratio=4.0, order=2.0)
+
+
+class FrictionScale(NamedTuple):
+    """Sizes of a run that a fraction of the friction limit acts on.
+
+    static [1]: coefficient of friction; limit [N]: friction limit; bond_length [m]; work, cycle_work [J]: what friction
+    exchanges to and fro in the whole run and in a cycle.
+    """
+
+    static: float
+    limit: float
+    bond_length: float
+    work: float
+    cycle_work: float
+
+
+def friction_errors(values: dict, fraction: float, scale: FrictionScale) -> dict:
+    """Return errors by name of measures whose friction force is uncertain by a fraction of the friction limit.
+
+    Forces and slip have it directly, work as that fraction of what went to and fro, the store as that of a bond length
+    at the limit, and every other measure as that fraction of its value.
+
+    Parameters
+    ----------
+    values : dict
+        Values of the measures by name.
+    fraction : float
+        Error of the friction force over the friction limit [1].
+    scale : FrictionScale
+    """
+    ratio, force = fraction * scale.static, fraction * scale.limit
+    work = fraction * scale.work
+    direct = {"friction_force_peak": force, "friction_ratio_end": ratio, "friction_ratio_peak": ratio,
+              "slip_amplitude": fraction * scale.bond_length, "work_check": fraction,
+              "energy_stored": force * scale.bond_length, "friction_work": work, "energy_dissipated": work,
+              "loop_area": fraction * scale.cycle_work, "energy_balance": 0.0, "normal_load": 0.0}
+    return {name: direct.get(name, fraction * abs(value)) for name, value in values.items()}
 
 
 def orders(fine: dict, half: dict, quarter: dict) -> dict:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...effects import has, listed
 from ...response.coarser import Coarser, coarser_space, estimate, left_open
-from ...response.errors import convergence_errors, finer_errors, step_errors
+from ...response.errors import FrictionScale, convergence_errors, finer_errors, friction_errors, step_errors
 from ...slip import shear_modes
 from . import bench, rigid, shear
 from .engine import ELEMENTS, LIST, LISTS, PLANE, STEPPED, slips_by_elements
@@ -43,7 +43,7 @@ def errors_of(model, patches: list, fine, steps: int, say=None) -> tuple:
     errors, seconds = estimate(solve, fine.values, ladder, made)
     kinds = [one.of for one in ladder]
     if sum_error(model, fine.engine):
-        errors, kinds = [*errors, sum_errors_of_bench(model, fine)], [*kinds, "bonds"]
+        errors, kinds = [*errors, _sum_errors(model, fine)], [*kinds, "bonds"]
     runs = [fine.values, *(made[one].values for one in ladder[0].runs)]
     return errors, seconds, left_open(kinds, errors, runs)
 
@@ -81,19 +81,10 @@ def sum_error(model, engine) -> float:
     return tail_of(model) if engine.kind in (STEPPED, PLANE) and listed(model.friction) else 0.0
 
 
-def sum_errors_of_bench(model, fine) -> dict:
-    """Error by measure name that follows from the bound of the sum over bonds, which is a share of the friction limit:
-    forces and slip directly, work as that share of what went to and fro, the store as that of a bond length at the
-    limit."""
-    error, f, power = sum_error(model, fine.engine), model.friction, float(np.abs(np.diff(fine.ledger[0])).sum())
-    force = error * f.static
-    out = {"friction_force_peak": force * float(fine.load.max()), "friction_ratio_end": force,
-           "friction_ratio_peak": force, "slip_amplitude": error * f.bond_length, "work_check": error}
-    out |= {name: error * power for name in ("friction_work", "energy_dissipated")}
-    out["energy_stored"] = out["friction_force_peak"] * f.bond_length
-    out["energy_created"] = error * fine.values["energy_created"]
-    out["loop_area"] = error * float(np.abs(np.diff(fine.ledger[0][fine.first:])).sum())
-    out |= {f"{name}_stiffness": error * abs(fine.values.get(f"{name}_stiffness", 0.0)) for name in ("equivalent",
-                                                                                                     "secant")}
-    return {name: value for name, value in out.items() if name in fine.values} | \
-        {name: 0.0 for name in fine.values if name not in out}
+def _sum_errors(model, fine) -> dict:
+    """Return `friction_errors` of the sum over bonds of a pass."""
+    work = np.abs(np.diff(fine.ledger[0]))
+    friction = model.friction
+    scale = FrictionScale(friction.static, friction.static * float(fine.load.max()), friction.bond_length,
+                          float(work.sum()), float(work[fine.first:].sum()))
+    return friction_errors(fine.values, sum_error(model, fine.engine), scale)

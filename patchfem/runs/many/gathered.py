@@ -24,7 +24,7 @@ from ...model.model import Model
 from ...model.source import placed
 from ...response import run_events
 from ...response.coarser import left_open
-from ...response.errors import coarser_errors, step_errors
+from ...response.errors import FrictionScale, coarser_errors, friction_errors, step_errors
 from ...response.measures import energy_balance
 from ...response.reasons import SHARED
 from ...response.ringing import LEAST_PERIODS, SHORT
@@ -250,7 +250,8 @@ def _with_errors(models: list, held: list, reads: tuple, counts: tuple) -> tuple
     for case in range(n):
         a, b, c, d = ({name: float(part[case]) for name, part in one.items() if not np.isnan(part[case])}
                       for one in whole)
-        few = _left_out(a, TWICE * held[case].error, held[case].fine, fine.book["passed"][case])
+        few = _left_out(a, TWICE * held[case].error, models[case].friction.static, held[case].fine,
+                        fine.book["passed"][case])
         own = fine.own[case]
         parts.append((step_errors(a, b, c, steps=steps), coarser_errors(c, d, order=2.0), few, own))
         for name, value in a.items():
@@ -262,14 +263,14 @@ def _with_errors(models: list, held: list, reads: tuple, counts: tuple) -> tuple
     return runs, parts
 
 
-def _left_out(values: dict, share: float, points: lanes.Points, passed: float) -> dict:
-    """Errors by name that follow from a share of the friction limit that modes and points leave out, as
-    `engines.sum_errors` has them of a sum; passed [J]: what went to and fro."""
-    force, length = share * points.limit.sum(), points.length
-    direct = {"friction_force_peak": force, "slip_amplitude": share * length, "work_check": share,
-              "friction_work": share * passed, "energy_dissipated": share * passed, "energy_balance": 0.0,
-              "normal_load": 0.0, "loop_area": 4 * force * (values["slip_amplitude"] + length)}
-    return {name: direct.get(name, share * abs(value)) for name, value in values.items()}
+def _left_out(values: dict, fraction: float, static: float, points: lanes.Points, work: float) -> dict:
+    """Return `friction_errors` of a fraction [1] of the friction limit that modes and points leave out.
+
+    static [1]: coefficient of friction; work [J]: what friction exchanged to and fro.
+    """
+    limit = points.limit.sum()
+    cycle_work = 4 * limit * (values["slip_amplitude"] + points.length)
+    return friction_errors(values, fraction, FrictionScale(static, limit, points.length, work, cycle_work))
 
 
 def _tell(found: Answers, case: int, model: Model, one: _Pressed, reads: tuple, parts: tuple, steps: int) -> None:

@@ -125,10 +125,8 @@ def values(patch: Patch) -> dict:
     The node at the edge of a step stands for half a cell on either side of it: the weighted mean of the patch where all
     of it bears and where none does.
     """
-    if not patch.either:
-        return _values(patch)
-    parts = [(weight, _values(one)) for weight, one in patch.either]
-    return {name: sum(weight * found[name] for weight, found in parts) for name in parts[0][1]}
+    parts = [(weight, _values(part)) for weight, part in patch.either or ((1.0, patch),)]
+    return {name: float(sum(weight * found[name] for weight, found in parts)) for name in parts[0][1]}
 
 
 def _values(patch: Patch) -> dict:

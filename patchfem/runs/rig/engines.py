@@ -17,7 +17,14 @@ from ...dynamics.events.elements import JOINED
 from ...effects import NO_WAVEFORM, has
 from ...model.model import Model
 from ...response.coarser import Coarser, coarser_space
-from ...response.errors import coarser_errors, finer_errors, merged_cell_errors, step_errors
+from ...response.errors import (
+    FrictionScale,
+    coarser_errors,
+    finer_errors,
+    friction_errors,
+    merged_cell_errors,
+    step_errors,
+)
 from ...scene.rules import methods
 from ...scene.rules.draft import acts, pinned
 from ...slip import shear_modes
@@ -237,7 +244,7 @@ def _summed(model: Model, few, patch, solution) -> list:
     choice = solution.summed
     if choice is None or not choice.error:
         return []
-    out = [Coarser((), lambda fine: sum_errors(model, patch, choice.error, fine, solution), of="bonds")]
+    out = [Coarser((), lambda fine: _sum_errors(model, patch, choice.error, fine, solution), of="bonds")]
     if choice.merge > 0 or choice.tail > LOOSE * model.accuracy.tolerance:
         finer = replace(choice, merge=FINER * choice.merge, tail=LESS * choice.tail)
         same, narrow = (Variant(replace(few, choice=one), patch) for one in (choice, finer))
@@ -245,21 +252,15 @@ def _summed(model: Model, few, patch, solution) -> list:
     return out
 
 
-def sum_errors(model: Model, patch, error: float, values: dict, solution) -> dict:
-    """Errors by measure name that follow from the bound of a sum over bonds, a share of the friction limit.
-
-    error: of the sum [1]; values: measures of the run. Forces and slip have it directly, work as that share of what
-    went to and fro, the store as that of a bond length at the limit, all else as a share of its value.
-    """
-    load = patch.pressure.load if patch is not None else model.point.load
-    force, ledger = error * model.friction.static * load, solution.window.extra["ledger"][0]
+def _sum_errors(model: Model, patch, fraction: float, values: dict, solution) -> dict:
+    """Return `friction_errors` of a sum over bonds whose error is a fraction [1] of the friction limit."""
+    friction, load = model.friction, patch.pressure.load if patch is not None else model.point.load
+    passed = np.abs(np.diff(solution.window.extra["ledger"][0])).sum()
     span = solution.window.time[-1] - solution.window.time[0]
-    passed = error * solution.book["passed"]
-    direct = {"friction_force_peak": force, "slip_amplitude": error * model.friction.bond_length, "work_check": error,
-              "energy_stored": force * model.friction.bond_length, "friction_work": passed, "energy_dissipated": passed,
-              "loop_area": error * float(np.abs(np.diff(ledger)).sum()) * model.rig.drive.period / max(span, 1e-300),
-              "energy_balance": 0.0, "normal_load": 0.0}
-    return {name: direct.get(name, error * abs(value)) for name, value in values.items()}
+    cycle_work = passed * model.rig.drive.period / max(span, 1e-300)
+    scale = FrictionScale(friction.static, friction.static * load, friction.bond_length, solution.book["passed"],
+                          cycle_work)
+    return friction_errors(values, fraction, scale)
 
 
 def _own_errors(model: Model, numerics, patch, coarse, solution) -> list:
