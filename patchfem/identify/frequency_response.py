@@ -8,9 +8,9 @@ every peak by about 1/T, which a fit to the estimate reads as damping: `driven_m
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import csd, welch
 
 from ..core import PatchfemError
+from ..response.welch import CrossDensities, average_segments, transform_segments
 
 UNEVEN = 1e-3  # of a step, that sampling times may be off; text holds them with six digits
 AVERAGES = 8  # lengths of a segment in a record, unless one is asked for
@@ -60,20 +60,18 @@ def h1(step: float, force, response, segment: int | None = None, window: str | N
     if not 64 <= segment <= force.size:
         raise PatchfemError(f"a segment has {segment} samples; at least 64, and at most the {force.size} samples of "
                             "the record, are needed")
-    asked = {"fs": 1 / step, "window": "boxcar" if window == "none" else window, "nperseg": segment,
-             "noverlap": segment // 2, "detrend": "constant" if window == "hann" else False}
-    frequency, own = welch(force, **asked)
-    cross = csd(force, response, **asked)[1]
-    kept = (frequency > (1.5 / (segment * step) if window == "hann" else 0)) & (frequency <= TOP / (2 * step))
-    kept &= own > FAINT * own[kept].max(initial=0.0)
-    if not kept.any() or not own.max() > 0:
+    frequency, transforms = transform_segments(step, (force, response), segment, has_window=window == "hann")
+    found = average_segments(*transforms)
+    # a window widens the mean of a segment to one and a half lines
+    lowest = 1.5 / (segment * step) if window == "hann" else 0.0
+    kept = (frequency > lowest) & (frequency <= TOP / (2 * step))
+    kept &= found.input > FAINT * found.input[kept].max(initial=0.0)
+    if not kept.any() or not found.input.max() > 0:
         raise PatchfemError("the input is zero, so there is no response to it")
-    count = 1 + (force.size - segment) // (segment - segment // 2)
-    coherence = None
-    if count > 1:
-        out = np.maximum(welch(response, **asked)[1], 1e-300)
-        coherence = (np.abs(cross)**2 / (np.maximum(own, 1e-300) * out))[kept]
-    return Estimate(frequency[kept], cross[kept] / own[kept], own[kept], coherence, segment, count, window)
+    found = CrossDensities(*(part[kept] for part in found))
+    count = transforms.shape[1]
+    coherence = found.coherence() if count > 1 else None
+    return Estimate(frequency[kept], found.cross / found.input, found.input, coherence, segment, count, window)
 
 
 def _rests(response) -> bool:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core import PatchfemError
-from ..response.decay_curve import HalfSwings, smoothed
+from ..response.decay_curve import HalfSwings, smooth_slopes
 
 FEWEST = 5  # samples of a half swing
 SINE = 3e-5  # of half a period and of a half swing, what a sine fitted to few samples leaves without noise
@@ -137,8 +137,8 @@ def _again(time, value, found: list, viscous) -> list:
     noise = _noise(found)
     middle, size, share, wide = (np.array([getattr(one, name) for one in found]) for name in (
         "middle", "size", "middle_share", "size_share"))
-    lengths = smoothed(middle, noise * share)
-    rates = -smoothed(np.log(np.abs(size)), noise * wide / np.abs(size)) / lengths if viscous else 0 * lengths
+    lengths = smooth_slopes(middle, noise * share)
+    rates = -smooth_slopes(np.log(np.abs(size)), noise * wide / np.abs(size)) / lengths if viscous else 0 * lengths
     out = [_fitted(time, value, one.middle, length, rate) for one, length, rate in zip(found, lengths, rates)]
     return out[:next((k for k, one in enumerate(out) if one is None), len(out))]
 

@@ -165,66 +165,121 @@ def of_turns(times, places, size=None) -> HalfSwings:
 
 
 def curve_of(swings: HalfSwings) -> DecayCurve:
-    """Frequency and damping over the amplitude, at points whose spans overlap by half, of a computed motion at every
-    half swing; without a point where there are fewer than three half swings."""
-    count, log = swings.size.size, np.log(swings.size)
-    noise = _at_least(swings.size_noise / swings.size, log)
-    wide = _at_least(swings.middle_noise, swings.middle)
-    if not (noise.any() or wide.any()):
-        return _of_computed(swings.middle, log) if count > 2 else DecayCurve(*np.empty((6, 0)))
-    out, k = [], 1
-    while k < count - 1:
-        fall, fall_error, span = _slope(log, noise, k)
-        half, half_error, other = _slope(swings.middle, wide, k)
-        out.append(_point(swings.middle[k], _level(log, k, span), (half, half_error), (fall, fall_error)))
-        k += max(1, min(span, other)) if wide.any() else 1
-    found = DecayCurve(*(np.array(part) for part in zip(*out))) if out else DecayCurve(*np.empty((6, 0)))
+    """Return frequency and damping against amplitude from the half swings of a decay.
+
+    A computed decay has a point at each inner half swing, a measured one at half swings whose spans
+    overlap by half. Fewer than three half swings give no point.
+    """
+    if swings.size.size < 3:
+        return DecayCurve(*np.empty((6, 0)))
+    log = np.log(swings.size)
+    fall = fit_slopes(log, _at_least(swings.size_noise / swings.size, log))
+    noise = _at_least(swings.middle_noise, swings.middle)
+    half = fit_slopes(swings.middle, noise)
+    at = np.arange(half.span.size)
+    if noise.any():
+        at = _overlap_by_half(np.minimum(half.span, fall.span))
+    half, fall = half.at(at), fall.at(at)
+    tilt = np.hypot(np.pi, fall.slope)
+    found = DecayCurve(
+        time=swings.middle[1 + at],
+        amplitude=np.exp(_smooth_levels(log, 1 + at, fall.span)) / 2,
+        frequency=0.5 / half.slope,
+        frequency_error=0.5 * half.error / half.slope**2,
+        damping=-fall.slope / tilt,
+        damping_error=fall.error * np.pi**2 / tilt**3,
+    )
     return _between_turns(found) if found.time.size > 1 else found
 
 
-def _of_computed(middle, log) -> DecayCurve:
-    """The curve at every inner half swing (k,) of a motion without noise, of all at once: a fraction of a second for
-    25 000 half swings, where one after the other takes ten."""
-    fall, fall_error, span = _slopes(log)
-    half, half_error, _ = _slopes(middle)
-    size = np.empty(span.size)
+def _overlap_by_half(span) -> np.ndarray:
+    """Choose inner places (n,) so that the spans about them overlap by half."""
+    out = [0]
+    while (place := out[-1] + max(1, int(span[out[-1]]))) < span.size:
+        out.append(place)
+    return np.array(out)
+
+
+def _smooth_levels(values, places, span) -> np.ndarray:
+    """Return the least-squares parabola over the span about each place, at the place."""
+    out = np.empty(places.size)
     for m in np.unique(span):
-        at = np.flatnonzero(span == m)
-        size[at] = sliding_window_view(log, 2 * m + 1)[at + 1 - m] @ _parabola(m)
-    found = DecayCurve(*_point(middle[1:-1], size, (half, half_error), (fall, fall_error)))
-    return _between_turns(found) if found.time.size > 1 else found
+        here = span == m
+        out[here] = sliding_window_view(values, 2 * m + 1)[places[here] - m] @ _parabola(m)
+    return out
 
 
-def _point(middle, size, half, fall) -> tuple:
-    """A point of a DecayCurve, numbers or (k,): middle [s], size [1], logarithm of the half swing; half [s] and fall
-    [1], slopes of middle and size, each with its error."""
-    tilt = np.hypot(np.pi, fall[0])
-    return (middle, np.exp(size) / 2, 0.5 / half[0], 0.5 * half[1] / half[0]**2, -fall[0] / tilt,
-            fall[1] * np.pi**2 / tilt**3)
+class Slopes(NamedTuple):
+    """Slopes (k,) per half swing, the half-widths of their intervals, and their spans."""
+
+    slope: np.ndarray
+    error: np.ndarray
+    span: np.ndarray
+
+    def at(self, pick) -> "Slopes":
+        """Return some of the slopes."""
+        return Slopes(*(part[pick] for part in self))
 
 
-def _slopes(values) -> tuple:
-    """(slopes, half-widths, spans) (n - 2,) of `_slope` at all inner places of values (n,) without noise."""
+def fit_slopes(values, noise) -> Slopes:
+    """Fit the slope at each inner place of a series, over the longest span that all shorter ones allow.
+
+    A span ends before one whose slope differs from that of a shorter one by more than the noise of both
+    allows (Lepski 1991). The error is that by noise, and what the slope may be off by as it is a mean:
+    its change over the next longer span m', of whose bias it has the share (m/m')^2; at the ends, its
+    change over the next shorter one.
+
+    Parameters
+    ----------
+    values : (n,) array
+        Values at the half swings.
+    noise : (n,) array
+        Their standard deviations; 0 for a computed motion.
+
+    Returns
+    -------
+    Slopes
+        At the n - 2 inner places.
+    """
     count = values.size - 2
-    slope, before, change, span = np.empty(count), np.empty(count), np.full(count, np.nan), np.ones(count, int)
-    alive, tried = np.ones(count, bool), []
+    slope = np.empty(count)
+    spread = np.zeros(count)
+    bias = np.full(count, np.nan)
+    shorter_change = np.full(count, np.nan)  # Change over the next shorter span, less its noise.
+    span = np.zeros(count, int)
+    grows = np.ones(count, bool)
+    tried: list = []
     for m in SPANS:
-        if 2 * m >= values.size or not alive.any():
+        if 2 * m >= values.size or not grows.any():
             break
-        one, x = np.full(count, np.nan), np.arange(-m, m + 1)
-        one[m - 1:count - m + 1] = np.correlate(values, x / (x @ x), "valid")
-        reached = alive & ~np.isnan(one)
-        close = reached & np.all([np.abs(one - other) <= ROUND * np.abs(other) for other in tried] or [reached], axis=0)
-        change[reached & ~close] = np.abs(one - slope)[reached & ~close]
-        ended = alive & ~reached & (span > 1)
-        change[ended] = np.abs(slope - before)[ended]
-        before[close], slope[close], span[close] = slope[close], one[close], m
-        alive, tried = close, [*tried, one]
-    ended = alive & (span > 1)
-    change[ended] = np.abs(slope - before)[ended]
-    ends = (span == 1) & np.isnan(change)
-    change[ends] = np.abs(np.diff(values, 2))[ends] / 2
-    return slope, change + ROUND * np.abs(slope), span
+        weight = np.arange(-m, m + 1) / np.sum(np.arange(-m, m + 1) ** 2)
+        inside = slice(m - 1, count - m + 1)
+        wide, wide_spread = np.full((2, count), np.nan)
+        wide[inside] = np.correlate(values, weight, "valid")
+        wide_spread[inside] = np.sqrt(np.correlate(noise**2, weight**2, "valid"))
+        reached = grows & ~np.isnan(wide)
+        agrees = reached.copy()
+        for other, other_spread in tried:
+            excess = np.sqrt(np.maximum(other_spread**2 - wide_spread**2, 0.0))
+            limit = APART * excess + ROUND * np.abs(other)
+            agrees &= ~(np.abs(wide - other) > limit)
+        change = np.abs(wide - slope)
+        ends = reached & ~agrees
+        bias[ends] = change[ends]
+        is_longer = agrees & (span > 0)
+        shorter_change[is_longer] = np.maximum(change - spread, 0.0)[is_longer]
+        still = ends & (spread > 0)
+        bias[still] /= (m / span[still]) ** 2 - 1
+        slope[agrees], spread[agrees], span[agrees] = wide[agrees], wide_spread[agrees], m
+        grows = agrees
+        tried.append((wide, wide_spread))
+    at_end = np.isnan(bias)
+    bias[at_end] = shorter_change[at_end]
+    # Next to an end there is no other span; the second difference tells of the bend if nothing is noisy.
+    only = np.isnan(bias)
+    bend = np.abs(np.diff(values, 2)) / 2
+    bias[only] = np.where(spread > 0, 0.0, bend)[only]
+    return Slopes(slope, SURE * spread + bias + ROUND * np.abs(slope), span)
 
 
 def _between_turns(found: DecayCurve) -> DecayCurve:
@@ -236,43 +291,10 @@ def _between_turns(found: DecayCurve) -> DecayCurve:
         getattr(found, name))) for name in ("frequency", "damping")})
 
 
-def smoothed(values, noise) -> np.ndarray:
-    """Slopes (n,) per half swing of values (n,) with standard deviations (n,); at both ends that of the neighbour."""
-    inner = [_slope(values, noise, k)[0] for k in range(1, values.size - 1)]
-    return np.array([inner[0], *inner, inner[-1]])
-
-
-def _slope(values, noise, k: int) -> tuple:
-    """(slope per half swing, half-width of its interval, span m) at place k of values (n,) with standard deviations
-    (n,)."""
-    room, found = min(k, values.size - 1 - k), []
-    for m in SPANS:
-        if m > room:
-            break
-        part, x = slice(k - m, k + m + 1), np.arange(-m, m + 1)
-        weight = x / (x @ x)
-        slope, spread = float(weight @ values[part]), float(np.sqrt(weight**2 @ noise[part]**2))
-        if any(abs(slope - one) > APART * np.sqrt(max(wide**2 - spread**2, 0.0)) + ROUND * abs(one)
-               for one, wide, _ in found):
-            break
-        found.append((slope, spread, m))
-    slope, spread, m = found[-1]
-    return slope, SURE * spread + _bend(values, k, room, found) + ROUND * abs(slope), m
-
-
-def _bend(values, k: int, room: int, found: list) -> float:
-    """What the slope of the last span found may be off by as it is a mean: its change over the next longer span, of
-    whose bias it has a share (m/m')^2, less what noise makes of it; at the ends, over the shorter one."""
-    slope, spread, m = found[-1]
-    wider = next((one for one in SPANS if m < one <= room), 0)
-    if wider:
-        x = np.arange(-wider, wider + 1)
-        change = abs(float(x @ values[k - wider:k + wider + 1]) / float(x @ x) - slope)
-        return change / ((wider / m)**2 - 1) if spread else change
-    if len(found) > 1:
-        return max(abs(slope - found[-2][0]) - found[-2][1], 0.0)
-    low = values[max(k - 1, 0):k + 2]
-    return abs(float(low[2] - 2 * low[1] + low[0])) / 2 if not spread else 0.0
+def smooth_slopes(values, noise) -> np.ndarray:
+    """Return the slopes (n,) per half swing of values (n,); at both ends that of the neighbour."""
+    slope = fit_slopes(values, noise).slope
+    return np.concatenate([slope[:1], slope, slope[-1:]])
 
 
 def _at_least(noise, values) -> np.ndarray:
@@ -284,11 +306,6 @@ def _at_least(noise, values) -> np.ndarray:
     low, high = (np.clip(np.arange(values.size) - 1 + side, 0, seen.size) for side in (-BESIDE, BESIDE))
     whole = np.concatenate([[0.0], np.cumsum(seen)])
     return np.sqrt(np.maximum(noise**2, (whole[high] - whole[low]) / np.maximum(high - low, 1)))
-
-
-def _level(log, k: int, m: int) -> float:
-    """The parabola over a span at its middle."""
-    return float(_parabola(m) @ log[k - m:k + m + 1])
 
 
 def _parabola(m: int) -> np.ndarray:

@@ -14,6 +14,8 @@ from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import least_squares
 from scipy.special import stdtrit
 
+from .welch import CrossDensities, Segments, average_segments, transform_segments
+
 PARTS = 16  # lengths of a segment in the record
 GROUPS = 10  # parts of the record by which its scatter is told; of segments, each left out in turn
 WIDE = 6.0, 8.0  # half-width of the band of a fit, in half-power widths and in lines
@@ -119,29 +121,24 @@ def steady(window, drive) -> bool:
     return bool(abs(first.std() - last.std()) <= 2 * np.hypot(rms_scatter(first), rms_scatter(last)))
 
 
-def segments(record: Record) -> tuple:
-    """(frequency (q,) [Hz], transforms (3, m, q) of drive, place and acceleration over m segments, scaled so that
-    2 |X|^2 is a density)."""
+def segments(record: Record) -> Segments:
+    """Transform drive, place and acceleration over segments of a sixteenth of a record."""
     size = max(min(LEAST, record.place.size), 2 * (record.place.size // (2 * PARTS)))
-    taper = np.sin(np.pi * np.arange(size) / size)**2  # Hann's, periodic
-    starts = np.arange(0, record.place.size - size + 1, size // 2)
-    cut = np.stack([one[starts[:, None] + np.arange(size)] for one in record[1:]])
-    cut = (cut - cut.mean(axis=2, keepdims=True)) * taper
-    return np.fft.rfftfreq(size, record.step), np.fft.rfft(cut) * np.sqrt(record.step / np.sum(taper**2))
+    return transform_segments(record.step, record[1:], size)
 
 
 def spectra(window, drive) -> Spectra:
     """The Spectra of a Response `window`, up to twice the highest frequency of the drive."""
-    frequency, (push, place, gain) = segments(record_of(window, drive))
-    own, other, far = (2 * np.mean(np.abs(one)**2, axis=0) for one in (push, place, gain))
-    cross = 2 * np.mean(push.conj() * place, axis=0)
-    driven = (frequency >= drive.band[0]) & (frequency <= drive.band[1])
-    safe = np.where(driven, own, np.inf)
-    kept = (frequency > 0) & (frequency <= 2 * drive.band[1])
-    with np.errstate(invalid="ignore"):
-        coherence = np.where(driven, np.abs(cross)**2 / (safe * np.maximum(other, 1e-300)), np.nan)
-    return Spectra(*(one[kept] for one in (frequency, own, other, far, np.where(driven, cross / safe, np.nan),
-                                           coherence)))
+    frequency, (push, place, acceleration) = segments(record_of(window, drive))
+    low, high = drive.band
+    shown = (frequency > 0) & (frequency <= 2 * high)
+    found = CrossDensities(*(part[shown] for part in average_segments(push, place)))
+    far = average_segments(push, acceleration).output[shown]
+    frequency = frequency[shown]
+    driven = (frequency >= low) & (frequency <= high)
+    gain = np.where(driven, found.cross / np.where(driven, found.input, np.inf), np.nan)
+    coherence = np.where(driven, found.coherence(), np.nan)
+    return Spectra(frequency, found.input, found.output, far, gain, coherence)
 
 
 def peak(record: Record, band: tuple) -> tuple | None:

@@ -12,10 +12,13 @@ from scipy.optimize import brentq
 import patchfem as pf
 from patchfem.campaigns.backbone.curves import backbone
 from patchfem.response.decay_curve import (
+    APART,
+    ROUND,
+    SPANS,
+    SURE,
     DecayCurve,
-    _slope,
-    _slopes,
     curve_of,
+    fit_slopes,
     last_swing,
     of_turns,
     turns,
@@ -37,16 +40,41 @@ def test_exact_a_viscous_decay_has_one_frequency_and_one_ratio(zeta):
     assert found.amplitude.size > 6 and (np.diff(found.amplitude) < 0).all()
 
 
-@pytest.mark.parametrize("count", [3, 4, 5, 7, 8, 40, 700])
-def test_exact_slopes_at_all_places_at_once_are_those_of_one_place_after_the_other(count):
-    """Straight at first, then bent, then with noise of which nobody tells: spans of all lengths, and both ends."""
+def slope_at(values, noise, k):
+    """(slope, half-width, span) at one place, one span after the other, as `fit_slopes` has it at all places."""
+    room, found = min(k, values.size - 1 - k), []
+    for m in SPANS:
+        part, x = slice(k - m, k + m + 1), np.arange(-m, m + 1)
+        weight = x / (x @ x)
+        if m > room:
+            break
+        slope, spread = weight @ values[part], np.sqrt(weight**2 @ noise[part]**2)
+        if any(abs(slope - one) > APART * np.sqrt(max(wide**2 - spread**2, 0.0)) + ROUND * abs(one)
+               for one, wide, _ in found):
+            share = (m / found[-1][2])**2 - 1 if found[-1][1] else 1.0
+            bias = abs(slope - found[-1][0]) / share
+            break
+        found.append((slope, spread, m))
+    else:
+        raise AssertionError("a series longer than all spans")
+    slope, spread, m = found[-1]
+    if m == max(one for one in SPANS if one <= room):
+        bend = 0.0 if spread else abs(np.diff(values[k - 1:k + 2], 2)[0]) / 2
+        bias = bend if len(found) == 1 else max(abs(slope - found[-2][0]) - found[-2][1], 0.0)
+    return slope, SURE * spread + bias + ROUND * abs(slope), m
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.03])
+@pytest.mark.parametrize("count", [3, 4, 5, 7, 8, 40, 500])
+def test_exact_slopes_at_all_places_at_once_are_those_of_one_place_after_the_other(count, noise):
+    """Straight at first, then bent, then with noise: spans of all lengths, and both ends."""
     k, r = np.arange(count), np.random.default_rng(count)
     for values in (k / 4, np.where(k < count // 2, k / 4, k / 4 + (k - count // 2)**2 / 64), k + 0.1 * r.random(count)):
-        slope, error, span = _slopes(values)
-        one = [_slope(values, np.zeros(count), place) for place in range(1, count - 1)]
-        assert slope == pytest.approx(np.array([each[0] for each in one]), rel=1e-13)
-        assert error == pytest.approx(np.array([each[1] for each in one]), rel=1e-9, abs=1e-13)
-        assert (span == [each[2] for each in one]).all()
+        found = fit_slopes(values, np.full(count, noise))
+        one = [slope_at(values, np.full(count, noise), place) for place in range(1, count - 1)]
+        assert found.slope == pytest.approx(np.array([each[0] for each in one]), rel=1e-13)
+        assert found.error == pytest.approx(np.array([each[1] for each in one]), rel=1e-9, abs=1e-13)
+        assert (found.span == [each[2] for each in one]).all()
 
 
 def viscous(zeta: float, omega: float, samples: int):
