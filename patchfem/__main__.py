@@ -95,14 +95,6 @@ SCREEN = {
               "cite": (start, "BibTeX of a scene's sources", "joint.toml")}}
 VERBS = {verb: row[0] for verbs in SCREEN.values() for verb, row in verbs.items()}
 
-REMOVED_OPTIONS = {  # (verb, option): what to do in its place
-    ("profile", "--level"): "read the material ratio of a level from the Abbott curve of the page (-o)",
-    ("profile", "--ratios"): "read the heights of two material ratios from the Abbott curve of the page (-o)",
-    ("profile", "--tip"): "compare the tip radius with 1/rms_curvature, which profile prints",
-    ("sweep", "--device"): "batches of cases run on the processor; share them by -j N or --executor dask",
-    ("report", "--measured"): "convert the file with `patchfem import FILE -o table.csv` and plot table.csv together "
-                              "with result.nc of the run in a plotting program"}
-
 OUT_OF_MEMORY = ("out of memory; if a key of the scene sets the size of the largest part of the "
                  "memory, `patchfem plan` names this part and the key")
 
@@ -131,11 +123,11 @@ def _unexpected(verb: str, left: list) -> str:
 
 def _removed_option(words: list) -> str:
     """State what replaces the first option among the words that was removed; "" without such an option."""
-    for word in words[1:]:
-        option = word.partition("=")[0]
-        if (words[0], option) in REMOVED_OPTIONS:
-            return f"{words[0]} {option} was removed in patchfem 1.0; {REMOVED_OPTIONS[words[0], option]}"
-    return ""
+    from .scene.keys.removed import sentence_on_option
+
+    options = (word.partition("=")[0] for word in words[1:] if word.startswith("--"))
+    sentences = (sentence_on_option(words[0], option, f"{words[0]} {option}") for option in options)
+    return next(filter(None, sentences), "")
 
 
 def known(words: list) -> None:

@@ -35,8 +35,7 @@ from .export.fits import request as fits
 from .export.pages import lead, released, words
 from .export.surfaces import compare as compared_data
 from .export.surfaces import pairs as pairs_data
-from .export.surfaces import roughness, worn
-from .export.surfaces.worn_runs import compare_runs
+from .export.surfaces import roughness, worn, worn_runs
 from .export.sweeps import folder, page, tables
 from .export.sweeps import run as sweep_run
 from .mesh import files as mesh_files
@@ -51,6 +50,7 @@ from .runs.results import result as run_result
 from .runs.run import run as run_plan
 from .scene import axes, starting
 from .scene.changed import Base
+from .scene.keys import removed
 from .scene.keys.quantities import parse
 from .scene.scene import Scene, SceneError, loads, text_of, with_files
 from .scene.scene import load as load_file
@@ -85,6 +85,18 @@ def _by_key(function: Callable) -> Callable:
             if isinstance(error, SceneError):
                 error.mistakes = [PLACES.sub("", one) for one in error.mistakes]
             raise
+    return called
+
+
+def _refuse_removed(function: Callable) -> Callable:
+    """Make a function refuse the arguments that were removed, in one sentence."""
+    @wraps(function)
+    def called(*args: Any, **named: Any) -> Any:
+        verb = function.__name__
+        for name in named:
+            if sentence := removed.sentence_on_option(verb, f"--{name}", f"{verb}: {name}"):
+                raise PatchfemError(sentence)
+        return function(*args, **named)
     return called
 
 
@@ -353,6 +365,7 @@ def _words(given: str | Iterable[str], what: str) -> tuple:
     return tuple(_word(one, what) for one in listed)
 
 
+@_refuse_removed
 def profile(*files: str | Path, cutoff: float | str | None = None, window: Iterable | None = None,
             units: tuple[str, str] | None = None) -> dict[str, Any]:
     """Compute the roughness of measured traces or areal scans: the dict of `patchfem profile --json`, in SI.
@@ -374,6 +387,7 @@ def profile(*files: str | Path, cutoff: float | str | None = None, window: Itera
     return {"profiles": [roughness.data_of(one) for one in reports], "means": roughness.means_data(reports)}
 
 
+@_refuse_removed
 def report(folders: str | Path | Iterable[str | Path], /, out: str | Path | None = None) -> Path:
     """Put the results folders of a list side by side on one page and return the path of the page. For a single sweep,
     rebuild the page of the sweep.
@@ -476,7 +490,7 @@ def compare(*files: str | Path, direction: str = "", units: tuple[str, str] | No
     if pairs is None and len(files) > 1 and any(Path(one).is_dir() for one in files):
         if len(files) > 2 or direction or units is not None or shift is not None or keep_spikes or datum:
             raise PatchfemError("compare: give two results folders alone, without other files or settings of traces")
-        lost = compare_runs(*map(Path, files))
+        lost = worn_runs.compare_runs(*map(Path, files))
         return worn.data_of(lost, worn.verdict(lost))
     if pairs is None:
         return compared_data.data_of(*verdict.judged(files, direction, **how))

@@ -10,8 +10,7 @@ from ..campaigns import compare as pressing
 from ..export import results, summary
 from ..export.surfaces import compare as paper
 from ..export.surfaces import pairs as pairs_paper
-from ..export.surfaces import worn
-from ..export.surfaces.worn_runs import compare_runs
+from ..export.surfaces import worn, worn_runs
 from ..surface import profile
 from ..surface.compare import pairs as tables
 from ..surface.compare import verdict
@@ -81,7 +80,7 @@ def compare(before: Path | None = None, after: Path | None = None, /, *other: Pa
         raise Refused("compare: give two files BEFORE and AFTER, or a table of pairs with --pairs")
     folders = before.is_dir(), after.is_dir()
     if any(folders) and len(files) == 2 and not all(folders):
-        compare_runs(before, after)  # which refuses a file beside a folder
+        worn_runs.compare_runs(before, after)  # which refuses a file beside a folder
     if any(folders):
         _no_traces({"a third file": other, "--direction": direction, "--units": units, "--shift": shift,
                     "--keep-spikes": keep_spikes, "--datum": datum, "--scene": scene, "--set": set_})
@@ -136,7 +135,7 @@ def _no_traces(asked: dict):
 
 def _runs(before: Path, after: Path, out, json_: bool):
     """What wore off between the runs in two results folders."""
-    lost = compare_runs(before, after)
+    lost = worn_runs.compare_runs(before, after)
     found = worn.verdict(lost)
     data, target = worn.data_of(lost, found), placed(out, f"{before.resolve().name}-{after.resolve().name}")
     with results.Folder(target) as folder:

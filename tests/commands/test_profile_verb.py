@@ -108,9 +108,6 @@ def test_exact_means_over_files_a_table_of_them_and_the_levelled_heights(tmp_pat
 @pytest.mark.parametrize("words, says", [
     (("--cutoff", "0.25"), "patchfem: profile --cutoff: '0.25' is a bare number without a unit"),
     (("--cutoff", "-1 mm"), "patchfem: profile --cutoff -1 mm: a length above zero is needed"),
-    (("--tip", "5 um"), "patchfem: profile --tip was removed in patchfem 1.0; compare the tip radius with"),
-    (("--level=1 um",), "patchfem: profile --level was removed in patchfem 1.0; read the material ratio"),
-    (("--ratios", "5,50"), "patchfem: profile --ratios was removed in patchfem 1.0; read the heights of two"),
     (("--cutoff", "5 mm"), "the trace is 4 mm long; half a cut-off of 5 mm is trimmed at each end"),
     (("--window", "1 mm"), "--window '1 mm': two positions are needed, such as '468 um,733 um'; a scan needs four"),
     (("--window", "1 mm,9 mm"), "the window runs from 1 mm to 9 mm, but the trace runs from 0 um to 4 mm"),

@@ -247,7 +247,6 @@ def test_exact_one_object_on_stdout(scene, tmp_path):
     (["--over", "normal.load=-1 N,-2 N"], ["-1 N", "-2 N"]),
     (["--set", "drive.cycles=0", "--over", "normal.load=1 N,2 N"], ["drive.cycles: must be > 0"]),
     ([], ["no key to sweep is given"]),
-    (["--over", "normal.load=1 N,2 N", "--device", "cuda"], ["sweep --device was removed in patchfem 1.0"]),
     (["--over", "friction.static=0.1..0.2:4000", "--over", "normal.load=1 N..2 N:4000"], ["16000000 cases, more "
                                                                                           "than"]),
 ])

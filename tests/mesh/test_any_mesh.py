@@ -283,9 +283,6 @@ def test_refuses_decks_it_cannot_use(text, message, tmp_path):
 def test_refuses_endings_and_files_it_does_not_know(tmp_path):
     with pytest.raises(PatchfemError, match="no such mesh file"):
         read_pieces(tmp_path / "none.med")
-    (tmp_path / "pair.unv").write_text("    -1")
-    with pytest.raises(PatchfemError, match=r"removed in patchfem 1\.0; use \.med or \.msh"):
-        read_pieces(tmp_path / "pair.unv")
     (tmp_path / "pair.stl").write_text("solid")
     with pytest.raises(PatchfemError, match=r"from \.msh, \.vtu, \.inp or \.med"):
         read_pieces(tmp_path / "pair.stl")

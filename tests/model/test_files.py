@@ -54,8 +54,6 @@ FAULTS = {
                     "contact.mesh", "a.msh: Nodes announces 9999999 entries"),
     "mesh, .inp": (mesh_text(), "a.inp", "*NODE\n1,0,0\n", "contact.mesh", "a.inp: no cells or nodes are tagged "
                                                                            "lower_far"),
-    "mesh, .unv": (mesh_text(), "a.unv", "    -1\n", "contact.mesh", "a.unv: the reader of .unv meshes was removed in "
-                                                                     "patchfem 1.0; use .med or .msh"),
     "mesh, .vtu": (mesh_text(), "a.vtu", "<?xml version='1.0'?>", "contact.mesh", "a.vtu: not a readable .vtu file"),
 }  # fmt: skip
 

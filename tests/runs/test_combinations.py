@@ -140,10 +140,6 @@ def test_always_the_words_stand_in_few_files():
 
 @pytest.mark.parametrize("text, sets, key, says", [
     (SHAKEN, [*STIFFENS, "accuracy.method=exact"], "accuracy.method", "exists with [structure.stiffening]; use 'mar"),
-    *[(POINT + RUBS + SHAKEN, [f"accuracy.method={name}"], "accuracy.method",
-       f"'{name}' was removed in patchfem 1.0; use 'march'") for name in ("duhamel", "newmark", "euler")],
-    *[(POINT + RUBS + SHAKEN, [f"accuracy.{key}"], f"accuracy.{key.split('=')[0]}", "was removed in patchfem 1.0")
-      for key in ("convergence=force", "convergence_tolerance=1e-4", "stick_speed=1 mm/s")],
     (POINT + RUBS + SHAKEN, [*BONDS, "friction.breakaway=0.2", "accuracy.quadrature=direct"], "accuracy.quadrature",
      "'direct' with friction.breakaway in a rig is not supported yet; use 'recursion' or 'auto'"),
     (PATCH + RUBS + SHAKEN, [*BONDS, *LOWER, "accuracy.quadrature=merged"], "accuracy.quadrature",

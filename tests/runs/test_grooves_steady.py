@@ -10,7 +10,7 @@ from patchfem.dynamics.march.march import march
 from patchfem.model.model import build
 from patchfem.runs.rig import interface
 from patchfem.runs.rig.numerics import choose
-from patchfem.scene.scene import SceneError, loads
+from patchfem.scene.scene import loads
 
 RIG = """
 [normal]
@@ -140,8 +140,6 @@ def test_always_a_curve_over_frequency_passes_the_points_of_single_runs():
 def test_always_the_plan_says_how():
     said = "the steady motion is found by a time integration whose initial state is corrected until the motion repeats"
     assert all(said in pf.plan(scene(law)).verdict for law in ("coulomb", "elastic-plastic"))
-    with pytest.raises(SceneError, match=r"accuracy.harmonics: harmonic balance .* was removed in patchfem 1.0; leave"):
-        scene("elastic-plastic", "accuracy.harmonics=15")
 
 
 def test_always_pieces_that_give_way_move_as_a_march_has_them():

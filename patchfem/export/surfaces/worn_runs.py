@@ -74,7 +74,7 @@ class PatchRun(NamedTuple):
     and friction force [N] (k,) of the last cycle, None without a drive; cycles of wear.
     """
 
-    run: beside.FinishedRun
+    run: "beside.FinishedRun"
     path: str
     surface: PatchSurface
     pressure: np.ndarray

@@ -8,25 +8,16 @@ from . import removed
 from .types import Share, Table, key, number, whole
 
 
-def _still_summed(value: object) -> object:
-    """An engine of the sum over bonds; ValueError for the one that 0.4 had besides."""
-    if value == "exponential":
-        raise ValueError("'exponential' was removed: this method supported only the orders 0, 1 and 2 of reading "
-                         "'report', and a run with it was at most 1.4 times faster; use 'merged'")  # fmt: skip
+def _refuse_removed(value: object) -> object:
+    """Return a value of a key; ValueError for one that was removed."""
+    for values in (removed.METHODS, removed.QUADRATURES):
+        if isinstance(value, str) and value in values:
+            raise ValueError(values[value])
     return value
 
 
-Summing = Annotated[Literal["auto", "direct", "truncated", "merged", "recursion"], BeforeValidator(_still_summed)]
-
-
-def _still_a_method(value: object) -> object:
-    """Return a method; ValueError for one that was removed."""
-    if isinstance(value, str) and value in removed.METHODS:
-        raise ValueError(removed.METHODS[value])
-    return value
-
-
-Method = Annotated[Literal["auto", "exact", "march", "harmonic"], BeforeValidator(_still_a_method)]
+Summing = Annotated[Literal["auto", "direct", "truncated", "merged", "recursion"], BeforeValidator(_refuse_removed)]
+Method = Annotated[Literal["auto", "exact", "march", "harmonic"], BeforeValidator(_refuse_removed)]
 
 
 class Accuracy(Table):

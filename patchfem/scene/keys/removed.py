@@ -1,15 +1,40 @@
-"""What patchfem 1.0 no longer takes, and what to use instead."""
+"""Options, keys and values that patchfem 1.0 no longer takes, and what to use instead."""
 
-METHODS = {
-    name: f"'{name}' was removed in patchfem 1.0; use 'march' (studies/integrators compares the methods)"
+VERSION = "patchfem 1.0"
+METHODS = {  # values of accuracy.method
+    name: f"'{name}' was removed in {VERSION}; use 'march' (studies/integrators compares the methods)"
     for name in ("duhamel", "newmark", "euler")
 }
 LAWS_OVER_GROOVES = ("iwan", "bouc-wen", "lugre")
+QUADRATURES = {"exponential": f"'exponential' was removed in {VERSION}; use 'merged'"}  # values of accuracy.quadrature
 KEYS = {
-    f"accuracy.{name}": f"this key of method '{method}' was removed in patchfem 1.0; use method 'march' without it"
+    f"accuracy.{name}": f"this key of method '{method}' was removed in {VERSION}; use method 'march' without it"
     for name, method in (
         ("convergence", "duhamel"),
         ("convergence_tolerance", "duhamel"),
         ("stick_speed", "newmark"),
     )
 }
+OPTIONS = {  # (verb, option): what to do instead
+    ("profile", "--level"): "read the material ratio of a level from the Abbott curve of the page (-o)",
+    ("profile", "--ratios"): "read the heights of two material ratios from the Abbott curve of the page (-o)",
+    ("profile", "--tip"): "compare the tip radius with 1/rms_curvature, which profile prints",
+    ("report", "--measured"): "convert the file with `patchfem import FILE -o table.csv` and plot table.csv together "
+    "with result.nc of the run in a plotting program",
+    ("sweep", "--device"): "batches of cases run on the processor; share them by -j N or --executor dask",
+}
+
+
+def sentence_on_option(verb: str, option: str, name: str) -> str:
+    """State that an option was removed and what to do instead; "" for an option that was not.
+
+    Parameters
+    ----------
+    verb, option : str
+        Words of the command line, such as "profile" and "--tip".
+    name : str
+        Option as the sentence calls it, such as "profile --tip" or, in Python, "profile: tip".
+    """
+    if (verb, option) not in OPTIONS:
+        return ""
+    return f"{name} was removed in {VERSION}; {OPTIONS[verb, option]}"

@@ -201,7 +201,9 @@ def _why(before: Profile, after: Profile, match: Match, valleys: Match) -> str:
                 f"{_apart(found)}; {MARK}")
     mean, scatter = valleys.chance
     return (f"the two traces show no common part: the best correlation of their valleys is {valleys.likeness:.2f}, but "
-            f"only values above {np.tanh(mean + CLEAR * scatter):.2f} are significant; {MARK}")
+            f"only values above {np.tanh(mean + CLEAR * scatter):.2f} are significant; {MARK}; if the "
+            "heights of one trace count into the material, change their sign (the search for such traces was removed "
+            "in patchfem 1.0)")
 
 
 def _period(before: Profile, after: Profile) -> float:

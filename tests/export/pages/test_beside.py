@@ -4,7 +4,6 @@ import re
 
 import numpy as np
 import pytest
-from command_line import cli
 from page_data import charts_of
 
 from patchfem.core import Measure, PatchfemError
@@ -102,15 +101,6 @@ def test_refuses_a_summary_of_another_shape(tmp_path, text, why):
     (tmp_path / "summary.json").write_text(text)
     with pytest.raises(PatchfemError, match=f"cannot be read: summary.json is not a summary of a run: .*{why}"):
         read(tmp_path)
-
-
-def test_exact_the_removed_option_measured_says_what_to_use(tmp_path):
-    folder = made(tmp_path / "a", 10.0, 2e-6, 0.0)
-    for words in (("--measured", "table.csv"), ("--measured=table.csv",)):
-        answer = cli("report", folder, *words, "-o", tmp_path / "p.html")
-        assert answer.code == 2 and not (tmp_path / "p.html").exists()
-        assert "report --measured was removed in patchfem 1.0" in answer.err
-        assert "patchfem import" in answer.err
 
 
 def test_always_a_browser_draws_it(tmp_path, browser):

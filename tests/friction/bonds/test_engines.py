@@ -180,8 +180,6 @@ def test_exact_engine_of_a_scene(tmp_path):
 def test_refuses_engines_that_cannot_sum_the_law(tmp_path):
     with pytest.raises(scene.SceneError, match=r"accuracy\.quadrature.*order = 1"):
         rig(tmp_path, "recursion")
-    with pytest.raises(scene.SceneError, match=r"accuracy\.quadrature: 'exponential' was removed.*use 'merged'"):
-        rig(tmp_path, "exponential")
 
 
 def test_exact_warning_of_energy_created(tmp_path):

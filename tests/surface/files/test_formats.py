@@ -148,13 +148,9 @@ def test_refuses_a_faulty_x3p_by_name(tmp_path, made, said):
 
 
 @pytest.mark.parametrize("data", [write.sdf_binary(Z), write.sdf_ascii(Z)], ids=["binary", "text"])
-def test_always_sdf_is_left_to_the_extra_profiles(tmp_path, data):
-    """The own reader was removed in patchfem 1.0."""
-    if find_spec("SurfaceTopography") is None:
-        with pytest.raises(Missing, match=r"pip install 'patchfem\[profiles\]', or export the surface as text"):
-            read(tmp_path, data, "scan.sdf")
-    else:
-        assert read(tmp_path, data, "scan.sdf").z == pytest.approx(Z, rel=1e-9)
+@pytest.mark.skipif(find_spec("SurfaceTopography") is None, reason="the extra `profiles` is not installed")
+def test_exact_sdf_is_read_by_the_extra_profiles(tmp_path, data):
+    assert read(tmp_path, data, "scan.sdf").z == pytest.approx(Z, rel=1e-9)
 
 
 def test_always_steep_heights_in_a_file_that_says_metres_are_told(tmp_path):

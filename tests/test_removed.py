@@ -1,0 +1,101 @@
+"""What patchfem 1.0 removed is refused with one sentence, which names what to use instead."""
+
+from functools import partial
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+import surfaces
+from command_line import cli
+from scene_texts import COULOMB, DRIVE, KEYS, MODE, NONLOCAL, POINT
+
+import patchfem as pf
+from patchfem.mesh.files import read_pieces
+from patchfem.scene.keys import removed
+from patchfem.surface.files.read import read_surface
+
+RIG = POINT + COULOMB + MODE + DRIVE
+GROOVED = MODE.join([POINT + 'grooves = {wavelength = "80 um", amplitude = "7.5 um"}\n', DRIVE]) + COULOMB
+BONDS = POINT + NONLOCAL + MODE + DRIVE
+
+
+def load(text: str, keys: dict, folder) -> None:
+    pf.load(text, **keys)
+
+
+def command(words: tuple, folder) -> None:
+    """Run a command, and raise what it prints where it ends with exit code 2."""
+    answer = cli(*words)
+    assert answer.code == 2
+    raise pf.PatchfemError(answer.err)
+
+
+def call(function, name: str, folder) -> None:
+    function(folder, **{name: "5 um"})
+
+
+def read_file(reader, name: str, folder) -> None:
+    path = folder / name
+    path.write_text("    -1\n", "utf-8")
+    reader(path)
+
+
+def match_inverted(folder) -> None:
+    """Compare a trace with the same trace turned upside down."""
+    x = np.arange(4001) * 1e-3
+    z = np.convolve(np.random.default_rng(1).normal(size=x.size), np.ones(20) / 20, "same")
+    for name, heights in (("before.csv", z), ("after.csv", -z)):
+        rows = "\n".join(f"{place:.4f},{height:.6f}" for place, height in zip(x, heights))
+        (folder / name).write_text(f"x [mm],z [um]\n{rows}\n", "utf-8")
+    raise pf.PatchfemError(pf.compare(folder / "before.csv", folder / "after.csv")["worn_depth_mean"]["reason"])
+
+
+TRIED = {  # what was removed -> (how a user tries it, what the sentence says to use instead)
+    **{f"method {name}": (partial(load, RIG, {"accuracy.method": name}), "use 'march'") for name in removed.METHODS},
+    **{key: (partial(load, RIG, {key: 1.0}), "use method 'march' without it") for key in removed.KEYS},
+    "quadrature exponential": (partial(load, BONDS, {"accuracy.quadrature": "exponential"}), "use 'merged'"),
+    "harmonics over grooves": (
+        partial(load, GROOVED, {"accuracy.method": "harmonic", "accuracy.harmonics": 15}),
+        "leave `harmonics` out",
+    ),
+    **{
+        f"law {law} over grooves": (partial(load, GROOVED + KEYS[law], {"friction.law": law}), "use law 'coulomb'")
+        for law in removed.LAWS_OVER_GROOVES
+    },
+    "oscillating load over grooves": (
+        partial(load, GROOVED, {"normal.amplitude": "10 N", "normal.frequency": "20 Hz"}),
+        "leave one of the two out",
+    ),
+    "profile --level": (partial(command, ("profile", "a.csv", "--level=1 um")), "Abbott curve of the page"),
+    "profile --ratios": (partial(command, ("profile", "a.csv", "--ratios", "5,50")), "Abbott curve of the page"),
+    "profile --tip": (partial(command, ("profile", "a.csv", "--tip", "5 um")), "compare the tip radius with"),
+    "report --measured": (partial(command, ("report", "out", "--measured", "a.csv")), "`patchfem import FILE"),
+    "sweep --device": (partial(command, ("sweep", "a.toml", "--device=cuda")), "-j N or --executor dask"),
+    "profile(tip=)": (partial(call, pf.profile, "tip"), "compare the tip radius with"),
+    "report(measured=)": (partial(call, pf.report, "measured"), "`patchfem import FILE"),
+    ".unv mesh": (partial(read_file, read_pieces, "pair.unv"), "use .med or .msh"),
+    "inverted trace": (match_inverted, "change their sign"),
+}
+
+
+@pytest.mark.parametrize("name", TRIED)
+def test_refuses_what_was_removed(tmp_path, name):
+    attempt, instead = TRIED[name]
+    with pytest.raises(pf.PatchfemError) as refused:
+        attempt(tmp_path)
+    sentence = str(refused.value)
+    assert "removed in patchfem 1.0" in sentence and instead in sentence
+    assert len(sentence.strip().splitlines()) == 1
+
+
+def test_always_every_removed_option_is_tried():
+    assert {" ".join(pair) for pair in removed.OPTIONS} <= set(TRIED)
+    assert {f"quadrature {name}" for name in removed.QUADRATURES} <= set(TRIED)
+
+
+@pytest.mark.skipif(find_spec("SurfaceTopography") is not None, reason="the extra `profiles` is installed")
+def test_refuses_an_sdf_file_without_the_extra(tmp_path):
+    path = tmp_path / "scan.sdf"
+    path.write_bytes(surfaces.sdf_binary(surfaces.scan()))
+    with pytest.raises(pf.Missing, match=r"pip install 'patchfem\[profiles\]', or export the surface as text"):
+        read_surface(path)
