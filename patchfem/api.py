@@ -25,9 +25,10 @@ from .campaigns.sweeps import ask, executors
 from .campaigns.sweeps import asked as case_models
 from .core import Measure, Missing, NotConverged, Outcome, PatchfemError
 from .export import backbone as backbone_files
-from .export import chosen, histories, shown
+from .export import chosen, histories
 from .export import cost as cost_files
 from .export import folder as results_folder
+from .export import report as run_page
 from .export import reports as page_of_several
 from .export import summary as summaries
 from .export.drawing import pictures, swept
@@ -630,7 +631,7 @@ class Plots:
 
         with TemporaryDirectory() as room:
             made = bodies.write_fields(self._result, Path(room) / "fields.vtkhdf")
-        return self._drawn(ax, ("bodies",), "the pieces do not touch, or their mesh is not a grid", {"bodies": made})
+        return self._drawn(ax, ("bodies",), "the pieces do not touch, or their mesh is not a grid", made)
 
     def _still(self) -> str:
         if self._result.response is not None:
@@ -638,10 +639,10 @@ class Plots:
         return "a static patch does not move; add [friction] with [slide], or with [structure] and [drive]" \
             if self._result.plan.kind == "patch" else "no motion was computed"
 
-    def _drawn(self, ax: Axes | None, names: tuple, lack: str, more: dict | None = None) -> Axes:
+    def _drawn(self, ax: Axes | None, names: tuple, lack: str, bodies: dict | None = None) -> Axes:
         if ax is not None and not hasattr(ax, "errorbar"):
             raise PatchfemError(f"plot.{names[0]}: matplotlib Axes are needed as ax, not {ax!r:.60}")
-        found = shown.axes(self._result, names, ax, more)
+        found = run_page.axes(self._result, names, ax, bodies)
         if found is not None:
             return found
         raise PatchfemError(f"plot.{names[0]}: nothing to draw: {lack}")

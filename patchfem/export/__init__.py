@@ -13,8 +13,8 @@ In: a `Result`. Out: files. A module imports its own entry of this list and the 
 9. `lab`        histories and loops in the formats of laboratories
 10. `drawing`   drawings as SVG, films, a script for ParaView
 11. `pages`     pages whose pictures the browser draws
-12. `report`    report.html of a run
-13. `shown`     the data of its page and its pictures
+12. `page_data` what the page and the pictures of a run show
+13. `report`    report.html of a run, and its pictures
 14. `folder`    a finished run on disk
 15. `sweeps`    a sweep on disk
 16. `reports`   one page over runs or sweeps

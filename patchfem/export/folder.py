@@ -11,7 +11,7 @@ from ..core import Missing, NotConverged, PatchfemError
 from ..disk.whole import write_text
 from ..runs.results.result import Result, without_folders
 from ..runs.run import KeptState, marches, run
-from . import netcdf, shown
+from . import netcdf, report
 from .fields import bodies as body_fields
 from .histories import contents
 from .pages import player
@@ -111,7 +111,7 @@ def write_page(written: Written, folder: Path) -> Path:
 
     Missing where another run has replaced the folder in the meantime.
     """
-    text, path = shown.page_of(written.result, written.bodies, player.reel(folder)), Path(folder) / PAGE
+    text, path = report.page_of(written.result, written.bodies, player.reel(folder)), Path(folder) / PAGE
     if not path.parent.is_dir() or _place(path.parent) != written.place:
         raise Missing(f"{folder}: replaced by another run while the page was drawn")
     write_text(path, text)

@@ -1,6 +1,7 @@
 """report.html: one page that stands alone, the verdict first; the browser draws its pictures, nothing is fetched."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from html import escape
 from typing import NamedTuple
 
@@ -8,83 +9,114 @@ import numpy as np
 
 from .. import scales
 from ..effects import shown_absent
-from .drawing import charts
+from ..runs.results.result import Result
+from .drawing import charts, pictures
+from .page_data import RunData, data_of
 from .pages import player
 from .pages.document import Section, document, prose, table, warned
 from .pages.driven import changed
-from .pages.words import SHARP, G, headline, in_order, linked, of_records, others, pair, texts, units
+from .pages.words import (
+    SHARP,
+    G,
+    headline,
+    in_order,
+    linked,
+    of_records,
+    others,
+    pair,
+    texts,
+    units,
+)
 from .results import MOST
 
 SETTLED = ("steady", "stuck", "done")
 DASH = "&ndash;"
 ROOM = 700_000  # characters that the numbers of all charts may take: with library and player below 3 MB
-FILES = (("fields.vtkhdf", "fields of both pieces and their interface, frame by frame (ParaView 5.13 or newer)"),
-         ("interfaces", "fields, in the same format, of every interface that has a patch of its own"),
-         ("summary.json", "measures, outcome, warnings, effects and numerics"),
-         ("result.nc", "histories and fields along the interface (xarray, MATLAB, ncdump)"),
-         ("scene.resolved.toml", "the scene in SI units, with all default values"))
+FILES = (
+    (
+        "fields.vtkhdf",
+        "fields of both pieces and their interface, frame by frame (ParaView 5.13 or newer)",
+    ),
+    ("interfaces", "fields, in the same format, of every interface that has a patch of its own"),
+    ("summary.json", "measures, outcome, warnings, effects and numerics"),
+    ("result.nc", "histories and fields along the interface (xarray, MATLAB, ncdump)"),
+    ("scene.resolved.toml", "the scene in SI units, with all default values"),
+)
 
 
-def part_of_cycle(data: dict) -> bool:
-    """Whether the run ended before its first cycle did."""
-    count = data.get("cycles")
-    return count is not None and count < 1 - 1e-6
-
-
-def pressed(data: dict) -> bool:
-    """Whether there is a patch and some of it is in contact."""
-    return data["x"] is not None and bool(data["fields"]) and bool(np.any(data["fields"]["normal_stress"][0] > 0))
-
-
-def verdict(data: dict) -> str:
+def verdict(data: RunData) -> str:
     """The answer of a run in a few sentences of HTML, with the error of each number."""
-    answer = f"<b>{escape(data['summary']['outcome'])}</b>: {prose(data['sentence'])}"
-    text = headline(data["summary"], data.get("cycles"), lambda number, name: linked(number, name, " class=v"),
-                    data.get("released", ""))
-    return f"{answer}{escape(charts.regime(data.get('steady')))} {text}".strip()
+    known = data.verdict
+    answer = f"<b>{escape(known.summary['outcome'])}</b>: {prose(known.sentence)}"
+    text = headline(
+        known.summary,
+        known.cycles,
+        lambda number, name: linked(number, name, " class=v"),
+        known.released,
+    )
+    return f"{answer}{escape(charts.regime(known.steady))} {text}".strip()
 
 
-def page(data: dict) -> str:
-    """The whole HTML page from the plain data of a run, as `shown.report_data` gives them."""
-    summary = data["summary"]
-    title = summary["title"] or data.get("name") or "patchfem run"
-    of = f"Scene: {escape(title)} &middot; " if data.get("sets") else ""  # whose title tells of the values before
-    title = changed(data["sets"]) if of else title
-    motion = f" &middot; {escape(data['driven'])}" if data.get("driven") else ""
-    lead = [f"<p class=soft>{of}patchfem {escape(summary['patchfem'])} &middot; {escape(summary['kind'])}{motion} "
-            f"&middot; engine {escape(data['engine'] or 'static')} &middot; "
-            f"computed in {summary['seconds'].get('total', 0):.2f} s</p>",
-            f"<p class=verdict>{verdict(data)}</p>"]
-    warnings = [w for w in summary["warnings"] if w != data["sentence"]]
+def page(data: RunData) -> str:
+    """Return the whole HTML page of a run."""
+    summary = data.verdict.summary
+    title = summary["title"] or data.source.name or "patchfem run"
+    of = (
+        f"Scene: {escape(title)} &middot; " if data.source.sets else ""
+    )  # its title speaks of the values before
+    title = changed(data.source.sets) if of else title
+    motion = f" &middot; {escape(data.source.driven)}" if data.source.driven else ""
+    lead = [
+        f"<p class=soft>{of}patchfem {escape(summary['patchfem'])} &middot; {escape(summary['kind'])}{motion} "
+        f"&middot; engine {escape(data.verdict.engine or 'static')} &middot; "
+        f"computed in {summary['seconds'].get('total', 0):.2f} s</p>",
+        f"<p class=verdict>{verdict(data)}</p>",
+    ]
+    warnings = [w for w in summary["warnings"] if w != data.verdict.sentence]
     lead.append(warned(warnings, "Warnings"))
     lead += [f"<p class=soft>Note: {prose(text)}</p>" for text in summary["notes"]]
     drawn, shown = figures(data)
     drawn = charts.within(drawn, ROOM)
     sections = [Section("pictures", "Pictures", shown)] if drawn else []
-    film = data.get("film") if pressed(data) else None
+    film = data.patch.film if data.patch.touches() else None
     if film is not None:
         sections.append(player.section(film))
-    if "measured" in data:
+    if data.measured is not None:
         sections += _table_one(data)
-    if "levels" in data:
-        sections.append(_table_of_levels(data["levels"]))
+    if data.evaluations.levels is not None:
+        sections.append(_table_of_levels(data.evaluations.levels))
     sections += [_measures(data), _cost(data), _origin(data)]
-    scripts = ("figures.js", *(("curves.js",) if drawn else ()), *(("stage.js", "player.js") if film else ()))
-    return document(title, "".join(lead), sections, {"charts": drawn} | ({"player": film} if film else {}),
-                    scripts if drawn or film else ())
+    scripts = (
+        "figures.js",
+        *(("curves.js",) if drawn else ()),
+        *(("stage.js", "player.js") if film else ()),
+    )
+    return document(
+        title,
+        "".join(lead),
+        sections,
+        {"charts": drawn} | ({"player": film} if film else {}),
+        scripts if drawn or film else (),
+    )
 
 
-def figures(data: dict) -> tuple:
+def figures(data: RunData) -> tuple:
     """The charts that this run has something to show in, each with its anchor, and the HTML of their places."""
     drawn, places = [], []
     for found in (picture(name, data) for name in PICTURES):
         if found is None:
             continue
-        made = [one | {"anchor": f"chart{len(drawn) + number}"} for number, one in
-                enumerate(found.charts(*found.values))]
-        cells = "".join(f'<div id="{one["anchor"]}" class=chart role=img aria-label="{escape(one["title"])}"></div>'
-                        for one in made)
-        places.append(f"<figure><div class=row>{cells}</div><figcaption>{prose(found.caption)}</figcaption></figure>")
+        made = [
+            one | {"anchor": f"chart{len(drawn) + number}"}
+            for number, one in enumerate(found.charts(*found.values))
+        ]
+        cells = "".join(
+            f'<div id="{one["anchor"]}" class=chart role=img aria-label="{escape(one["title"])}"></div>'
+            for one in made
+        )
+        places.append(
+            f"<figure><div class=row>{cells}</div><figcaption>{prose(found.caption)}</figcaption></figure>"
+        )
         drawn += made
     return drawn, "\n".join(places)
 
@@ -97,62 +129,90 @@ class Picture(NamedTuple):
     caption: str
 
 
-def picture(name: str, data: dict) -> Picture | None:
+def picture(name: str, data: RunData) -> Picture | None:
     """The picture of this name (a key of PICTURES), None where the run has nothing to show in it."""
     return PICTURES[name](data)
 
 
-def _curve(data: dict) -> Picture | None:
-    found = data.get("curve")
-    text = data.get("driven", "")
-    return None if found is None else Picture(charts.curve, (found,), charts.caption(found) + (
-        f" {text[0].upper()}{text[1:]}." if text else ""))
+def _curve(data: RunData) -> Picture | None:
+    found, text = data.evaluations.curve, data.source.driven
+    return (
+        None
+        if found is None
+        else Picture(
+            charts.curve,
+            (found,),
+            charts.caption(found) + (f" {text[0].upper()}{text[1:]}." if text else ""),
+        )
+    )
 
 
-def _spectra(data: dict) -> Picture | None:
-    if "spectra" not in data:
+def _spectra(data: RunData) -> Picture | None:
+    if data.evaluations.spectra is None:
         return None
-    found = data["summary"]["measures"]
+    found = data.verdict.summary["measures"]
     at = found.get("response_frequency", {}).get("value")
-    told = "" if at is None else (
-        " The peak of H1 is marked by a ring. It is the peak of a mode at {} ({}) with a damping ratio of {} ({}), "
-        "friction included.".format(
-            *of_records("response_frequency", found), *of_records("response_damping", found)))
-    return Picture(charts.spectra, (data["spectra"], at), "One-sided spectral densities of output and drive, and the "
-                                                          "frequency response H1 (displacement of the output divided "
-                                                          "by acceleration of the base). H1 is drawn "
-                   f"faint where the coherence is below {charts.COHERENT:g}.{told}")
+    told = (
+        ""
+        if at is None
+        else (
+            " The peak of H1 is marked by a ring. It is the peak of a mode at {} ({}) with a damping ratio of {} ({}), "
+            "friction included.".format(
+                *of_records("response_frequency", found), *of_records("response_damping", found)
+            )
+        )
+    )
+    return Picture(
+        charts.spectra,
+        (data.evaluations.spectra, at),
+        "One-sided spectral densities of output and drive, and the "
+        "frequency response H1 (displacement of the output divided "
+        "by acceleration of the base). H1 is drawn "
+        f"faint where the coherence is below {charts.COHERENT:g}.{told}",
+    )
 
 
-def _decay(data: dict) -> Picture | None:
-    if "decay" not in data:
+def _decay(data: RunData) -> Picture | None:
+    if data.evaluations.decay is None:
         return None
-    return Picture(charts.decay, (data["decay"],), "Frequency and damping ratio (structure and friction together) of "
-                                                   "the released output against half its peak-to-peak motion; bars "
-                                                   "show the errors of the evaluation and of the computation.")
+    return Picture(
+        charts.decay,
+        (data.evaluations.decay,),
+        "Frequency and damping ratio (structure and friction together) of "
+        "the released output against half its peak-to-peak motion; bars "
+        "show the errors of the evaluation and of the computation.",
+    )
 
 
-def _levels(data: dict) -> Picture | None:
-    if "levels" not in data:
+def _levels(data: RunData) -> Picture | None:
+    if data.evaluations.levels is None:
         return None
-    return Picture(charts.levels, (data["levels"],), "Amplitude at the end of every level; each level starts from the "
-                                                     "final state of the previous level; arrows show the order of the "
-                                                     f"test.{_under(data)}")
+    return Picture(
+        charts.levels,
+        (data.evaluations.levels,),
+        "Amplitude at the end of every level; each level starts from the "
+        "final state of the previous level; arrows show the order of the "
+        f"test.{_under(data)}",
+    )
 
 
-def _wear(data: dict) -> Picture | None:
-    if "wear" not in data:
+def _wear(data: RunData) -> Picture | None:
+    wear = data.evaluations.wear
+    if wear is None:
         return None
-    states, history = data["wear"]["states"], data["wear"]["history"]
+    states, history = wear.states, wear.history
     depth = states["worn_depth"]
     mean = depth.mean(axis=1) if depth.ndim == 3 else depth
-    profiles = (states["time"] / data["wear"]["period"], states["normal_stress"], mean)
-    return Picture(charts.wear, (data["x"], *profiles, history),
-                   f"Wear of the patch over {scales.plain(history['cycle'][-1], 4)} cycles: pressure and worn depth "
-                   f"of both pieces together{', means over the width' if depth.ndim == 3 else ''}, and measures of "
-                   "patch and motion divided by their values on the unworn patch. All other pictures show the worn "
-                   "patch."
-                   f"{_edge_peaks(history)}")
+    profiles = (states["time"] / wear.period, states["normal_stress"], mean)
+    return Picture(
+        charts.wear,
+        (data.patch.x, *profiles, history),
+        f"Wear of the patch over {scales.plain(history['cycle'][-1], 4)} cycles: pressure and worn depth "
+        f"of both pieces together{', means over the width' if depth.ndim == 3 else ''}, and measures of "
+        "patch and motion divided by their values on the unworn patch. All other pictures show the worn "
+        "patch."
+        f"{_edge_peaks(history)}",
+    )
 
 
 def _edge_peaks(history: dict) -> str:
@@ -162,71 +222,107 @@ def _edge_peaks(history: dict) -> str:
         return ""
     cycles = ", ".join(scales.plain(one, 4) for one in np.asarray(history["cycle"])[above > 0])
     most = scales.short(float(above.max()), "Pa", 2)
-    return (f" After {cycles} cycles the peak pressure is that of a node at the edge of the contact; it stands up to "
-            f"{most} above all pressures farther inside and has an error of this size.")
+    return (
+        f" After {cycles} cycles the peak pressure is that of a node at the edge of the contact; it stands up to "
+        f"{most} above all pressures farther inside and has an error of this size."
+    )
 
 
-def _worn_map(data: dict) -> Picture | None:
-    if "wear" not in data or (depth := data["wear"]["states"]["worn_depth"][-1]).ndim < 2 or not depth.any():
+def _worn_map(data: RunData) -> Picture | None:
+    wear = data.evaluations.wear
+    if wear is None:
         return None
-    return Picture(charts.worn_map, (data["x"], data["width"], depth), "Worn depth of both pieces together after "
-                   f"{scales.plain(data['wear']['history']['cycle'][-1], 4)} cycles, in every strip over the width.")
-
-
-def _interface(data: dict) -> Picture | None:
-    if not pressed(data):
+    depth = wear.states["worn_depth"][-1]
+    if depth.ndim < 2 or not depth.any():
         return None
-    fields, caption = data["fields"], "Normal stress of the pressed pieces"
+    return Picture(
+        charts.worn_map,
+        (data.patch.x, data.patch.width, depth),
+        "Worn depth of both pieces together after "
+        f"{scales.plain(wear.history['cycle'][-1], 4)} cycles, in every strip over the width.",
+    )
+
+
+def _interface(data: RunData) -> Picture | None:
+    if not data.patch.touches():
+        return None
+    fields, caption = data.patch.fields, "Normal stress of the pressed pieces"
     if np.any(fields.get("shear_stress", 0.0)):
-        span = "the last cycle" if data["summary"]["kind"] == "rig" and not part_of_cycle(data) else "the run"
-        caption += (f"; shear stress at {len(fields['time']) - 1} instants of {span}; the instant with the largest "
-                    "resultant force is in colour")
-    if charts.part_in_contact(data["x"], fields["normal_stress"][0]):
-        length, scale = scales.axis_unit(data["x"], "m")
-        caption += (". Only the part in contact is drawn; the whole length is "
-                    f"{(data['x'][-1] - data['x'][0]) * scale:.4g} {length}")
-    return Picture(charts.interface, (data["x"], fields), caption + ".")
+        whole_cycle = data.verdict.summary["kind"] == "rig" and not data.verdict.is_part_of_cycle()
+        span = "the last cycle" if whole_cycle else "the run"
+        caption += (
+            f"; shear stress at {len(fields['time']) - 1} instants of {span}; the instant with the largest "
+            "resultant force is in colour"
+        )
+    if charts.part_in_contact(data.patch.x, fields["normal_stress"][0]):
+        length, scale = scales.axis_unit(data.patch.x, "m")
+        caption += (
+            ". Only the part in contact is drawn; the whole length is "
+            f"{(data.patch.x[-1] - data.patch.x[0]) * scale:.4g} {length}"
+        )
+    return Picture(charts.interface, (data.patch.x, fields), caption + ".")
 
 
-def _faces(data: dict) -> Picture | None:
-    found = [one for one in data.get("faces", ()) if np.any(one[1]["normal_stress"][0] > 0)]
+def _faces(data: RunData) -> Picture | None:
+    found = [one for one in data.patch.faces if np.any(one[1]["normal_stress"][0] > 0)]
     part = any(charts.part_in_contact(x, fields["normal_stress"][0]) for x, fields, _ in found)
     shear = any(np.any(fields.get("shear_stress", 0.0)) for _, fields, _ in found)
-    moved = "; shear stress at several instants of the last cycle; the instant with the largest resultant force is " \
-        "in colour" if shear else ""
-    return Picture(charts.faces, (found[:MOST],), f"Normal stress of the pressed patch of each interface{moved}."
-                   f"{' Only the part in contact is drawn.' * part}{_first(found)}") if found else None
+    moved = (
+        "; shear stress at several instants of the last cycle; the instant with the largest resultant force is "
+        "in colour"
+        if shear
+        else ""
+    )
+    return (
+        Picture(
+            charts.faces,
+            (found[:MOST],),
+            f"Normal stress of the pressed patch of each interface{moved}."
+            f"{' Only the part in contact is drawn.' * part}{_first(found)}",
+        )
+        if found
+        else None
+    )
 
 
 def _first(found: list) -> str:
     """The sentence on charts that are left out, behind a caption."""
-    return f" Only the first {MOST} of {len(found)} interfaces are shown." if len(found) > MOST else ""
+    return (
+        f" Only the first {MOST} of {len(found)} interfaces are shown." if len(found) > MOST else ""
+    )
 
 
-def _bodies(data: dict) -> Picture | None:
-    if "bodies" not in data or not pressed(data):
+def _bodies(data: RunData) -> Picture | None:
+    if data.patch.bodies is None or not data.patch.touches():
         return None
-    effects = [e["effect"] for e in data["summary"]["effects"]]
+    effects = [e["effect"] for e in data.verdict.summary["effects"]]
     coated = "with their coatings " if "contact.coating" in effects else ""
     cause = "at the prescribed approach" if "contact.approach" in effects else "under the load"
-    alone = "" if data["summary"]["kind"] == "patch" else " alone, before any slide"
-    mises = data["bodies"]["mises"]
+    alone = "" if data.verdict.summary["kind"] == "patch" else " alone, before any slide"
+    bodies = data.patch.bodies
+    mises = bodies["mises"]
     largest = max(float(np.max(part)) for part in mises)
     unit, scale = scales.axis_unit([largest], "Pa")
-    return Picture(charts.bodies, (data["bodies"]["x"], data["bodies"]["depth"], mises, data["bodies"]["pressure"]),
-                   f"Both pieces {coated}{cause}{alone}. The largest stress in a cell is {largest * scale:.3g} "
-                   f"{unit}{_at_corner(data['bodies'])}.{_of_mesh(data)}")
+    values = (bodies["x"], bodies["depth"], mises, bodies["pressure"])
+    return Picture(
+        charts.bodies,
+        values,
+        f"Both pieces {coated}{cause}{alone}. The largest stress in a cell is {largest * scale:.3g} "
+        f"{unit}{_at_corner(bodies)}.{_of_mesh(data)}",
+    )
 
 
-def _of_mesh(data: dict) -> str:
+def _of_mesh(data: RunData) -> str:
     """The sentence on pressure peaks that the stress inside the pieces does not show; "" where it shows them."""
-    sigma, mine = data["fields"]["normal_stress"][0], data["bodies"]["pressure"]
+    sigma, mine = data.patch.fields["normal_stress"][0], data.patch.bodies["pressure"]
     if sigma.size == mine.size:
         return ""
     unit, scale = scales.axis_unit([sigma.max()], "Pa")
-    return (f" The stress is computed on a mesh, on which the largest pressure is "
-            f"{mine.max() * scale:.3g} {unit}; near the narrow pressure peaks of up to "
-            f"{sigma.max() * scale:.3g} {unit} it is larger.")
+    return (
+        f" The stress is computed on a mesh, on which the largest pressure is "
+        f"{mine.max() * scale:.3g} {unit}; near the narrow pressure peaks of up to "
+        f"{sigma.max() * scale:.3g} {unit} it is larger."
+    )
 
 
 def _at_corner(bodies: dict) -> str:
@@ -236,51 +332,96 @@ def _at_corner(bodies: dict) -> str:
     column, row = np.unravel_index(np.argmax(part), part.shape)
     if column not in (0, part.shape[0] - 1):
         return ""
-    faces = {"the face of the coating meets the end of the piece": coating, "the held far face ends": depth[-1]}
-    near = [words for words, face in faces.items() if face > 0 and np.isclose(depth[row:row + 2], face).any()]
-    return (f", where {near[0]}: the stress "
-            "is unbounded in this corner, and a finer mesh shows a larger value") if near else ""
+    faces = {
+        "the face of the coating meets the end of the piece": coating,
+        "the held far face ends": depth[-1],
+    }
+    near = [
+        words
+        for words, face in faces.items()
+        if face > 0 and np.isclose(depth[row : row + 2], face).any()
+    ]
+    return (
+        (
+            f", where {near[0]}: the stress "
+            "is unbounded in this corner, and a finer mesh shows a larger value"
+        )
+        if near
+        else ""
+    )
 
 
-def _loop(data: dict) -> Picture | None:
-    if "loop" not in data or not np.any(data["loop"]["force"]) or np.ptp(data["loop"]["slide"]) == 0:
+def _loop(data: RunData) -> Picture | None:
+    motion = data.motion
+    if motion is None or not np.any(motion.loop["force"]) or np.ptp(motion.loop["slide"]) == 0:
         return None
-    own = data["loop"]
-    whole = "window" not in data or part_of_cycle(data)
-    count = 0.0 if whole else (own["time"][-1] - own["time"][0]) / own["period"]
-    span = "the whole run" if whole else f"the last {count:.3g} cycles" if count > 1 + 1e-6 else "one cycle"
-    title = "Friction force against slide" if part_of_cycle(data) or data.get("cycles") is None else "Friction loop"
-    read = data.get("recorded")
-    beside = "" if read is None else f" Grey: the force measured in {read['file']}."
+    own = motion.loop
+    whole = motion.window is None or data.verdict.is_part_of_cycle()
+    count = 0.0 if whole else (own["time"][-1] - own["time"][0]) / motion.period
+    span = (
+        "the whole run"
+        if whole
+        else f"the last {count:.3g} cycles"
+        if count > 1 + 1e-6
+        else "one cycle"
+    )
+    open_loop = data.verdict.is_part_of_cycle() or data.verdict.cycles is None
+    title = "Friction force against slide" if open_loop else "Friction loop"
+    name, *read = motion.recorded or ("",)
+    beside = f" Grey: the force measured in {name}." if read else ""
     if each := own.get("each"):
-        return Picture(charts.loops, (each[:MOST],), f"Friction force against the slide of each interface, over {span}."
-                       f"{_under(data)}{_first(each)}")
-    return Picture(charts.loop, (own["slide"], own["force"], title, read and (read["slide"], read["force"])),
-                   f"Resultant friction force against the slide of the interface, over {span}.{_under(data)}{beside}")
+        return Picture(
+            charts.loops,
+            (each[:MOST],),
+            f"Friction force against the slide of each interface, over {span}."
+            f"{_under(data)}{_first(each)}",
+        )
+    return Picture(
+        charts.loop,
+        (own["slide"], own["force"], title, tuple(read) or None),
+        f"Resultant friction force against the slide of the interface, over {span}.{_under(data)}{beside}",
+    )
 
 
-def _histories(data: dict) -> Picture | None:
-    if "history" not in data:
+def _histories(data: RunData) -> Picture | None:
+    motion = data.motion
+    if motion is None:
         return None
-    history, period, window, title = data["history"], data["loop"].get("period"), None, ""
-    if "window" not in data:
+    history, period = motion.history, motion.period
+    if motion.window is None:
         force = " and friction force" if np.any(history["force"]) else ""
-        return Picture(charts.histories, (history, None, None), f"Slide{force} over the whole run.{_under(data)}"
-                       + (" Grey: the measured force." if "measured" in history else ""))
-    w = data["window"]
+        return Picture(
+            charts.histories,
+            (history, None, None),
+            f"Slide{force} over the whole run.{_under(data)}"
+            + (" Grey: the measured force." if "measured" in history else ""),
+        )
+    w = motion.window
     late = w["time"] >= w["time"][-1] - 3 * period * (1 + 1e-9)
     window = {k: v[late] for k, v in w.items()}
     count = (window["time"][-1] - window["time"][0]) / period
-    title = f"The run's {count:.2g} cycles" if count >= data.get("cycles") - 1e-6 else f"Last {count:.2g} cycles"
-    title = f"The run: {count:.2g} of a cycle" if part_of_cycle(data) else title
+    title = (
+        f"The run's {count:.2g} cycles"
+        if count >= data.verdict.cycles - 1e-6
+        else f"Last {count:.2g} cycles"
+    )
+    title = f"The run: {count:.2g} of a cycle" if data.verdict.is_part_of_cycle() else title
     bodies = "output and base" if np.any(window["base"]) else "the output"
-    caption = ("Displacement over the whole run. At the end of the run: displacement, and acceleration of "
-               f"{bodies}.{_under(data)}")
-    begin, swings = charts.whole_from(history["time"], period, w["time"][0]), bool(data.get("released"))
+    caption = (
+        "Displacement over the whole run. At the end of the run: displacement, and acceleration of "
+        f"{bodies}.{_under(data)}"
+    )
+    begin, swings = (
+        charts.whole_from(history["time"], period, w["time"][0]),
+        bool(data.verdict.released),
+    )
     kept = int(np.sum(history["time"] < begin))
     if kept:
-        what = "reversals were kept, drawn as a band from the lowest to the highest value of each cycle." \
-            if kept * period > begin else f"{kept} of the samples {'was' if kept == 1 else 'were'} kept."
+        what = (
+            "reversals were kept, drawn as a band from the lowest to the highest value of each cycle."
+            if kept * period > begin
+            else f"{kept} of the samples {'was' if kept == 1 else 'were'} kept."
+        )
         what = "turning points and stops were kept, joined by lines." if swings else what
         unit, scale = scales.axis_unit(history["time"], "s")
         caption += f" Before {begin * scale:.4g} {unit} only {what}"
@@ -288,78 +429,121 @@ def _histories(data: dict) -> Picture | None:
     return Picture(charts.histories, (history, window, period, title, swings), caption)
 
 
-def _under(data: dict) -> str:
+def _under(data: RunData) -> str:
     """What moves the run, as a sentence behind a caption; beside a curve the frequency of the motion that is shown."""
-    text = data.get("driven", "")
-    if text and "curve" in data and data.get("loop", {}).get("period"):
-        return f" The steady motion at {1 / data['loop']['period']:.5g} Hz; {text}."
+    text = data.source.driven
+    if (
+        text
+        and data.evaluations.curve is not None
+        and data.motion is not None
+        and data.motion.period
+    ):
+        return f" The steady motion at {1 / data.motion.period:.5g} Hz; {text}."
     return f" {text[0].upper()}{text[1:]}." if text else ""
 
 
-def _measured(data: dict) -> Picture | None:
-    m, found = data.get("measured", {}), data["summary"]["measures"]
-    if m.get("input") is None or m.get("frequency") is None:
+def _measured(data: RunData) -> Picture | None:
+    m, found = data.measured, data.verdict.summary["measures"]
+    if m is None or not m.is_comparable():
         return None
     points = []
-    for name, gain in zip(("absolute_acceleration_peak", "relative_displacement_amplitude"), _factors(m)):
+    for name, gain in zip(
+        ("absolute_acceleration_peak", "relative_displacement_amplitude"), m.factors()
+    ):
         one = found.get(name, {"value": None})
-        points.append(None if one["value"] is None else
-                      (one["value"] * gain, None if one["error"] is None else one["error"] * gain))
-    factor = "".join(f" (computed {name} multiplied by the reading factor {gain:g})" for name, gain in
-                     zip(("acceleration", "displacement"), m["gains"]) if gain != 1)
-    if m.get("reading", "peak") != "peak":
-        factor += f" (readings are taken as {m['reading']}, which is {m['share']:.4g} of the peak)"
-    return Picture(charts.measured, (m["rows"], m["frequency"], m["input"], *points),
-                   f"Responses measured at the drive frequency, and the computed response{factor}.{_unsettled(data)}")
+        points.append(
+            None
+            if one["value"] is None
+            else (one["value"] * gain, None if one["error"] is None else one["error"] * gain)
+        )
+    factor = "".join(
+        f" (computed {name} multiplied by the reading factor {gain:g})"
+        for name, gain in zip(("acceleration", "displacement"), m.gains)
+        if gain != 1
+    )
+    if m.reading != "peak":
+        factor += f" (readings are taken as {m.reading}, which is {m.share:.4g} of the peak)"
+    return Picture(
+        charts.measured,
+        (m.rows, m.frequency, m.input, *points),
+        f"Responses measured at the drive frequency, and the computed response{factor}.{_unsettled(data)}",
+    )
 
 
 # in the order of the page
-PICTURES = {"wear": _wear, "worn": _worn_map, "curve": _curve, "spectra": _spectra, "decay": _decay,
-            "levels": _levels, "pressure": _interface, "faces": _faces, "bodies": _bodies, "loop": _loop,
-            "history": _histories, "measured": _measured}
+PICTURES = {
+    "wear": _wear,
+    "worn": _worn_map,
+    "curve": _curve,
+    "spectra": _spectra,
+    "decay": _decay,
+    "levels": _levels,
+    "pressure": _interface,
+    "faces": _faces,
+    "bodies": _bodies,
+    "loop": _loop,
+    "history": _histories,
+    "measured": _measured,
+}
 
 
-def _factors(measured: dict) -> tuple:
-    """What the accelerometer shows of the largest acceleration, the factor of its reading times the share it reads, and
-    the gauge of the displacement."""
-    felt, seen = measured["gains"]
-    return felt * measured.get("share", 1.0), seen
+def _unsettled(data: RunData) -> str:
+    outcome = data.verdict.summary["outcome"]
+    return (
+        ""
+        if outcome in SETTLED
+        else (
+            f" The run ended with the outcome '{outcome}': the computed values are not "
+            "those of a steady motion."
+        )
+    )
 
 
-def _unsettled(data: dict) -> str:
-    outcome = data["summary"]["outcome"]
-    return "" if outcome in SETTLED else (f" The run ended with the outcome '{outcome}': the computed values are not "
-                                          "those of a steady motion.")
-
-
-def _table_one(data: dict) -> list:
+def _table_one(data: RunData) -> list:
     """The section that sets the computed values beside the measured ones, none where nothing compares."""
-    m, found = data["measured"], data["summary"]["measures"]
-    if m.get("input") is None or m.get("frequency") is None:
+    m, found = data.measured, data.verdict.summary["measures"]
+    if not m.is_comparable():
         return []
     rows = []
-    for r in m["rows"]:
-        if abs(r.frequency - m["frequency"]) > 0.5 or abs(r.input - m["input"]) > 0.01 * m["input"]:
+    for r in m.rows:
+        if abs(r.frequency - m.frequency) > 0.5 or abs(r.input - m.input) > 0.01 * m.input:
             continue
-        for (name, key, scale, unit), gain in zip((("acceleration", "absolute_acceleration_peak", G, "g"),
-                                                   ("displacement", "relative_displacement_amplitude", 25.4e-6, "mil")),
-                                                  _factors(m)):
+        for (name, key, scale, unit), gain in zip(
+            (
+                ("acceleration", "absolute_acceleration_peak", G, "g"),
+                ("displacement", "relative_displacement_amplitude", 25.4e-6, "mil"),
+            ),
+            m.factors(),
+        ):
             value, mine = getattr(r, name), found.get(key, {"value": None})["value"]
             if value is None or mine is None:
                 continue
             mine = mine * gain
             kind = f"{name}{' (repeat run)' if 'R' in r.flag else ''}"
             ratio = f"{mine / value:.2f}" if value else "&ndash;"
-            rows.append([linked(kind, key), f"{value / scale:.3g} {unit}", f"{mine / scale:.3g} {unit}", ratio])
+            rows.append(
+                [
+                    linked(kind, key),
+                    f"{value / scale:.3g} {unit}",
+                    f"{mine / scale:.3g} {unit}",
+                    ratio,
+                ]
+            )
     text = "<p class=soft>No measured row has this frequency and input.</p>"
     if rows:
-        text = (table(("reading", ">measured", ">computed", ">ratio"), rows)
-                + f"<p class=soft>{escape(_unsettled(data).strip())}</p>")
+        text = (
+            table(("reading", ">measured", ">computed", ">ratio"), rows)
+            + f"<p class=soft>{escape(_unsettled(data).strip())}</p>"
+        )
     return [Section("measured", "Against the measurement", text)]
 
 
-OF_LEVELS = (("relative_displacement_amplitude", "m"), ("absolute_acceleration_peak", "m s-2"),
-             ("absolute_acceleration_fundamental", "m s-2"), ("acceleration_distortion", "1"))
+OF_LEVELS = (
+    ("relative_displacement_amplitude", "m"),
+    ("absolute_acceleration_peak", "m s-2"),
+    ("absolute_acceleration_fundamental", "m s-2"),
+    ("acceleration_distortion", "1"),
+)
 
 
 def _table_of_levels(levels: list) -> Section:
@@ -373,12 +557,29 @@ def _table_of_levels(levels: list) -> Section:
             there = value is not None and np.isfinite(value)
             cells.append(pair(name, measure(value, unit, error)) if there else DASH)
         drive = f"{one['drive']:.4g} N" if one.get("unit") == "N" else f"{one['drive'] / G:.4g} g"
-        rows.append([str(number), drive, *cells, *([escape(one["outcome"])] if judged else []),
-                     "stuck" if one["stuck"] else "slips"])
+        rows.append(
+            [
+                str(number),
+                drive,
+                *cells,
+                *([escape(one["outcome"])] if judged else []),
+                "stuck" if one["stuck"] else "slips",
+            ]
+        )
     sized = "force" if any(one.get("unit") == "N" for one in levels) else "base acceleration"
-    texts = ("half the peak-to-peak motion", "peak acceleration", "its first harmonic", "third / first harmonic")
-    heads = [">level", f">{sized}", *(f">{linked(text, name)}" for text, (name, _) in zip(texts, OF_LEVELS)),
-             *(["outcome"] if judged else []), "interface"]
+    texts = (
+        "half the peak-to-peak motion",
+        "peak acceleration",
+        "its first harmonic",
+        "third / first harmonic",
+    )
+    heads = [
+        ">level",
+        f">{sized}",
+        *(f">{linked(text, name)}" for text, (name, _) in zip(texts, OF_LEVELS)),
+        *(["outcome"] if judged else []),
+        "interface",
+    ]
     return Section("levels", "Levels", table(heads, rows))
 
 
@@ -387,10 +588,10 @@ def measure(value: float, unit: str, error: float | None) -> dict:
     return {"value": value, "unit": unit, "error": error, "floor": 0.0}
 
 
-def _measures(data: dict) -> Section:
+def _measures(data: RunData) -> Section:
     """Every measure with its error, in other units, and what it means."""
-    rows, means = [], data.get("means", {})
-    found = data["summary"]["measures"]
+    rows, means = [], data.verdict.means
+    found = data.verdict.summary["measures"]
     for name, m in in_order(found).items():
         value, error = texts(name, m)
         cells = [f"<td id='measure-{escape(name)}'>{escape(name)}</td>", value]
@@ -401,41 +602,117 @@ def _measures(data: dict) -> Section:
             error = error or ("unknown" if m["error"] is None else DASH)
             cells += [error, f"<td class=v>{escape(unit)}</td>", escape(others(name, m))]
         others_lie = of_records(name, found)[1]
-        text = means.get(name, "") + (f"; {others_lie} for other records of the random drive" if others_lie else "")
+        text = means.get(name, "") + (
+            f"; {others_lie} for other records of the random drive" if others_lie else ""
+        )
         rows.append([*cells, f"<td class=soft>{prose(text)}</td>"])
-    note = (f"<p class=soft>The run covers only {data['cycles']:.2g} of a cycle, so measures per cycle do not cover a "
-            "whole cycle.</p>") if part_of_cycle(data) else ""
+    note = (
+        (
+            f"<p class=soft>The run covers only {data.verdict.cycles:.2g} of a cycle, so measures per cycle do not "
+            "cover a "
+            "whole cycle.</p>"
+        )
+        if data.verdict.is_part_of_cycle()
+        else ""
+    )
     heads = ("measure", ">value", ">error (±)", "unit", "in customary units", "what it is")
-    return Section("measures", "Measures", table(heads, rows, "across many")
-                   + f"<p class=soft>Value and error have the same unit; {SHARP.replace('±', 'error')}. summary.json "
-                     f"has all digits in SI.</p>{note}")
+    return Section(
+        "measures",
+        "Measures",
+        table(heads, rows, "across many")
+        + f"<p class=soft>Value and error have the same unit; {SHARP.replace('±', 'error')}. summary.json "
+        f"has all digits in SI.</p>{note}",
+    )
 
 
-def _cost(data: dict) -> Section:
+def _cost(data: RunData) -> Section:
     """What ran, by which equations, and how long it took."""
-    summary = data["summary"]
-    rows = [[escape(e["effect"]), escape(e["equations"]), f"{e['seconds']:.3f}"] for e in summary["effects"]]
+    summary = data.verdict.summary
+    rows = [
+        [escape(e["effect"]), escape(e["equations"]), f"{e['seconds']:.3f}"]
+        for e in summary["effects"]
+    ]
     parts = ", ".join(f"{k} {v:.3f} s" for k, v in summary["seconds"].items())
-    shared = " The friction law and the modes are computed in one loop; the row of the law gives the time of this " \
-        "loop." if summary["kind"] == "rig" else ""
+    shared = (
+        " The friction law and the modes are computed in one loop; the row of the law gives the time of this "
+        "loop."
+        if summary["kind"] == "rig"
+        else ""
+    )
     absent = shown_absent(summary["not_in_scene"], summary.get("numerics", {}).get("engine"))
-    text = (table(("effect", "equations", ">seconds"), rows)
-            + f"<p class=soft>Wall-clock seconds: {escape(parts)}.{shared}</p>"
-            "<details><summary>Effects not in the scene, which are neither imported nor computed</summary>"
-            f"<p class=soft>{escape(', '.join(absent))}.</p></details>")
+    text = (
+        table(("effect", "equations", ">seconds"), rows)
+        + f"<p class=soft>Wall-clock seconds: {escape(parts)}.{shared}</p>"
+        "<details><summary>Effects not in the scene, which are neither imported nor computed</summary>"
+        f"<p class=soft>{escape(', '.join(absent))}.</p></details>"
+    )
     return Section("cost", "What was computed, and the computing time", text)
 
 
-def _origin(data: dict) -> Section:
+def _origin(data: RunData) -> Section:
     """The scene as written and as understood, the files beside the page, the versions."""
-    versions = ", ".join(f"{k} {v}" for k, v in data["versions"].items())
-    lacks = ["fields.vtkhdf"] * (data["x"] is None) + ["interfaces"] * ("faces" not in data)
+    versions = ", ".join(f"{k} {v}" for k, v in data.versions.items())
+    lacks = ["fields.vtkhdf"] * (data.patch.x is None) + ["interfaces"] * (not data.patch.faces)
     there = [one for one in FILES if one[0] not in lacks]
     files = "".join(f"<li><a href={name}>{name}</a>: {what}</li>" for name, what in there)
-    again = "" if "command" not in data else \
-        f"<p>To repeat the run, in the folder of its scene:</p><pre>{escape(data['command'])}</pre>"
-    return Section("origin", "Scene and files", f"{again}<p>Files beside this page:</p><ul>{files}</ul>"
-                   f"<details><summary>Scene</summary><pre>{escape(data['scene'])}</pre></details>"
-                   "<details><summary>Scene in SI, with the value of every default</summary><pre>"
-                   f"{escape(data['resolved'])}</pre></details><details><summary>Versions</summary>"
-                   f"<p class=soft>patchfem {escape(data['summary']['patchfem'])}, {escape(versions)}</p></details>")
+    again = (
+        ""
+        if not data.source.command
+        else f"<p>To repeat the run, in the folder of its scene:</p><pre>{escape(data.source.command)}</pre>"
+    )
+    return Section(
+        "origin",
+        "Scene and files",
+        f"{again}<p>Files beside this page:</p><ul>{files}</ul>"
+        f"<details><summary>Scene</summary><pre>{escape(data.source.text)}</pre></details>"
+        "<details><summary>Scene in SI, with the value of every default</summary><pre>"
+        f"{escape(data.source.resolved)}</pre></details><details><summary>Versions</summary>"
+        f"<p class=soft>patchfem {escape(data.verdict.summary['patchfem'])}, {escape(versions)}</p></details>",
+    )
+
+
+def page_of(result: Result, bodies: dict | None = None, film: dict | None = None) -> str:
+    """Return the HTML page of a run.
+
+    Parameters
+    ----------
+    result : Result
+    bodies : dict or None
+        The pressed pieces, from `fields.bodies.write_fields`.
+    film : dict or None
+        From `pages.player.reel`.
+    """
+    return page(_with_pieces(data_of(result), bodies, film))
+
+
+def axes(result: Result, names: tuple, onto=None, bodies: dict | None = None):
+    """Draw the first of the named pictures in which a run has something to show, as matplotlib Axes.
+
+    Parameters
+    ----------
+    result : Result
+    names : tuple of str
+        Keys of PICTURES.
+    onto : Axes or None
+        Where to draw the first panel; by default a new figure with all panels.
+    bodies : dict or None
+        The pressed pieces, from `fields.bodies.write_fields`.
+
+    Returns
+    -------
+    Axes or None
+        None if the run has nothing to show.
+    """
+    data = _with_pieces(data_of(result), bodies)
+    shown = next((one for one in (picture(name, data) for name in names) if one is not None), None)
+    if shown is None:
+        return None
+    if onto is None:
+        return pictures.draw.figure(shown.charts(*shown.values)).axes[0]
+    pictures.draw.figure(shown.charts(*shown.values), onto=onto)
+    return onto
+
+
+def _with_pieces(data: RunData, bodies: dict | None, film: dict | None = None) -> RunData:
+    """Return the data with the pressed pieces and their film."""
+    return replace(data, patch=replace(data.patch, bodies=bodies or None, film=film or None))

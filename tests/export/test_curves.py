@@ -13,6 +13,7 @@ from scene_texts import COULOMB, MODE, POINT
 from patchfem.core import Outcome
 from patchfem.export import netcdf, report
 from patchfem.export.drawing import charts, pictures
+from patchfem.export.page_data import RunData, SceneText, Verdict
 
 FOLDED = {"frequency": np.array([10.0, 11, 12, 13, 12.5, 12, 11.5, 12.5, 14]),
           "level": np.full(9, 5.0), "amplitude": 1e-5 * np.array([1.0, 2, 4, 7, 6, 5, 3, 2, 1]),
@@ -169,11 +170,12 @@ def test_exact_the_arrows_of_the_levels_point_along_the_test(monkeypatch):
 
 
 def test_exact_a_page_without_curve_or_levels_has_neither():
-    data = {"name": "a", "scene": "", "resolved": "", "sentence": Outcome.DONE.sentence, "engine": "", "fields": {},
-            "x": None, "versions": {}, "summary": {"patchfem": "0", "title": "", "kind": "patch", "outcome": "done",
-            "measures": {}, "effects": [], "not_in_scene": [], "warnings": [], "notes": [], "seconds": {}}}  # fmt: skip
+    summary = {"patchfem": "0", "title": "", "kind": "patch", "outcome": "done", "measures": {}, "effects": [],
+               "not_in_scene": [], "warnings": [], "notes": [], "seconds": {}}
+    data = RunData(SceneText("a", "", ""), Verdict(summary, Outcome.DONE.sentence), {})
     assert "Floquet" not in report.page(data) and "<h2>Levels" not in report.page(data)
-    text = report.page(data | {"summary": data["summary"] | {"seconds": {"total": 0.434, "files": 0.1}}})
+    summary["seconds"] = {"total": 0.434, "files": 0.1}
+    text = report.page(data)
     assert "computed in 0.43 s" in text and "Wall-clock seconds: total 0.434 s, files 0.100 s" in text
 
 

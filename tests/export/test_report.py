@@ -5,6 +5,7 @@ import re
 import subprocess
 import sys
 from copy import deepcopy
+from dataclasses import replace
 from html.parser import HTMLParser
 from types import SimpleNamespace
 
@@ -19,6 +20,7 @@ from patchfem.__main__ import main
 from patchfem.core import G_N, Outcome
 from patchfem.export import report
 from patchfem.export.drawing import charts
+from patchfem.export.page_data import Measured, Motion, PressedPatch, RunData, SceneText, Verdict
 from patchfem.export.pages import words
 from patchfem.export.pages.document import prose
 from patchfem.response.rows import TABLE as MOTION
@@ -33,17 +35,16 @@ def measure(value, unit, error=None):
     return {"value": value, "unit": unit, "error": error, "floor": 0.0}
 
 
-def base(kind, outcome, effects, measures, title="a title") -> dict:
+def base(kind, outcome, effects, measures, title="a title") -> RunData:
     """What every page is made of; the rest is added per kind."""
     rows = [{"effect": name, "equations": "a < b & c", "seconds": 0.1} for name in effects]
-    return {"name": "scene-file", "scene": 'title = "<b>"', "resolved": "", "sentence": Outcome(outcome).sentence,
-            "engine": "", "fields": {}, "x": None, "cycles": None, "versions": {"python": "3"},
-            "summary": {"patchfem": "0", "title": title, "kind": kind, "outcome": outcome, "measures": measures,
-                        "effects": rows, "not_in_scene": ["wear"], "warnings": [], "notes": [],
-                        "seconds": {"total": 1.0}}}
+    summary = {"patchfem": "0", "title": title, "kind": kind, "outcome": outcome, "measures": measures,
+               "effects": rows, "not_in_scene": ["wear"], "warnings": [], "notes": [], "seconds": {"total": 1.0}}
+    scene = SceneText("scene-file", 'title = "<b>"', "")
+    return RunData(scene, Verdict(summary, Outcome(outcome).sentence), {"python": "3"})
 
 
-def patch(load=1.0, frames=1, effects=("contact",)) -> dict:
+def patch(load=1.0, frames=1, effects=("contact",)) -> RunData:
     """A Hertzian pressure over a tenth of 10 mm, and a stress that fades with depth."""
     x, depth = np.linspace(-5e-3, 5e-3, 201), np.linspace(0, 5e-3, 21)
     sigma = load * 5e7 * np.sqrt(np.maximum(0, 1 - (x / 0.5e-3)**2))
@@ -55,10 +56,10 @@ def patch(load=1.0, frames=1, effects=("contact",)) -> dict:
         fields["shear_stress"] = 0.3 * sigma * np.sin(np.arange(frames))[:, None]
     mises = np.tile((sigma[1:] + sigma[:-1])[:, None] / 2 * np.exp(-depth[1:] / 1e-3), (2, 1, 1))
     bodies = {"x": x, "depth": (depth, depth), "coating": (0.0, 0.25e-3), "mises": mises, "pressure": sigma}
-    return data | {"x": x, "fields": fields, "bodies": bodies}
+    return replace(data, patch=PressedPatch(x, fields=fields, bodies=bodies))
 
 
-def rig(cycles=60.0, title="a title", effects=("contact", "contact.coating", "structure")) -> dict:
+def rig(cycles=60.0, title="a title", effects=("contact", "contact.coating", "structure")) -> RunData:
     """A settled sine over `cycles`, its reversals alone before the last three cycles, over a patch, with a table."""
     keep = min(cycles, 3.0)
     late = np.linspace((cycles - keep) * PERIOD, cycles * PERIOD, round(keep * 400) + 1)
@@ -67,30 +68,31 @@ def rig(cycles=60.0, title="a title", effects=("contact", "contact.coating", "st
     wave = {t.size: np.sin(2 * np.pi * t / PERIOD) for t in (late, time)}
     whole, end = 1.4808e-5 * wave[time.size], wave[late.size]
     data = patch(frames=5, effects=effects)
-    data["summary"] |= {"kind": "rig", "outcome": "steady", "title": title}
-    data["summary"]["measures"] |= {
+    summary = data.verdict.summary
+    summary |= {"kind": "rig", "outcome": "steady", "title": title}
+    summary["measures"] |= {
         "relative_displacement_amplitude": measure(1.48081e-5, "m", 4.1e-8),
         "absolute_acceleration_peak": measure(5.2 * G_N, "m s-2", 0.1), "loop_area": measure(1.96e-3, "J", 5.8e-6),
         "slip_start_phase": measure(2.89849, "rad", 1.6)}
     rows = [SimpleNamespace(frequency=143.0, input=5 * G_N, acceleration=6 * G_N, displacement=0.23 * MIL, flag=""),
             SimpleNamespace(frequency=143.0, input=8 * G_N, acceleration=None, displacement=None, flag="U")]
-    return data | {
-        "engine": "march", "cycles": cycles,
-        "history": {"time": time, "displacement": whole, "force": 30 * wave[time.size]},
-        "window": {"time": late, "displacement": 1.4808e-5 * end, "acceleration": 50 * end, "base": 49 * end},
-        "loop": {"slide": 1.4808e-5 * end, "force": 30 * np.cos(2 * np.pi * late / PERIOD), "time": late,
-                 "period": PERIOD},
-        "measured": {"rows": rows, "frequency": 143.0, "gains": (1.0, 1.0), "input": 5 * G_N}}
+    motion = Motion(
+        history={"time": time, "displacement": whole, "force": 30 * wave[time.size]},
+        window={"time": late, "displacement": 1.4808e-5 * end, "acceleration": 50 * end, "base": 49 * end},
+        loop={"slide": 1.4808e-5 * end, "force": 30 * np.cos(2 * np.pi * late / PERIOD), "time": late}, period=PERIOD)
+    return replace(data, verdict=replace(data.verdict, engine="march", cycles=cycles), motion=motion,
+                   measured=Measured(rows, (1.0, 1.0), 143.0, 5 * G_N))
 
 
-def bench() -> dict:
+def bench() -> RunData:
     """Two cycles of a slide at one point."""
     data = base("bench", "done", ("normal", "friction.law=coulomb"), {"friction_ratio_peak": measure(0.3, "1", 1e-6),
                                                                       "loop_area": measure(1e-3, "J", 1e-9)})
     time = np.linspace(0, 0.02, 401)
     slide, force = 1e-5 * np.sin(200 * np.pi * time), 30 * np.cos(200 * np.pi * time)
-    return data | {"cycles": 2.0, "history": {"time": time, "displacement": slide, "force": force},
-                   "loop": {"slide": slide, "force": force, "time": time}}
+    motion = Motion({"time": time, "displacement": slide, "force": force},
+                    {"slide": slide, "force": force, "time": time})
+    return replace(data, verdict=replace(data.verdict, cycles=2.0), motion=motion)
 
 
 PAGES = {"patch": patch, "no contact": lambda: patch(load=0.0), "rig": rig, "short": lambda: rig(0.3), "bench": bench}
@@ -161,8 +163,8 @@ def test_exact_the_pictures_hold_the_numbers_of_the_run(pages):
     data, text = pages["rig"]
     found = charts_of(text)
     loop = found["Friction loop", "friction force"]["marks"][0]
-    np.testing.assert_allclose(loop["x"], data["loop"]["slide"] * 1e6, rtol=1e-8)
-    np.testing.assert_allclose(loop["y"], data["loop"]["force"], rtol=1e-8)
+    np.testing.assert_allclose(loop["x"], data.motion.loop["slide"] * 1e6, rtol=1e-8)
+    np.testing.assert_allclose(loop["y"], data.motion.loop["force"], rtol=1e-8)
     whole = found["Whole run", "displacement"]
     band, late = whole["marks"]
     assert band["kind"] == "band" and max(band["high"]) == pytest.approx(14.808, rel=1e-6)
@@ -188,8 +190,8 @@ def test_always_the_verdict_first_and_every_measure_listed(pages, name):
     data, text = pages[name]
     at = text.index("<p class=verdict>")
     assert all(tag not in text[:at] for tag in ("<figure", "<table", "<h2"))
-    assert spoken(text).startswith(f"{data['summary']['outcome']}: {data['sentence']}")
-    assert set(data["summary"]["measures"]) <= set(Parsed(text).cells)
+    assert spoken(text).startswith(f"{data.verdict.summary['outcome']}: {data.verdict.sentence}")
+    assert set(data.verdict.summary["measures"]) <= set(Parsed(text).cells)
 
 
 @pytest.mark.parametrize("text, html", [
@@ -205,8 +207,8 @@ def test_always_no_sentence_of_a_page_shows_back_quotes(pages):
     key, stick = "`structure.travel`", MOTION["stick_fraction"].text
     assert "`slip_amplitude`" in stick
     data = base("rig", "steady", ["friction"], {"stick_fraction": measure(0.5, "1", 0.01)})
-    data["summary"]["notes"], data["summary"]["warnings"] = [f"raise {key}"], [f"lower {key}"]
-    data["means"] = {"stick_fraction": stick}
+    data.verdict.summary["notes"], data.verdict.summary["warnings"] = [f"raise {key}"], [f"lower {key}"]
+    data.verdict.means["stick_fraction"] = stick
     text = report.page(data)
     assert text.count("<code>structure.travel</code>") == 2 and "as in <code>slip_amplitude</code>" in text
     for whole in (text, *(page for _, page in pages.values())):
@@ -227,9 +229,9 @@ def test_always_captions_speak_of_what_the_run_has(pages):
 
 def test_always_no_picture_where_nothing_touches(pages):
     data, text = deepcopy(pages["no contact"])
-    assert "<script" not in text and spoken(text) == f"no_contact: {data['sentence']}"
-    data["summary"]["warnings"] = [data["sentence"], "another one"]
-    assert report.page(data).count(data["sentence"]) == 1
+    assert "<script" not in text and spoken(text) == f"no_contact: {data.verdict.sentence}"
+    data.verdict.summary["warnings"] = [data.verdict.sentence, "another one"]
+    assert report.page(data).count(data.verdict.sentence) == 1
 
 
 def test_always_a_part_of_a_cycle_claims_nothing_per_cycle(pages):
@@ -240,7 +242,7 @@ def test_always_a_part_of_a_cycle_claims_nothing_per_cycle(pages):
 def test_always_the_heading_is_the_title_or_the_file():
     data = rig(title="")
     assert "<h1>scene-file</h1>" in report.page(data)
-    data.pop("name")
+    data = replace(data, source=replace(data.source, name=""))
     assert "<h1>patchfem run</h1>" in report.page(data)
     assert "&lt;b&gt;" in report.page(data)
 
@@ -350,7 +352,7 @@ cycles = 20
 def test_exact_a_stress_without_bound_is_named_where_it_is_the_largest(cell, said):
     """Beside a coating a corner showed 6.7 to 8.3 MPa on finer meshes of one pressed pair, without a word."""
     data = patch()
-    data["bodies"]["mises"][1][cell] = 1e9
+    data.patch.bodies["mises"][1][cell] = 1e9
     caption = report.picture("bodies", data).caption
     assert "largest stress in a cell is 1 GPa" in caption and (said in caption if said else "bound" not in caption)
 

@@ -15,7 +15,7 @@ from scene_texts import BENCH, COATED
 
 from patchfem.core import Missing
 from patchfem.export import folder as results_folder
-from patchfem.export import netcdf, shown
+from patchfem.export import netcdf, report
 
 WHOLE = {"summary.json", "result.nc", "scene.resolved.toml"}
 
@@ -107,7 +107,7 @@ def test_always_the_results_are_in_place_before_the_page(scene, tmp_path, monkey
     def kept():
         return {path.name: path.read_bytes() for path in out.iterdir()}
 
-    monkeypatch.setattr(shown, "page_of", stop)
+    monkeypatch.setattr(report, "page_of", stop)
     said = io.StringIO()
     with redirect_stdout(said):
         monkeypatch.setattr("command_line.io.StringIO", lambda: said)
@@ -136,14 +136,14 @@ def test_exact_a_full_disk_leaves_no_part_of_a_page(scene, tmp_path, monkeypatch
 
 
 def test_refuses_to_put_its_page_into_the_results_of_another_run(scene, tmp_path, monkeypatch):
-    out, page_of = tmp_path / "out", shown.page_of
+    out, page_of = tmp_path / "out", report.page_of
 
     def slow(*given):  # another run of the same folder ends while this one draws
         os.replace(out, tmp_path / "first")
         assert cli("run", scene, "-o", out, "--no-page", "--set", "slide.cycles=3").code == 0
         return page_of(*given)
 
-    monkeypatch.setattr(shown, "page_of", slow)
+    monkeypatch.setattr(report, "page_of", slow)
     answer = cli("run", scene, "-o", out)
     assert answer.code == 4 and "replaced by another run" in answer.err
     assert {path.name for path in out.iterdir()} == {path.name for path in (tmp_path / "first").iterdir()} == WHOLE

@@ -7,7 +7,7 @@ import pytest
 from command_line import cli
 
 import patchfem as pf
-from patchfem.export import shown
+from patchfem.export import page_data
 from patchfem.export.drawing import charts
 from patchfem.export.report import picture
 
@@ -58,7 +58,7 @@ def test_exact_the_first_row_is_the_rms_with_the_interval_of_records(found, tmp_
 def test_exact_the_spectra_of_an_oscillator(found):
     """White noise of G: G |H|^2 of the place, H = 1/(w0^2 - w^2 + 2 i zeta w0 w); each line of the record scatters by
     some 18 %, the middle of the band by less."""
-    made = picture("spectra", shown.report_data(found)).charts(found.extra["spectra"], 100.0)
+    made = picture("spectra", page_data.data_of(found)).charts(found.extra["spectra"], 100.0)
     assert [one["title"].split()[0] for one in made] == ["Displacement", "Acceleration", "H1:"]
     (density,), (_, base), (_, gain, peak) = (one["marks"] for one in made)
     assert all(20 <= one["x"].min() and one["x"].max() <= 400 for one in (density, base, gain))

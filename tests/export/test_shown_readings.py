@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from patchfem.export.shown import page_of, report_data
+from patchfem.export.page_data import data_of
+from patchfem.export.report import page_of
 from patchfem.runs.run import run
 from patchfem.scene.scene import SceneError, load
 
@@ -37,8 +38,8 @@ def test_exact_a_sine_reads_as_its_effective_value(tmp_path):
     """A sine's rms is its peak over the root of two, beside the measured row and nowhere else."""
     plain, read = (run(scene_of(tmp_path, *sets)) for sets in ((), ("measured.reading=rms",)))
     assert read.measures["absolute_acceleration_peak"].value == plain.measures["absolute_acceleration_peak"].value
-    data = report_data(read)["measured"]
-    assert data["share"] == pytest.approx(np.sqrt(0.5), rel=1e-5) and report_data(plain)["measured"]["share"] == 1
+    data = data_of(read).measured
+    assert data.share == pytest.approx(np.sqrt(0.5), rel=1e-5) and data_of(plain).measured.share == 1
     peak = plain.measures["absolute_acceleration_peak"].value / 9.80665
     assert f"{1.5 * np.sqrt(0.5) * peak:.3g} g" in page_of(read, {})
     assert f"{1.5 * peak:.3g} g" in page_of(plain, {})

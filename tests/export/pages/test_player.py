@@ -13,6 +13,7 @@ from page_data import data_of
 from patchfem.export import report
 from patchfem.export.drawing.panels import corners, panels, sizes
 from patchfem.export.fields.series import Series, moving
+from patchfem.export.page_data import PressedPatch, RunData, SceneText, Verdict
 from patchfem.export.pages import player
 from patchfem.export.pages.thinned import spread, thinned
 
@@ -162,8 +163,8 @@ def opened(bench, film, chromium):
     with h5netcdf.File(bench / "result.nc", "r") as file:
         x, fields = file["x"][...], {"normal_stress": file["normal_stress"][...], "time": file["frame_time"][...],
                                      "shear_stress": file["shear_stress"][...]}
-    text = report.page({"name": "a", "summary": summary, "scene": "</pre><b id=evil>&", "resolved": "", "sentence": "s",
-                        "engine": "", "fields": fields, "x": x, "cycles": None, "versions": {}, "film": film})
+    text = report.page(RunData(SceneText("a", "</pre><b id=evil>&", ""), Verdict(summary, "s"), {},
+                               PressedPatch(x, fields=fields, film=film)))
     assert len(text.encode()) < 3e6 and data_of(text)["player"]["of"] == film["of"]
     return chromium.opened(text)
 

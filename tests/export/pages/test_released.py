@@ -10,9 +10,10 @@ from command_line import cli
 import patchfem as pf
 from patchfem.export.drawing.charts import histories
 from patchfem.export.drawing.pictures import draw
+from patchfem.export.page_data import Motion, RunData, SceneText, Verdict
 from patchfem.export.pages.released import released, swung
 from patchfem.export.pages.words import headline
-from patchfem.export.report import _histories
+from patchfem.export.report import picture
 from patchfem.scene.starting import text_of
 
 IWAN = """
@@ -92,8 +93,9 @@ def test_exact_the_picture_of_the_whole_run_shows_every_turn():
     still = np.zeros(late.size)
     history = {"time": np.r_[time, late], "displacement": np.r_[swing, still - 5e-6], "force": np.zeros(5007)}
     window = {"time": late, "displacement": still - 5e-6, "acceleration": still, "base": still}
-    data = {"history": history, "window": window, "loop": {"period": 1 / 143}, "cycles": 43.0, "released": "released"}
-    found = _histories(data)
+    motion = Motion(history, {}, window, 1 / 143)
+    data = RunData(SceneText("a", "", ""), Verdict({}, "", 43.0, "released"), {}, motion=motion)
+    found = picture("history", data)
     early, last = histories(*found.values)[0]["marks"]
     assert {early["kind"], last["kind"]} == {"line"} and early["x"].size == 7 and early["x"][-1] == last["x"][0]
     assert np.allclose(early["y"][:6], 1e6 * swing) and "turning points and stops were kept" in found.caption

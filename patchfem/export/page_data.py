@@ -1,0 +1,342 @@
+"""What the page and the pictures of a run show, as plain arrays and texts in SI units."""
+
+import tomllib
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from ..core import BaseSine, PatchfemError
+from ..inputs import loops, measured
+from ..response import spectrum
+from ..runs.results.result import Result, surface_of
+from ..structure.drive_sizes import largest
+from .histories import largest_multiplier
+from .pages.driven import command, driven
+from .pages.released import released
+from .pages.words import verdict
+from .summary import cycles_of, summary_of, versions
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class SceneText:
+    """The scene of a run: as written, with all defaults in SI, and what was set on the command line."""
+
+    name: str
+    text: str
+    resolved: str
+    sets: tuple = ()
+    driven: str = ""
+    command: str = ""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Verdict:
+    """How a run ended.
+
+    Attributes
+    ----------
+    summary : dict
+        As summary.json holds it.
+    sentence : str
+        How the run ended.
+    cycles : float or None
+        Cycles of the drive; None for a run without cycles.
+    released : str
+        How a released output swung.
+    steady : dict or None
+        `regime` and `multiplier` of a steady motion that was found directly.
+    engine : str
+    means : dict
+        {measure: its definition}.
+    """
+
+    summary: dict
+    sentence: str
+    cycles: float | None = None
+    released: str = ""
+    steady: dict | None = None
+    engine: str = ""
+    means: dict = field(default_factory=dict)
+
+    def is_part_of_cycle(self) -> bool:
+        """Check whether the run ended before its first cycle did."""
+        return self.cycles is not None and self.cycles < 1 - 1e-6
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class PressedPatch:
+    """A patch in contact, or none.
+
+    Attributes
+    ----------
+    x : (m,) ndarray or None
+        Positions along the interface [m]; None without a patch.
+    width : float or None
+        [m].
+    fields : dict
+        {name: (f, m)} over the frames at `time` (f,).
+    faces : list
+        (x, fields, name) of each interface that has a patch of its own.
+    bodies : dict or None
+        The pressed pieces, from `fields.bodies.write_fields`.
+    film : dict or None
+        From `pages.player.reel`.
+    """
+
+    x: np.ndarray | None = None
+    width: float | None = None
+    fields: dict = field(default_factory=dict)
+    faces: list = field(default_factory=list)
+    bodies: dict | None = None
+    film: dict | None = None
+
+    def touches(self) -> bool:
+        """Check whether some of the patch is in contact."""
+        return (
+            self.x is not None
+            and bool(self.fields)
+            and bool(np.any(self.fields["normal_stress"][0] > 0))
+        )
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Motion:
+    """Histories of a run.
+
+    Attributes
+    ----------
+    history : dict
+        `time`, `displacement` and `force` of the whole run; `measured` (time, force) where a file has them.
+    loop : dict
+        `slide`, `force` and `time` of the friction loop; `each`: (name, slide, force) of several interfaces.
+    window : dict or None
+        The last cycles of a rig; None for a bench.
+    period : float or None
+        [s].
+    recorded : tuple or None
+        (file name, slide, force) of a measured loop.
+    """
+
+    history: dict
+    loop: dict
+    window: dict | None = None
+    period: float | None = None
+    recorded: tuple | None = None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Wear:
+    """Wear of a patch: `history` of measures over the cycles, `states` of the profiles, period of a cycle [s]."""
+
+    history: dict
+    states: dict
+    period: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Evaluations:
+    """What was evaluated beside the histories, each None where the run has none."""
+
+    curve: object = None
+    decay: object = None
+    spectra: object = None
+    levels: list | None = None
+    wear: Wear | None = None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Measured:
+    """Measured responses to compare with.
+
+    Attributes
+    ----------
+    rows : list
+        Rows of the table.
+    gains : tuple
+        Reading factors of the accelerometer and of the displacement gauge.
+    frequency, input : float or None
+        Of the drive [Hz], [m s-2].
+    reading : str
+        How the accelerometer reads a motion.
+    share : float
+        What it reads, as a fraction of the peak.
+    """
+
+    rows: list
+    gains: tuple
+    frequency: float | None = None
+    input: float | None = None
+    reading: str = "peak"
+    share: float = 1.0
+
+    def is_comparable(self) -> bool:
+        """Check whether a drive with a frequency makes the rows comparable."""
+        return self.input is not None and self.frequency is not None
+
+    def factors(self) -> tuple:
+        """Return what accelerometer and gauge show per peak acceleration and displacement."""
+        acceleration, displacement = self.gains
+        return acceleration * self.share, displacement
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RunData:
+    """All that the page of a run shows."""
+
+    source: SceneText
+    verdict: Verdict
+    versions: dict
+    patch: PressedPatch = field(default_factory=PressedPatch)
+    motion: Motion | None = None
+    evaluations: Evaluations = field(default_factory=Evaluations)
+    measured: Measured | None = None
+
+
+def data_of(result: Result) -> RunData:
+    """Collect what the page of a run shows."""
+    source = result.plan.model.source
+    tables = tomllib.loads(source.resolved)
+    motion = None
+    if result.response is not None:
+        motion = (
+            _bench_motion(result, tables) if result.plan.kind == "bench" else _rig_motion(result)
+        )
+    return RunData(
+        source=SceneText(
+            source.path.stem,
+            source.text,
+            source.resolved,
+            source.sets,
+            driven(tables),
+            command(source.path, source.sets),
+        ),
+        verdict=_verdict(result),
+        versions=versions(),
+        patch=_patch(result),
+        motion=motion,
+        evaluations=_evaluations(result),
+        measured=_measured(result),
+    )
+
+
+def _verdict(result: Result) -> Verdict:
+    summary = summary_of(result)
+    steady = None
+    if "regime" in result.extra:
+        steady = {"regime": result.extra["regime"], "multiplier": largest_multiplier(result.extra)}
+    return Verdict(
+        summary=summary,
+        sentence=verdict(summary),
+        cycles=cycles_of(result),
+        released=released(result),
+        steady=steady,
+        engine=result.extra.get("engine", ""),
+        means={name: measure.text for name, measure in result.measures.items()},
+    )
+
+
+def _patch(result: Result) -> PressedPatch:
+    faces = [
+        (face.surface.x, face.fields, f"interface {face.name}")
+        for face in result.extra.get("faces", ())
+    ]
+    if result.patch is None:
+        return PressedPatch(fields=result.fields, faces=faces)
+    fields = result.fields
+    if "wear" in result.extra:  # the frames behind the states of the wear show the worn patch
+        count = result.extra["wear_shown"]["states"]
+        fields = {name: rows[count:] for name, rows in fields.items()}
+        fields["time"] = fields["time"] - fields["time"][0]
+    return PressedPatch(
+        surface_of(result.patch, result.fields).x, result.plan.model.patch.width, fields, faces
+    )
+
+
+def _evaluations(result: Result) -> Evaluations:
+    extra, levels, wear = result.extra, None, None
+    if "levels" in extra:
+        names = ("drive", "stuck", "values", "errors", "unit", "outcome")
+        levels = [{name: getattr(level, name) for name in names} for level in extra["levels"]]
+    if "wear" in extra:
+        count = extra["wear_shown"]["states"]
+        states = {name: rows[: count + 1] for name, rows in result.fields.items()}
+        wear = Wear(extra["wear"], states, extra["wear_shown"]["period"])
+    return Evaluations(extra.get("curve"), extra.get("decay"), extra.get("spectra"), levels, wear)
+
+
+def _bench_motion(result: Result, tables: dict) -> Motion:
+    response, window = result.response, result.window
+    history = {"time": response.time, "displacement": response.slide, "force": response.force}
+    loop = {"slide": window.slide, "force": window.force, "time": window.time}
+    recorded = None
+    read = _recorded(result.plan.model.source.path.parent, tables["slide"], response)
+    if read is not None:
+        time, slide, force = read
+        history["measured"] = time, force
+        recorded = Path(tables["slide"]["file"]).name, slide, force
+    return Motion(history, loop, recorded=recorded)
+
+
+def _recorded(folder: Path, slide: dict, response) -> tuple | None:
+    """Read times [s], slides [m] and forces [N] from the file of a slide; None where it holds no force."""
+    if slide["kind"] != "file":
+        return None
+    try:
+        read = loops.read_loop(folder / slide["file"])
+    except PatchfemError:  # a path alone; its own mistakes were found when it was read as one
+        return None
+    if read.time is None:
+        return None
+    load = 1.0 if read.quantity == "force" else np.interp(read.time, response.time, response.load)
+    return read.time, read.displacement, read.reading * load
+
+
+def _rig_motion(result: Result) -> Motion:
+    response, window, rig = result.response, result.window, result.plan.model.rig
+    loop = {"slide": window.slide, "force": window.force, "time": window.time}
+    if rig.names and "slides" in window.extra:
+        loop["each"] = list(zip(rig.names, window.extra["slides"].T, window.extra["forces"].T))
+        for k, (name, interface) in enumerate(zip(rig.names, rig.interfaces)):
+            if interface.lateral:
+                loop["each"].append(
+                    (
+                        f"{name}, across: {interface.lateral}",
+                        window.extra["lateral_slides"][:, k],
+                        window.extra["lateral_forces"][:, k],
+                    )
+                )
+    return Motion(
+        history={"time": response.time, "displacement": response.output, "force": response.force},
+        loop=loop,
+        window={
+            "time": window.time,
+            "displacement": window.output,
+            "acceleration": window.acceleration,
+            "base": window.base_acceleration,
+            "force": window.force,
+            "slide": window.slide,
+        },
+        period=result.extra["period"],
+    )
+
+
+def _measured(result: Result) -> Measured | None:
+    model = result.plan.model
+    if model.measured is None:
+        return None
+    path, gains, kind, cutoff = model.measured
+    found = Measured(measured.read_table(path), gains)
+    rig = model.rig
+    if rig is None:
+        return found
+    found = replace(found, frequency=rig.frequency, input=largest(rig.drive))
+    acceleration = result.measures.get("absolute_acceleration_peak")
+    if kind == "peak" or not isinstance(rig.drive, BaseSine) or acceleration is None:
+        return found
+    peak = acceleration.value
+    return replace(
+        found,
+        reading=kind,
+        share=spectrum.reading(result.window, rig.drive, peak, kind, cutoff) / peak,
+    )
