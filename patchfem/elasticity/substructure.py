@@ -22,10 +22,11 @@ from .lapack import one_thread
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Substructure:
-    """One piece of any mesh, assembled and factorised when first needed.
+    """One piece of any mesh, held at its far face; assembled and factorised when first needed.
 
-    A piece whose compliance is kept on disk is never assembled. mesh: mesh.anymesh.PieceMesh; layers: its Layers;
-    made: what has been assembled.
+    A piece whose compliance is kept on disk is never assembled. Factors that do not solve the system raise
+    NotConverged: one step of refinement then moves the solution for a `rough` load by more than 1e-2; a smaller move is
+    the `rounding`. mesh: mesh.anymesh.PieceMesh; layers: its Layers; made: what has been assembled.
     """
 
     mesh: object
@@ -61,18 +62,6 @@ class Substructure:
         if not self.made:
             self.made.update(zip(("order", "factor", "rounding"), _assembled(self.mesh, self.layers)))
         return self.made[name]
-
-
-def assemble(mesh, layers: Layers) -> Substructure:
-    """Assemble and factorise at once one piece held at its far face.
-
-    mesh: points (N, 2) as x and depth [m], triangles, quads, is_coating, interface, far as in mesh.anymesh.PieceMesh.
-    NotConverged when the factors do not solve the system: one step of refinement moves the solution for a `rough` load
-    by more than 1e-2; a smaller move is its `rounding`.
-    """
-    piece = Substructure(mesh, layers)
-    _ = piece.factor
-    return piece
 
 
 def _assembled(mesh, layers: Layers) -> tuple:

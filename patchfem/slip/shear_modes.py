@@ -461,9 +461,10 @@ def _backbone(limit, shape, values, length, slides, start) -> tuple:
 
 
 def tangential_stiffness(tangential: np.ndarray, active: np.ndarray) -> float:
-    """Tangential stiffness dT/d(slide) [N/m] of a patch with every node of its contact set sticking.
+    """Return the tangential stiffness dT/d(slide) [N/m] of a patch with every node of its contact set sticking.
 
-    tangential: compliance (m, m) [m/N]; active: (m,) bool contact set.
+    Of the normal compliance it is dN/d(approach) at fixed rotation. tangential: compliance (m, m) [m/N]; active: (m,)
+    bool contact set.
     """
     index = np.flatnonzero(active)
     return float(np.linalg.solve(tangential[np.ix_(index, index)], np.ones(index.size)).sum())
@@ -488,11 +489,3 @@ def rotational_stiffness(normal: np.ndarray, x: np.ndarray, active: np.ndarray) 
     """
     index = np.flatnonzero(active)
     return float(np.linalg.solve(normal[np.ix_(index, index)], x[index]) @ x[index])
-
-
-def normal_stiffness(normal: np.ndarray, active: np.ndarray) -> float:
-    """Normal stiffness dN/d(approach) [N/m] at fixed rotation and contact set.
-
-    normal: compliance (m, m) [m/N]; active: (m,) bool contact set.
-    """
-    return tangential_stiffness(normal, active)

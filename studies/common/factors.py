@@ -32,7 +32,7 @@ def factorise(matrix: csc_matrix, firsts, name: str):
 
 
 def assemble(mesh, layers, name: str) -> Substructure:
-    """The piece of any mesh as `substructure.assemble` has it, with the factors of this name."""
+    """The piece of any mesh as a `Substructure`, with the factors of this name."""
     order, firsts = elimination(mesh)
     piece = Substructure(mesh, layers, {"order": order, "rounding": 0.0})
     with one_thread():

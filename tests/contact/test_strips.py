@@ -18,7 +18,7 @@ from patchfem.contact.strips import one_strip, press_strips, strip_offsets, stri
 from patchfem.contact.strips_solve import Slices
 from patchfem.contact.unilateral import LIMIT, press, press_by, solve_forces
 from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
-from patchfem.slip.shear_modes import normal_stiffness, tangential_stiffness
+from patchfem.slip.shear_modes import tangential_stiffness
 
 AREA = LENGTH * WIDTH
 MEAN = LOAD / AREA
@@ -184,7 +184,7 @@ def test_figure_yaw_moment_of_a_rolled_pad_on_a_linear_skin(roll, yaw):
 @pytest.mark.parametrize("roll", [1e-5, 1e-4, 1e-3])
 def test_exact_flat_pieces_are_a_rigid_pad_on_their_own_stiffness(roll):
     """Without tilt a strip touches all along or not at all: a foundation of dN/d(approach) per area, and its wedge."""
-    stiffness = normal_stiffness(coated_pair(60).normal, np.ones(61, bool)) / AREA
+    stiffness = tangential_stiffness(coated_pair(60).normal, np.ones(61, bool)) / AREA
     fraction, centre, _, _ = wedge_linear(roll, LOAD, WIDTH, LENGTH, stiffness)
     for count in (7, 16, 256):
         c, x, weight, y = real(count)
@@ -418,7 +418,7 @@ def test_exact_stiffnesses_without_roll_are_those_of_one_patch():
     y, gap = strip_offsets(WIDTH, 8), 1e-4 * pair.interface.x
     bare = press_strips(c, pair.interface.x, weight, y, gap, load=LOAD)
     active = bare.force[0] > 0
-    assert strips_tangent(c, weight, bare) == pytest.approx(normal_stiffness(pair.normal, active), rel=1e-12)
+    assert strips_tangent(c, weight, bare) == pytest.approx(tangential_stiffness(pair.normal, active), rel=1e-12)
     assert strips_tangent(tangential, weight, bare) == pytest.approx(tangential_stiffness(pair.tangential, active),
                                                                      rel=1e-12)
     skin = SKINS["hertz"]

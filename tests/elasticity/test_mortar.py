@@ -162,7 +162,7 @@ def crooked(sizes, seed):
 def two_crooked(poisson=0.0, stiff=100.0):
     """Two crooked blocks of 12 and 9 columns, the upper one `stiff` times as stiff, assembled and condensed."""
     rng = np.random.default_rng(4)
-    pair = [substructure.assemble(crooked(rng.uniform(0.5, 1.0, count), count), bare((young, poisson)))
+    pair = [substructure.Substructure(crooked(rng.uniform(0.5, 1.0, count), count), bare((young, poisson)))
             for count, young in ((12, YOUNG), (9, stiff * YOUNG))]
     return pair, [elasticity.interface_compliance(piece) for piece in pair]
 

@@ -157,7 +157,7 @@ def test_exact_energy_is_the_work_of_the_load_and_shares_add_up(split):
         face = np.arange(SMALL.x.size) * SMALL.depth.size
     else:
         mesh = of_grid(SMALL, split, seed=2)
-        piece, face = substructure.assemble(mesh, COATED), mesh.interface
+        piece, face = substructure.Substructure(mesh, COATED), mesh.interface
     u = elasticity.displacement(piece, *force)
     found = indicator(recovery(cells_of(piece)), u, middle_stress(piece, u))
     work = (force.transpose(1, 2, 0) * u[:, face]).sum(axis=(1, 2))
@@ -260,7 +260,7 @@ def test_exact_bond_line_carries_the_load_and_its_moment(kind, seed, plane):
     else:
         mesh = of_grid(SMALL, 0.5, seed=2) if kind == "mixed" else \
             cloud(1e-3, 1e-3, lambda x, y: 8e-5 + 0.1 * y + 0 * x, COATING)
-        piece, x = substructure.assemble(mesh, layers), mesh.x
+        piece, x = substructure.Substructure(mesh, layers), mesh.x
     shear, normal = np.random.default_rng(seed).normal(size=(2, 2, x.size))
     cells = cells_of(piece)
     bond = bond_line(cells, elasticity.displacement(piece, shear, normal))
@@ -349,9 +349,9 @@ def test_exact_indicator_of_any_mesh_is_the_energy_a_finer_mesh_adds(split):
     force[:-1] += step * (2 * pressure[:-1] + pressure[1:]) / 6
     force[1:] += step * (2 * pressure[1:] + pressure[:-1]) / 6
     hats = np.array([np.interp(finest.x, mesh.x, unit) for unit in np.eye(mesh.x.size)])
-    fine = substructure.assemble(finest, COATED)
+    fine = substructure.Substructure(finest, COATED)
     energy = force @ elasticity.displacement(fine, 0 * force, force)[0, finest.interface, 1]
-    piece, load = substructure.assemble(mesh, COATED), hats @ force
+    piece, load = substructure.Substructure(mesh, COATED), hats @ force
     u = elasticity.displacement(piece, 0 * load, load)
     true = (energy - load @ u[0, mesh.interface, 1]) * 16 / 15
     found = indicator(recovery(cells_of(piece)), u, middle_stress(piece, u))

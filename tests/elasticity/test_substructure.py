@@ -22,7 +22,7 @@ from patchfem.elasticity import elasticity
 from patchfem.elasticity.elasticity import Layers, displacement, lame
 from patchfem.elasticity.elasticity import interface_compliance as condense
 from patchfem.elasticity.recovery import middle_stress
-from patchfem.elasticity.substructure import assemble
+from patchfem.elasticity.substructure import Substructure
 from patchfem.mesh.anymesh import halved
 from patchfem.mesh.tensor import graded_grid
 
@@ -35,7 +35,7 @@ def test_exact_a_tensor_grid_read_as_any_mesh_is_the_sweep(cells, plane):
     grid = graded_grid(LENGTH, HEIGHT, LENGTH / cells, COATING)
     layers = Layers(CARBIDE, TITANIUM, plane)
     wanted = elasticity.interface_compliance(elasticity.assemble(grid.x, grid.depth, grid.coating_rows, layers))
-    found = condense(assemble(of_grid(grid, seed=cells), layers))
+    found = condense(Substructure(of_grid(grid, seed=cells), layers))
     for mine, theirs in zip(found, wanted):
         assert np.abs(mine - theirs).max() <= 1e-9 * np.abs(theirs).max()
         assert not mine.flags.writeable
@@ -44,7 +44,7 @@ def test_exact_a_tensor_grid_read_as_any_mesh_is_the_sweep(cells, plane):
 @pytest.mark.parametrize("split", [0.0, 0.5, 1.0])
 def test_exact_compliance_is_the_interface_block_of_the_dense_inverse(split):
     mesh = of_grid(graded_grid(4e-3, 2e-3, 2e-4, COATING), split, seed=7)
-    piece = assemble(mesh, COATED)
+    piece = Substructure(mesh, COATED)
     m = 2 * mesh.interface.size
     wanted = np.linalg.inv(stiffness_of(piece).toarray())[-m:, -m:]
     nn, tt, nt = condense(piece)
@@ -59,10 +59,10 @@ def test_exact_compliance_is_the_interface_block_of_the_dense_inverse(split):
 def test_always_numbering_does_not_matter_and_triangles_are_stiffer_than_halved_ones(coating, substrate, plane, split):
     grid = graded_grid(4e-3, 2e-3, 1e-3, COATING)
     layers = Layers(coating, substrate, plane)
-    base = condense(assemble(of_grid(grid, split), layers))
-    for mine, theirs in zip(condense(assemble(of_grid(grid, split, seed=3), layers)), base):
+    base = condense(Substructure(of_grid(grid, split), layers))
+    for mine, theirs in zip(condense(Substructure(of_grid(grid, split, seed=3), layers)), base):
         assert np.abs(mine - theirs).max() <= 1e-9 * base[0].max()
-    fine = condense(assemble(halved(of_grid(grid, split)), layers))
+    fine = condense(Substructure(halved(of_grid(grid, split)), layers))
     kept = [part[::2, ::2] for part in fine]
     more = np.block([[kept[0] - base[0], kept[2] - base[2]], [(kept[2] - base[2]).T, kept[1] - base[1]]])
     assert np.linalg.eigvalsh(more).min() >= -1e-9 * base[0].max()  # nested spaces: refining only softens
@@ -74,7 +74,7 @@ def test_exact_stress_of_a_linear_field_on_crooked_cells_obeys_hooke(material, p
     rng = np.random.default_rng(2)
     inner = (np.abs(mesh.points[:, 0]) < 1.99e-3) & (mesh.points[:, 1] > 0) & (mesh.points[:, 1] < 1.99e-3)
     mesh.points[inner] += rng.uniform(-4e-6, 4e-6, (inner.sum(), 2))
-    piece = assemble(mesh, bare(material, plane))
+    piece = Substructure(mesh, bare(material, plane))
     slope = np.reshape(slopes, (2, 2)) * 1e-3
     stress = middle_stress(piece, (mesh.points @ slope.T)[None])
     mises = elasticity.von_mises(stress)
@@ -93,7 +93,7 @@ def test_exact_stress_of_a_linear_field_on_crooked_cells_obeys_hooke(material, p
 def test_exact_fields_are_those_of_the_compliance_and_of_the_tensor_grid(split):
     grid = graded_grid(4e-3, 2e-3, 2e-4, COATING)
     mesh = of_grid(grid, split, seed=5)
-    piece = assemble(mesh, COATED)
+    piece = Substructure(mesh, COATED)
     nn, tt, nt = condense(piece)
     shear, normal = np.random.default_rng(1).normal(size=(2, 3, grid.x.size))
     u = displacement(piece, shear, normal)
@@ -121,7 +121,7 @@ def hertz(per_half_width):
     fine = a / per_half_width
     mesh = cloud(6e-3, 6e-3, lambda x, y: fine + 0.1 * np.hypot(np.maximum(np.abs(x) - 1.3 * a, 0),
                                                                 max(y - 4 * fine, 0)))
-    nn, tt, _ = condense(assemble(mesh, bare(TITANIUM)))
+    nn, tt, _ = condense(Substructure(mesh, bare(TITANIUM)))
     pair = Compliance(Interface(mesh.x, mesh.tributary(), 1.0), 2 * nn, 2 * tt)
     modulus = TITANIUM[0] / (1 - TITANIUM[1] ** 2) / 2
     state = press(pair, crown(mesh.x, np.pi * modulus * a**2 / (4 * load)), load)
@@ -144,7 +144,7 @@ def harmonic_error(wave, cells):
     """One half wave of pressure on the coated piece of triangles, from its energy, against the layered half space."""
     fine = wave / 2 / cells
     mesh = cloud(wave / 4, 2 * wave, lambda x, y: 0 * x + min(fine + 0.05 * y, wave / 16), COATING)
-    piece = assemble(mesh, COATED)
+    piece = Substructure(mesh, COATED)
     x, k = mesh.x, 2 * np.pi / wave
     gauss, weight = np.polynomial.legendre.leggauss(5)
     force = np.zeros(x.size)
@@ -175,7 +175,7 @@ def test_always_twenty_thousand_unknowns_condense_within_a_second():
     seconds = []
     for _ in range(3):
         begin = time.process_time()
-        condense(assemble(mesh, COATED))
+        condense(Substructure(mesh, COATED))
         seconds.append(time.process_time() - begin)
     assert min(seconds) < 1.0
 
@@ -187,7 +187,7 @@ def test_refuses_a_bare_piece_too_slender_for_its_cells_by_their_length_and_long
     layers = Layers((young, nu), (young, nu), "stress")
     fine, coarse = (of_grid(graded_grid(length, height, length / cells), seed=1) for cells in (96, 3))
     with pytest.raises(NotConverged, match=r"shortest cell is 1.04 um in a piece of 100 um x 20 m: use longer"):
-        assemble(fine, layers)
-    normal, *_ = condense(assemble(coarse, layers))
+        condense(Substructure(fine, layers))
+    normal, *_ = condense(Substructure(coarse, layers))
     share = coarse.tributary() / length
     assert share @ normal @ share == pytest.approx(height / (young * length), rel=1e-3)

@@ -25,7 +25,7 @@ from patchfem.elasticity.elasticity import (
     von_mises,
 )
 from patchfem.elasticity.recovery import cells_of, indicator, middle_stress, recovery
-from patchfem.elasticity.substructure import assemble as assemble_mesh
+from patchfem.elasticity.substructure import Substructure
 from patchfem.elasticity.tensor_stiffness import applied
 from patchfem.mesh.anymesh import PieceMesh
 from patchfem.mesh.tensor import graded_grid
@@ -93,7 +93,7 @@ def test_exact_a_bent_grid_is_the_same_piece_as_a_mesh_of_any_cells():
     piece = assemble_nodes(nodes, 3, COATED)
     flat, number = nodes.reshape(-1, 2), np.arange(135).reshape(15, 9)
     mesh = PieceMesh(flat, np.empty((0, 3), int), piece.cells, piece.is_coating, number[:, 0], number[:, -1])
-    other = assemble_mesh(mesh, COATED)
+    other = Substructure(mesh, COATED)
     for mine, theirs in zip(interface_compliance(piece), interface_compliance(other)):
         assert np.abs(mine - theirs).max() <= 1e-11 * np.abs(theirs).max()
     shear, normal = np.random.default_rng(0).normal(size=(2, 2, 15))
@@ -110,7 +110,7 @@ def test_exact_a_bent_grid_is_the_same_piece_as_a_mesh_of_any_cells():
 @pytest.mark.parametrize("split", [0.0, 0.4, 1.0])
 def test_exact_a_mesh_of_any_cells_has_the_stiffness_of_scikit_fem_s_own_form(split):
     mesh = of_grid(graded_grid(4e-3, 2e-3, 3e-4, COATING), split, seed=3)
-    piece, first, whole = assemble_mesh(mesh, COATED), len(mesh.triangles), 0
+    piece, first, whole = Substructure(mesh, COATED), len(mesh.triangles), 0
     for shape, element, cells, coated, degree in (
             (MeshTri, ElementTriP1, mesh.triangles, mesh.is_coating[:first], 1),
             (MeshQuad, ElementQuad1, mesh.quads, mesh.is_coating[first:], 2)):

@@ -13,7 +13,7 @@ from patchfem.contact.unilateral import press
 from patchfem.core import Compliance, Interface, Missing, PatchfemError
 from patchfem.elasticity.elasticity import Layers
 from patchfem.elasticity.elasticity import interface_compliance as condense
-from patchfem.elasticity.substructure import assemble
+from patchfem.elasticity.substructure import Substructure
 from patchfem.mesh.files import read_pieces, write_mesh
 
 try:
@@ -55,7 +55,7 @@ def test_exact_rounded_punch_within_one_percent(quads):
     flat, radius, modulus = 0.1e-3, 61e-3, TITANIUM[0] / (1 - TITANIUM[1]**2) / 2
     load = 0.5 * flat**2 * modulus / radius
     pair = rounded_pair(12e-3, 6e-3, 0.0, radius, flat / 40, 0.6e-3, flat=flat, quads=quads)
-    low = condense(assemble(pair.lower, Layers(TITANIUM, TITANIUM, "strain")))
+    low = condense(Substructure(pair.lower, Layers(TITANIUM, TITANIUM, "strain")))
     nn, tt = (2 * part for part in low[:2])
     x, weight = pair.lower.x, pair.lower.tributary()
     state = press(Compliance(Interface(x, weight, 1.0), nn, tt), pair.lower.rise + pair.upper.rise, load)

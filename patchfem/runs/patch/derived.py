@@ -26,7 +26,11 @@ def static_measures(asked, patch: Patch, coarse, tolerance: float | None) -> dic
     def make() -> dict:
         return measures(patch, *coarse, tolerance=tolerance)
 
-    return store.reuse(("measures", patch, coarse, tolerance), make) if store.is_shared(asked) else make()
+    return (
+        store.reuse(("measures", patch, coarse, tolerance), make)
+        if store.is_shared(asked)
+        else make()
+    )
 
 
 def plane_notes(asked, patch: Patch) -> list:
@@ -56,7 +60,9 @@ def elements(patch: Patch, static: float, length: float) -> "shear_modes.Jenkins
     def make() -> "shear_modes.JenkinsSet":
         if length or not static > 0:
             return shear_modes.jenkins_set(patch.giving, static * load, length)
-        unit_elements = store.reuse(("unit elements", patch), lambda: shear_modes.jenkins_set(patch.giving, load))
+        unit_elements = store.reuse(
+            ("unit elements", patch), lambda: shear_modes.jenkins_set(patch.giving, load)
+        )
         return shear_modes.scaled(unit_elements, static)
 
     return store.reuse(("elements", patch, static, length), make)
@@ -76,5 +82,7 @@ def strip_elements(patch: Patch, static: float, length: float) -> tuple[StripEle
         found = shear_modes.jenkins_set(giving, static * force, length)
         return StripElements(found.stiffness, found.yield_slide)
 
-    return store.reuse(("strip elements", patch, static, length),
-                       lambda: tuple(elements_under(force) for force in patch.strips.force))
+    return store.reuse(
+        ("strip elements", patch, static, length),
+        lambda: tuple(elements_under(force) for force in patch.strips.force),
+    )

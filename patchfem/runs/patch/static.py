@@ -89,27 +89,44 @@ class Together(NamedTuple):
 
     def band(self, asked, k: int) -> list:
         """The sentence of `measures.plane_band` on the k-th patch, a PatchModel."""
-        return one_by_one.band_words(asked, *({name: float(column[k]) for name, column in one.items()}
-                                              for one in self.planes)) if self.planes else []
+        return (
+            one_by_one.band_words(
+                asked,
+                *({name: float(column[k]) for name, column in one.items()} for one in self.planes),
+            )
+            if self.planes
+            else []
+        )
 
     def measures(self, k: int, floors: Mapping | None = None) -> dict:
         """The measures of the k-th patch by name; floors: name -> (q,) in place of those of the table."""
-        return {name: Measure(float(column[k]), TABLE[name].unit, float(self.errors[name][k]),
-                              TABLE[name].floor if floors is None else float(floors[name][k]),
-                              engine=one_by_one.mesh_engine(column[k], self.levels[0].values[name][k]))
-                for name, column in self.values.items()}
+        return {
+            name: Measure(
+                float(column[k]),
+                TABLE[name].unit,
+                float(self.errors[name][k]),
+                TABLE[name].floor if floors is None else float(floors[name][k]),
+                engine=one_by_one.mesh_engine(column[k], self.levels[0].values[name][k]),
+            )
+            for name, column in self.values.items()
+        }
 
 
 def not_together(asked) -> str:
     """Why a `PatchModel` is not pressed together with others; "" where it may be."""
     if asked.meshes is None:
         return "the case has a mesh of its own"
-    if not all(isinstance(body, TensorGrid) or body is None for level in asked.meshes.levels for body in level):
+    if not all(
+        isinstance(body, TensorGrid) or body is None
+        for level in asked.meshes.levels
+        for body in level
+    ):
         return "the meshes of the pieces are not plain grids"
     if asked.gap.profile is not None:
         return "a profile has its own averaging length"
-    return _not_of_one_stretch(asked) or \
-        ("" if len(asked.meshes.levels) > 2 else "the mesh of the case cannot be made coarser")
+    return _not_of_one_stretch(asked) or (
+        "" if len(asked.meshes.levels) > 2 else "the mesh of the case cannot be made coarser"
+    )
 
 
 def _not_of_one_stretch(asked) -> str:
@@ -118,7 +135,11 @@ def _not_of_one_stretch(asked) -> str:
         return "strips or a smooth skin lie between the pieces"
     if not asked.load:
         return "no load presses the pieces together"
-    return "the pressure of the case may be unbounded" if asked.singular_ends or asked.gap.jumps else ""
+    return (
+        "the pressure of the case may be unbounded"
+        if asked.singular_ends or asked.gap.jumps
+        else ""
+    )
 
 
 def pressing_kind(asked) -> tuple:
@@ -127,34 +148,51 @@ def pressing_kind(asked) -> tuple:
 
 
 def _kind(asked) -> tuple:
-    skin = None if asked.skin is None else (asked.skin.normal_stiffness, asked.skin.tangential_ratio)
+    skin = (
+        None if asked.skin is None else (asked.skin.normal_stiffness, asked.skin.tangential_ratio)
+    )
     return skin, asked.moment is None
 
 
 def asked_of(patches: Sequence) -> Asked:
     """What presses `PatchModel`s."""
     first = patches[0]
-    return Asked(first, np.array([one.load for one in patches], float),
-                 None if first.moment is None else np.array([one.moment for one in patches], float),
-                 np.array([one.spring for one in patches], float), np.array([one.gap.angle for one in patches], float),
-                 tuple(one.gap for one in patches))
+    return Asked(
+        first,
+        np.array([one.load for one in patches], float),
+        None if first.moment is None else np.array([one.moment for one in patches], float),
+        np.array([one.spring for one in patches], float),
+        np.array([one.gap.angle for one in patches], float),
+        tuple(one.gap for one in patches),
+    )
 
 
 def asked_by_columns(patch, count: int) -> Asked:
     """What presses `count` patches, given as one PatchModel whose numbers are columns where they differ."""
+
     def column(number) -> np.ndarray:
         return np.broadcast_to(np.asarray(number, float), count)
 
     moment = patch.moment
-    return Asked(patch, column(patch.load), None if moment is None else column(moment), column(patch.spring),
-                 column(patch.gap.angle), (patch.gap,))
+    return Asked(
+        patch,
+        column(patch.load),
+        None if moment is None else column(moment),
+        column(patch.spring),
+        column(patch.gap.angle),
+        (patch.gap,),
+    )
 
 
 def patches_on(patches, pair: Pair) -> list:
     """Each of `PatchModel`s of one geometry as a solved Patch on a Pair; None of those that do not press as this module
     can."""
     out, groups = [None] * len(patches), {}
-    grids = isinstance(pair.grid, TensorGrid) and isinstance(pair.upper_grid, TensorGrid) and not pair.closing.any()
+    grids = (
+        isinstance(pair.grid, TensorGrid)
+        and isinstance(pair.upper_grid, TensorGrid)
+        and not pair.closing.any()
+    )
     for k, asked in enumerate(patches if grids else ()):
         if not _not_of_one_stretch(asked):
             groups.setdefault(_kind(asked), []).append(k)
@@ -171,16 +209,25 @@ def solved_patches(patches, tolerance: float) -> list:
     """Each of `PatchModel`s alike in their pieces and in `pressing_kind` as SolvedPatch; None of those that do not
     press as this module can. tolerance: as `pressed_together` has it."""
     pairs, found = shared_pairs(patches[0]), pressed_together(asked_of(patches), tolerance)
-    return [SolvedPatch(found.measures(k), found.band(one, k),
-                        tuple(_patch_of(one, pair, level, k) for pair, level in zip(pairs, found.levels)))
-            if found.good[k] else None for k, one in enumerate(patches)]
+    return [
+        SolvedPatch(
+            found.measures(k),
+            found.band(one, k),
+            tuple(_patch_of(one, pair, level, k) for pair, level in zip(pairs, found.levels)),
+        )
+        if found.good[k]
+        else None
+        for k, one in enumerate(patches)
+    ]
 
 
 def missed_on(patches, pairs: list, tolerance: float) -> list:
     """For each of `PatchModel`s of one geometry on pieces, fine to coarse, its largest error over the tolerance; None
     for those that do not press as this module can."""
     out, groups = [None] * len(patches), {}
-    grids = all(isinstance(body, TensorGrid) for pair in pairs for body in (pair.grid, pair.upper_grid))
+    grids = all(
+        isinstance(body, TensorGrid) for pair in pairs for body in (pair.grid, pair.upper_grid)
+    )
     for k, asked in enumerate(patches if grids and len(pairs) > 2 else ()):
         if asked.gap.profile is None and not _not_of_one_stretch(asked):
             groups.setdefault((asked.mesh_tolerance, *_kind(asked)), []).append(k)
@@ -203,24 +250,50 @@ def pressed_together(asked: Asked, tolerance: float, pieces: list | None = None)
     fine, pair = levels[0], pairs[0]
     good = np.logical_and.reduce([level.is_solved for level in (*levels, *theirs)])
     good &= (fine.contacts.count > one_by_one.POINT) & (not any(one.closing.any() for one in pairs))
-    hidden = one_by_one.hidden_by_meshes(pair, _with_skin(first, pair), fine.contacts.force, fine.gap_range,
-                                         first.moment is not None)
+    hidden = one_by_one.hidden_by_meshes(
+        pair, _with_skin(first, pair), fine.contacts.force, fine.gap_range, first.moment is not None
+    )
     found = one_by_one.converge(
-        [level.values for level in reversed(levels)], one_by_one.least_of(hidden, fine.values),
+        [level.values for level in reversed(levels)],
+        one_by_one.least_of(hidden, fine.values),
         (first.mesh_tolerance or tolerance) if first.chosen else None,
-        all(one_by_one.cells_halved(a, b) for a, b in pairwise(pairs)), max(one_by_one.ALIKE, pair.rounding))
-    return Together(found.values, found.errors, good, fine.pressure.sigma_n.max(axis=1), fine.values["approach"],
-                    tuple(level.values for level in (levels[1], *theirs)) if theirs else (), levels)
+        all(one_by_one.cells_halved(a, b) for a, b in pairwise(pairs)),
+        max(one_by_one.ALIKE, pair.rounding),
+    )
+    return Together(
+        found.values,
+        found.errors,
+        good,
+        fine.pressure.sigma_n.max(axis=1),
+        fine.values["approach"],
+        tuple(level.values for level in (levels[1], *theirs)) if theirs else (),
+        levels,
+    )
 
 
 def _patch_of(asked, pair: Pair, level: Level, k: int):
     """Return the k-th patch of a level, of the PatchModel `asked`, as `press.pressed` gives it by itself."""
     gap, notes, seconds = asked.gap.at(level.x)
     rows = level.pressure
-    pressure = Pressure(frozen_array(rows.sigma_n[k]), frozen_array(rows.gap[k]), float(rows.approach[k]),
-                        float(rows.rotation[k]), float(rows.load[k]), float(rows.moment[k]), Outcome.DONE, 1,
-                        MappingProxyType({}))
-    return as_patch(asked, pair, gap + pair.rise, notes, seconds, (_with_skin(asked, pair), pressure, None, None))
+    pressure = Pressure(
+        frozen_array(rows.sigma_n[k]),
+        frozen_array(rows.gap[k]),
+        float(rows.approach[k]),
+        float(rows.rotation[k]),
+        float(rows.load[k]),
+        float(rows.moment[k]),
+        Outcome.DONE,
+        1,
+        MappingProxyType({}),
+    )
+    return as_patch(
+        asked,
+        pair,
+        gap + pair.rise,
+        notes,
+        seconds,
+        (_with_skin(asked, pair), pressure, None, None),
+    )
 
 
 def _with_skin(asked, pair: Pair):
@@ -231,7 +304,11 @@ def _with_skin(asked, pair: Pair):
 def _in_other_plane(asked: Asked, known: Level) -> tuple:
     """Return the patches on the second mesh in the other plane state; () where its values in their own are enough."""
     other = one_by_one.other_plane(asked.first)
-    return () if other is None else (pressed_on(asked._replace(first=other), shared_pair(other, 1), known),)
+    return (
+        ()
+        if other is None
+        else (pressed_on(asked._replace(first=other), shared_pair(other, 1), known),)
+    )
 
 
 def pressed_on(asked: Asked, pair: Pair, coarse: Level | None = None) -> Level:
@@ -241,22 +318,47 @@ def pressed_on(asked: Asked, pair: Pair, coarse: Level | None = None) -> Level:
     gap = asked.gaps(x) + pair.rise
     gap_range = np.ptp(gap, axis=1)
     turned = np.zeros(asked.load.size) if held else asked.angle
-    gap = gap - turned[:, None] * x  # a free piece is counted from no angle, so that its rotation keeps its digits
+    gap = (
+        gap - turned[:, None] * x
+    )  # a free piece is counted from no angle, so that its rotation keeps its digits
     low = gap.min(axis=1)
     normal, tangential = Intervals(pieces.normal, x), Intervals(pieces.tangential, x)
-    contacts = normal.press(gap - low[:, None], asked.load, None if held else asked.moment - asked.spring * turned,
-                            asked.spring, coarse and _about(x, coarse))
+    contacts = normal.press(
+        gap - low[:, None],
+        asked.load,
+        None if held else asked.moment - asked.spring * turned,
+        asked.spring,
+        coarse and _about(x, coarse),
+    )
     tangential.fill(contacts.first)
     sigma = contacts.force / bare.interface.weight
-    pressure = Pressure(sigma, contacts.opening, low + contacts.closing, contacts.theta + asked.angle - turned,
-                        contacts.force.sum(axis=1), contacts.force @ x, Outcome.DONE, 1, MappingProxyType({}))
+    pressure = Pressure(
+        sigma,
+        contacts.opening,
+        low + contacts.closing,
+        contacts.theta + asked.angle - turned,
+        contacts.force.sum(axis=1),
+        contacts.force @ x,
+        Outcome.DONE,
+        1,
+        MappingProxyType({}),
+    )
     softness = normal.c.diagonal() - bare.normal.diagonal()
     left, right = normal.places(contacts, softness, pair.row)
     width = np.maximum(right - left, 0.0)
-    edge_values = EdgeValues(width, width, normal.stiffness(contacts), tangential.stiffness(contacts),
-                             normal.stiffness(contacts, lever=True))
-    peak = peak_pressures(x, sigma, None if asked.first.skin is None else softness / normal.c.diagonal())
-    return Level(static_values(bare.interface, pressure, peak, edge_values), pressure, contacts, gap_range, x)
+    edge_values = EdgeValues(
+        width,
+        width,
+        normal.stiffness(contacts),
+        tangential.stiffness(contacts),
+        normal.stiffness(contacts, lever=True),
+    )
+    peak = peak_pressures(
+        x, sigma, None if asked.first.skin is None else softness / normal.c.diagonal()
+    )
+    return Level(
+        static_values(bare.interface, pressure, peak, edge_values), pressure, contacts, gap_range, x
+    )
 
 
 def _about(x, coarse: Level) -> tuple:
@@ -265,7 +367,12 @@ def _about(x, coarse: Level) -> tuple:
     (q,) nodes from which on and (q,) nodes before which they lie.
     """
     known, solved = coarse.contacts, coarse.is_solved
-    before, after = coarse.x[np.maximum(known.first - 1, 0)], coarse.x[np.minimum(known.stop, coarse.x.size - 1)]
+    before, after = (
+        coarse.x[np.maximum(known.first - 1, 0)],
+        coarse.x[np.minimum(known.stop, coarse.x.size - 1)],
+    )
     first = np.searchsorted(x, before) - np.where(known.first > 0, 0, 1)
     stop = np.searchsorted(x, after) + 1 + BEYOND
-    return np.where(solved, np.maximum(first, 0), 0), np.where(solved, np.minimum(stop, x.size), x.size)
+    return np.where(solved, np.maximum(first, 0), 0), np.where(
+        solved, np.minimum(stop, x.size), x.size
+    )

@@ -7,7 +7,9 @@ patches of different models have in common, until MAX_ENTRIES other results were
 from collections.abc import Callable
 from dataclasses import fields
 
-MAX_ENTRIES = 64  # a patch with its measures and elements is about seven entries, its meshes are four to nine
+MAX_ENTRIES = (
+    64  # a patch with its measures and elements is about seven entries, its meshes are four to nine
+)
 
 _RESULTS: dict = {}  # from the least to the most recently used
 
@@ -39,7 +41,13 @@ def content_key(asked) -> tuple:
     values = tuple(getattr(asked, field.name) for field in fields(asked) if field.name not in apart)
     shapes = tuple((name, tuple(part)) for name, part in gap.shapes)
     heights = (gap.profile, gap.average, gap.limit, gap.rough, gap.side, gap.material)
-    return values, asked.skin and tuple(asked.skin), asked.meshes and asked.meshes.name, shapes, heights
+    return (
+        values,
+        asked.skin and tuple(asked.skin),
+        asked.meshes and asked.meshes.name,
+        shapes,
+        heights,
+    )
 
 
 def is_shared(asked) -> bool:
