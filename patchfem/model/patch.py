@@ -205,7 +205,7 @@ def profile_lengths(contact: Contact, pieces) -> tuple:
     automatic = length / AUTOMATIC_CELLS
     if contact.asperities is not None:
         split = split_at(contact, length)
-        return split and split / profile.ELEMENTS, None
+        return split and split / profile.ELEMENTS_PER_WAVE, None
     if contact.mesh is not None or contact.element_size:
         return (None, 0.0) if contact.mesh is not None else (contact.element_size, contact.element_size)
     apart = contact.strips is None and all(piece.length <= length * (1 + CLOSE) for piece in pieces)
@@ -217,7 +217,7 @@ def split_at(contact: Contact, length: float) -> float | None:
     [m]; None where all waves are of the asperities."""
     if contact.asperities.cutoff is not None or contact.profile is None:
         return contact.asperities.cutoff
-    return profile.ELEMENTS * length / AUTOMATIC_CELLS
+    return profile.ELEMENTS_PER_WAVE * length / AUTOMATIC_CELLS
 
 
 def interface_of(pieces) -> float:

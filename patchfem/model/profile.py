@@ -8,9 +8,9 @@ import numpy as np
 
 from ..core import PatchfemError, frozen_array, say
 from ..surface.files.read import read_profile
-from ..surface.fine import ELEMENTS, fine_share, too_fine
-from ..surface.nodes import on_nodes, placed
-from ..surface.profile import Profile, cleaned, even, level
+from ..surface.fine import ELEMENTS_PER_WAVE, describe_lost_waves, fine_fraction
+from ..surface.nodes import average_at_nodes, place_over_patch
+from ..surface.profile import Profile, clean, even, level
 from ..surface.roughness.filter import mean_line
 
 SPLIT = 16  # straight pieces of a cell of a smooth profile
@@ -26,27 +26,27 @@ def profile_gap(path: Path, x, lengths: tuple, rough: bool, material: bool = Fal
     smooth curve goes through the means, or, where that is None, through the samples of the file; every node sees the
     mean of the curve over its own cells. limit: cells that too much of the heights may not be finer than, 0: those of
     the nodes, None: all may. The gap counts from its least, where flat pieces touch first. rough: asperities stand for
-    the waves shorter than ELEMENTS times `average`, and the curve is the waviness of this cut-off; material: heights of
-    a surface, on either piece measured outwards, so that a peak closes the gap. PatchfemError where too much of the
-    profile is finer than `limit`, or the cut-off longer than the interface.
+    the waves shorter than ELEMENTS_PER_WAVE times `average`, and the curve is the waviness of this cut-off; material:
+    heights of a surface, on either piece measured outwards, so that a peak closes the gap. PatchfemError where too
+    much of the profile is finer than `limit`, or the cut-off longer than the interface.
     """
     average, limit = lengths
     cell = float(x[-1] - x[0]) / CELLS
     trace, notes, straight = _levelled(path, x, min(average, cell) if rough else average or cell, material)
     if limit is not None and not straight and \
-            (said := too_fine(trace, limit or float(np.diff(x).max()))) is not None:
+            (said := describe_lost_waves(trace, limit or float(np.diff(x).max()))) is not None:
         raise PatchfemError(said, "contact.profile.file")
     if rough:
-        shape, said = _waviness(trace, ELEMENTS * average)
-        return on_nodes(shape, x) - shape.z.min(), notes if straight else (*notes, *said)
+        shape, said = _waviness(trace, ELEMENTS_PER_WAVE * average)
+        return average_at_nodes(shape, x) - shape.z.min(), notes if straight else (*notes, *said)
     if average is None:
-        heights = on_nodes(trace, x, _curve(trace).antiderivative())
+        heights = average_at_nodes(trace, x, _curve(trace).antiderivative())
         return heights - heights.min(), notes
     places, shape = x, trace
     if not _even(x, average):
         places = np.linspace(x[0], x[-1], max(2, round(float(x[-1] - x[0]) / average) + 1))
         shape = _smooth(trace, places)
-    return on_nodes(shape, x) - on_nodes(trace, places).min(), notes
+    return average_at_nodes(shape, x) - average_at_nodes(trace, places).min(), notes
 
 
 def _waviness(trace: Profile, cutoff: float) -> tuple:
@@ -59,7 +59,7 @@ def _waviness(trace: Profile, cutoff: float) -> tuple:
     same = even(trace)
     x = np.linspace(same.x[0], same.x[-1], max(same.x.size, int(np.ceil(DENSE * same.length / cutoff)) + 1))
     line = mean_line(np.interp(x, same.x, same.z), cutoff * (x.size - 1) / same.length, tilted=True)
-    share = fine_share(trace, cutoff)
+    share = fine_fraction(trace, cutoff)
     said = (f"{trace.source}: waves longer than {say(cutoff)} give the shape of the gap; the shorter waves "
             f"({100 * share:.2g} % of the rms height) are represented by [contact.asperities], whose key `cutoff` sets "
             "this limit",) if share > 0 else ()
@@ -100,7 +100,7 @@ def _curve(trace: Profile):
 def _smooth(trace: Profile, even) -> Profile:
     """The cubic spline through the means of a trace over even nodes (k,) [m], SPLIT points a cell."""
     fine = np.interp(np.arange(SPLIT * (even.size - 1) + 1) / SPLIT, np.arange(even.size), even)
-    heights = _curve(replace(trace, x=frozen_array(even), z=on_nodes(trace, even)))(fine)
+    heights = _curve(replace(trace, x=frozen_array(even), z=average_at_nodes(trace, even)))(fine)
     return replace(trace, x=frozen_array(fine), z=frozen_array(heights), notes=())
 
 
@@ -119,10 +119,10 @@ def spacing_of(path: Path) -> float:
 
 
 def _whole(path: Path, x, longest: float) -> Profile:
-    """The cleaned part of a trace over the nodes; a line may bridge `longest` [m]."""
+    """The clean part of a trace over the nodes; a line may bridge `longest` [m]."""
     found = trace_of(path)
     try:
-        return cleaned(placed(found, x), longest)
+        return clean(place_over_patch(found, x), longest)
     except PatchfemError as error:
         raise type(error)(str(error), error.key or "contact.profile.file") from None
 

@@ -1,7 +1,6 @@
-"""Height profiles: read, measured, and as a share of the gap.
+"""Measured surfaces: read, levelled and cleaned, their roughness, and their wear.
 
-In: traces x [m], z [m] and areal scans, from `files`. Out: levelled heights averaged over the cells of the interface
-nodes; roughness with intervals (`roughness`); two traces (`compare`) or two scans (`scans`) before and
-after. Read `profile` first, then
-`nodes`.
+In: files of traces and areal scans (`files`). Out: levelled heights averaged over the cells of the
+interface nodes (`nodes`), roughness with intervals (`roughness`), and what changed between two
+traces (`compare`) or two scans (`scans`). Read `profile` first, then `nodes`.
 """

@@ -1,4 +1,4 @@
-"""An areal scan of heights on a rectangular raster: its rows and columns as traces, and its levelling."""
+"""Areal scan of heights on a rectangular raster: its rows and columns, and its levelling."""
 
 from dataclasses import dataclass, replace
 
@@ -7,17 +7,30 @@ import numpy as np
 from ..core import PatchfemError, frozen_array
 from .profile import Profile
 
-RELAXED, DAMPED = 40, 0.6  # rounds of the surface over missing heights, half of them by the Laplacian; under 5/8
-CROSS = (0, 1), (0, -1), (1, 0), (-1, 0)
-LAPLACE = ((1 / 4, CROSS),)
-BILAPLACE = ((8 / 20, CROSS), (-2 / 20, ((1, 1), (1, -1), (-1, 1), (-1, -1))),
-             (-1 / 20, ((0, 2), (0, -2), (2, 0), (-2, 0))))
+N_ROUNDS = 40  # rounds of relaxation, the first half by the Laplacian; they settle single holes
+DAMPING = 0.6  # fraction of each round's change; the bi-Laplacian diverges from 5/8 on
+RANK_TOL = 1e-12  # smaller singular values of the normal equations / count are round-off
+_LAPLACIAN = np.array([[0, 1, 0], [1, 0, 1], [0, 1, 0]]) / 4
+_BILAPLACIAN = (
+    np.array(
+        [
+            [0, 0, -1, 0, 0],
+            [0, -2, 8, -2, 0],
+            [-1, 8, 0, 8, -1],
+            [0, -2, 8, -2, 0],
+            [0, 0, -1, 0, 0],
+        ]
+    )
+    / 20
+)
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Areal:
-    """Heights z (m, n) [m] at x (n,) [m] along a row and y (m,) [m] along a column, NaN where none was measured.
+    """Heights z (m, n) [m] at x (n,) [m] along a row and y (m,) [m] along a column.
 
-    x and y increase. source: a name of the scan for messages; notes: what was done to it on the way, one sentence each.
+    Missing heights are NaN; x and y increase. source: name of the scan for messages; notes:
+    sentences on its treatment.
     """
 
     x: np.ndarray
@@ -32,71 +45,90 @@ class Areal:
         return np.isnan(self.z)
 
     def row(self, k: int) -> Profile:
-        """The trace along x at y[k]; negative k count from the end."""
-        return self._trace(self.x, self.z[self._within(k, 0)], f"row {k}")
+        """Return the trace along x at y[k]; negative k count from the end."""
+        return self._trace(self.x, self.z, k, "row")
 
     def column(self, k: int) -> Profile:
-        """The trace along y at x[k]; negative k count from the end."""
-        return self._trace(self.y, self.z[:, self._within(k, 1)], f"column {k}")
+        """Return the trace along y at x[k]; negative k count from the end."""
+        return self._trace(self.y, self.z.T, k, "column")
 
-    def _within(self, k: int, axis: int) -> int:
-        count = self.z.shape[axis]
+    def _trace(self, places, heights, k: int, name: str) -> Profile:
+        count = len(heights)
         if not -count <= k < count:
-            name = ("row", "column")[axis]
-            raise PatchfemError(f"{self.source}: no {name} {k}; the scan has {count} of them, counted from 0")
-        return k
-
-    def _trace(self, along, heights, name: str) -> Profile:
-        return Profile(frozen_array(along), frozen_array(heights), f"{self.source}, {name}", self.notes)
+            raise PatchfemError(
+                f"{self.source}: no {name} {k}; the scan has {count} of them, counted from 0"
+            )
+        return Profile(
+            frozen_array(places), frozen_array(heights[k]), f"{self.source}, {name} {k}", self.notes
+        )
 
 
 def filled(z, missing) -> np.ndarray:
-    """Heights (m, n) with a smooth surface over what is missing: from the nearest ones on, relaxed towards a zero
-    bi-Laplacian, which a single hole reaches to the fourth order of the step."""
+    """Fill missing heights (m, n) with a smooth surface.
+
+    The nearest heights are relaxed towards a zero bi-Laplacian, which a single hole reaches to the
+    fourth order of the step.
+    """
     from scipy.ndimage import distance_transform_edt
 
     if not missing.any():
         return z
     nearest = distance_transform_edt(missing, return_distances=False, return_indices=True)
-    room = np.pad(z[tuple(nearest)], 2, "reflect", reflect_type="odd")
-    rows, columns = (one + 2 for one in np.nonzero(missing))
-    for turn in range(RELAXED):
-        lap = 0.0
-        for weight, moves in (LAPLACE if turn < RELAXED // 2 else BILAPLACE):
-            for down, right in moves:
-                lap = lap + weight * room[rows + down, columns + right]
-        room[rows, columns] += DAMPED * (lap - room[rows, columns])
-    return room[2:-2, 2:-2]
+    padded = np.pad(z[tuple(nearest)], 2, "reflect", reflect_type="odd")
+    rows, columns = np.nonzero(missing)
+    for turn in range(N_ROUNDS):
+        stencil = _LAPLACIAN if turn < N_ROUNDS // 2 else _BILAPLACIAN
+        reach = len(stencil) // 2
+        mean = 0.0
+        for (down, right), weight in np.ndenumerate(stencil):
+            if weight:
+                mean = mean + weight * padded[rows + 2 + down - reach, columns + 2 + right - reach]
+        padded[rows + 2, columns + 2] += DAMPING * (mean - padded[rows + 2, columns + 2])
+    return padded[2:-2, 2:-2]
 
 
 def level_plane(scan: Areal) -> Areal:
-    """Level a scan: subtract the least-squares plane of its measured heights, which all count alike (`level`)."""
+    """Subtract the least-squares plane of the measured heights of a scan."""
     return level(scan, 1)
 
 
 def level(scan: Areal, degree: int) -> Areal:
-    """A scan less the least-squares polynomial in x and y of its measured heights, x^i y^j with i + j <= degree.
+    """Subtract the least-squares polynomial of a total degree in x and y from a scan.
 
-    PatchfemError where the measured heights do not determine it, such as all of them in one line.
+    Raises PatchfemError if the measured heights do not determine it, such as all of them in one
+    line.
     """
-    there, count = ~scan.missing, int((~scan.missing).sum())
-    across, along = (np.polynomial.legendre.legvander(_reduced(axis), degree) for axis in (scan.x, scan.y))
-    terms = np.add.outer(np.arange(degree + 1), np.arange(degree + 1)) <= degree  # of y, of x
-    pairs = there.astype(float) @ (across[:, :, None] * across[:, None, :]).reshape(scan.x.size, -1)
-    normal = np.einsum("mik,mj,ml->jilk", pairs.reshape(-1, degree + 1, degree + 1), along, along, optimize=True)
-    normal = normal[terms][:, terms]
-    if count < len(normal) or np.linalg.matrix_rank(normal / count, tol=1e-12, hermitian=True) < len(normal):
-        raise PatchfemError(f"{scan.source}: {count} heights, which all lie on one straight line; a plane needs three "
-                            "points that do not"
-                            if degree == 1 else f"{scan.source}: {count} heights do not determine a polynomial of "
-                            f"degree {degree}; use a lower degree")
-    mean = scan.z[there].mean()
-    found = np.zeros(terms.shape)
-    found[terms] = np.linalg.solve(normal, (along.T @ np.where(there, scan.z - mean, 0.0) @ across)[terms])
-    return replace(scan, z=frozen_array(scan.z - (mean + along @ found @ across.T)))
+    known = ~scan.missing
+    count = int(known.sum())
+    along_x, along_y = (
+        np.polynomial.legendre.legvander(_reduce_axis(axis), degree) for axis in (scan.x, scan.y)
+    )
+    powers = np.arange(degree + 1)
+    is_term = np.add.outer(powers, powers) <= degree  # powers of y, powers of x
+    products = (along_x[:, :, None] * along_x[:, None, :]).reshape(scan.x.size, -1)
+    sums = (known.astype(float) @ products).reshape(-1, degree + 1, degree + 1)
+    normal = np.einsum("mik,mj,ml->jilk", sums, along_y, along_y, optimize=True)[is_term][
+        :, is_term
+    ]
+    rank = np.linalg.matrix_rank(normal / max(count, 1), tol=RANK_TOL, hermitian=True)
+    if count < len(normal) or rank < len(normal):
+        if degree == 1:
+            raise PatchfemError(
+                f"{scan.source}: {count} heights, which all lie on one straight line; a plane "
+                "needs three points that do not"
+            )
+        raise PatchfemError(
+            f"{scan.source}: {count} heights do not determine a polynomial of degree {degree}; use "
+            "a lower degree"
+        )
+    mean = scan.z[known].mean()
+    right = along_y.T @ np.where(known, scan.z - mean, 0.0) @ along_x
+    factors = np.zeros(is_term.shape)
+    factors[is_term] = np.linalg.solve(normal, right[is_term])
+    return replace(scan, z=frozen_array(scan.z - (mean + along_y @ factors @ along_x.T)))
 
 
-def _reduced(axis) -> np.ndarray:
-    """An axis from -1 to 1."""
+def _reduce_axis(axis) -> np.ndarray:
+    """Map an axis to -1 ... 1."""
     half = (axis[-1] - axis[0]) / 2
     return (axis - (axis[0] + axis[-1]) / 2) / (half if half > 0 else 1.0)

@@ -1,80 +1,103 @@
-"""Part of a trace that is too fine for the elements: the share of its height in short waves."""
+"""Part of a trace that is too fine for the elements: the fraction of its height in short waves."""
+
+from typing import NamedTuple
 
 import numpy as np
 
 from ..core import PatchfemError, say
 from .profile import Profile, even, level
 
-ELEMENTS = 2  # a wave shorter than this many elements has no place on the nodes
-LIMIT = 0.1  # share of the height in such waves from which something is really lost
+ELEMENTS_PER_WAVE = 2  # elements below which the nodes cannot represent a wave
+MAX_LOST = 0.1  # fraction of the rms height in such waves that a patch may lose without a word
 
 
-def spectrum(profile: Profile) -> tuple:
-    """Spectrum of the levelled trace: wavelength (k,) [m], falling from twice the length, and mean square (k,) [m2].
+class WaveSpectrum(NamedTuple):
+    """Falling wavelengths (k,) [m] and their mean squares (k,) [m2]."""
 
-    The waves are the cosines of half a wave and its multiples over the trace. The mirror image of the trace goes on
-    without a jump, so the ends put no false short waves in, as those of a Fourier series do. The mean squares add up to
-    that of the trace, exactly by the trapezoidal rule. Uneven samples are first read off at an even step. PatchfemError
-    for missing heights.
+    waves: np.ndarray
+    power: np.ndarray
+
+    def lost_fraction(self, length: float) -> float:
+        """Return the fraction of the rms height in waves shorter than a length [m]."""
+        total = self.power.sum()
+        lost = self.power[self.waves < length * (1 - 1e-9)].sum()
+        return float(np.sqrt(lost / total)) if total > 0 else 0.0
+
+    def element_length(self, kept: float) -> float:
+        """Return the longest element [m] that keeps a fraction of the rms height, inf if flat."""
+        total = self.power.sum()
+        if not 0 < kept < 1:
+            raise PatchfemError(
+                f"the share of the height to keep must lie between 0 and 1, but is {kept:g}"
+            )
+        if total == 0:
+            return np.inf
+        lost = np.cumsum(self.power[::-1])[::-1] / total  # in this wave and all shorter ones
+        needed = np.flatnonzero(lost > (1 - kept) ** 2)
+        return float(self.waves[needed[-1]]) / ELEMENTS_PER_WAVE
+
+
+def wave_spectrum(profile: Profile) -> WaveSpectrum:
+    """Compute the spectrum of a levelled trace by cosines of multiples of half a wave.
+
+    The mirror image of the trace continues it without a jump, so the ends add no false short waves,
+    as those of a Fourier series do. The mean squares add up to that of the trace by the trapezoidal
+    rule. Uneven samples are first resampled. Raises PatchfemError for missing heights.
     """
     from scipy.fft import dct
 
     if profile.missing.any():
-        raise PatchfemError(f"{profile.source}: {profile.missing.sum()} heights are missing; clean the trace first")
+        raise PatchfemError(
+            f"{profile.source}: {profile.missing.sum()} heights are missing; clean the trace first"
+        )
     z = level(even(profile)).z
     count = z.size - 1
-    amplitude = dct(z, type=1) / count
-    power = amplitude[1:] ** 2 / 2
-    power[-1] /= 2  # the wave of two samples: its transform counts twice, its mean square is the square
-    return 2 * profile.length / np.arange(1, count + 1), power
+    power = (dct(z, type=1) / count)[1:] ** 2 / 2
+    power[-1] /= (
+        2  # the wave of two samples has its square as mean square, but its transform counts twice
+    )
+    return WaveSpectrum(2 * profile.length / np.arange(1, count + 1), power)
 
 
-def fine_share(profile: Profile, length: float) -> float:
-    """Share [1] of the height of the levelled trace in waves shorter than `length` [m], rms over rms, 0 to 1.
+def fine_fraction(profile: Profile, length: float) -> float:
+    """Return the fraction of the rms height of a trace in waves shorter than a length [m]."""
+    return wave_spectrum(profile).lost_fraction(length)
 
-    PatchfemError for missing heights.
+
+def describe_lost_waves(profile: Profile, element: float, max_lost: float = MAX_LOST) -> str | None:
+    """State that elements [m] are too long for a trace, with the element lengths that suffice.
+
+    None if they are not.
+
+    Parameters
+    ----------
+    profile : Profile
+    element : float [m]
+    max_lost : float
+        Fraction of the height that may be lost.
+
+    Returns
+    -------
+    str or None
     """
-    waves, power = spectrum(profile)
-    return float(np.sqrt(_below(waves, power, length)))
-
-
-def too_fine(profile: Profile, element: float, limit: float = LIMIT) -> str | None:
-    """Sentence for a scene whose elements [m] are too long for the trace, None where `limit` is kept.
-
-    It is the refusal of a scene without [contact.asperities], and a warning of `plan`.
-    """
-    waves, power = spectrum(profile)
-    share = float(np.sqrt(_below(waves, power, ELEMENTS * element)))
-    if share <= limit:
+    spectrum = wave_spectrum(profile)
+    length = ELEMENTS_PER_WAVE * element
+    lost = spectrum.lost_fraction(length)
+    if lost <= max_lost:
         return None
-    most, nearly = (_two_digits(element_for(waves, power, kept)) for kept in (1 - limit, 1 - limit / 10))
-    return (f"{profile.source} has {100 * share:.0f} % of its rms height in waves shorter than {ELEMENTS} elements "
-            f"({say(ELEMENTS * element)}), which the mesh cannot resolve: add [contact.asperities], or set "
-            f'element_size = "{say(most)}", which keeps {100 - 100 * limit:g} % of the height '
-            f'("{say(nearly)}" keeps {100 - 10 * limit:g} %)')
+    sufficient, better = (
+        _round_down(spectrum.element_length(1 - part)) for part in (max_lost, max_lost / 10)
+    )
+    return (
+        f"{profile.source} has {100 * lost:.0f} % of its rms height in waves shorter than "
+        f"{ELEMENTS_PER_WAVE} elements ({say(length)}), which the mesh cannot resolve: add "
+        "[contact.asperities], or set element_size = "
+        f'"{say(sufficient)}", which keeps {100 - 100 * max_lost:g} % of the height ("{say(better)}" keeps '
+        f"{100 - 10 * max_lost:g} %)"
+    )
 
 
-def _below(waves, power, length: float) -> float:
-    total = power.sum()
-    return float(power[waves < length * (1 - 1e-9)].sum() / total) if total > 0 else 0.0
-
-
-def element_for(waves, power, kept: float) -> float:
-    """Largest element [m] whose waves of two elements and more keep the share `kept` of the height (rms).
-
-    waves, power: (k,) as `spectrum` gives them. It is inf for a flat trace. PatchfemError unless 0 < kept < 1.
-    """
-    total = power.sum()
-    if not 0 < kept < 1:
-        raise PatchfemError(f"the share of the height to keep must lie between 0 and 1, but is {kept:g}")
-    if total == 0:
-        return np.inf
-    lost = np.cumsum(power[::-1])[::-1] / total  # in this wave and all shorter ones
-    kept_waves = np.flatnonzero(lost > (1 - kept) ** 2)
-    return float(waves[kept_waves[-1]]) / ELEMENTS
-
-
-def _two_digits(length: float) -> float:
-    """A length rounded down to two digits, so that the suggestion itself passes."""
+def _round_down(length: float) -> float:
+    """Round a length down to two digits, so that the suggestion suffices."""
     unit = 10.0 ** (np.floor(np.log10(length)) - 1)
     return float(np.floor(length / unit * (1 + 1e-12)) * unit)

@@ -1,25 +1,32 @@
-"""One measured or made trace of heights, and the levelling and cleaning that every trace goes through first."""
+"""Measured or simulated trace of heights, and its levelling, resampling and cleaning."""
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ..core import PatchfemError, frozen_array, say
 
-WINDOW = 7  # samples of the running median; what is three samples wide or less can be a spike
-SPIKE = 8.0  # robust standard deviations from the running median
-WIDE, FOOT = (15, 31), 3.0  # samples of the medians that wider specks stand above; deviations at which their feet end
-_BLOCK = 1 << 17  # windows sorted at a time
-_MOST = 1 << 21  # samples of an evened trace
+WINDOW = 7  # samples of the running median; a group of up to three samples can be a spike
+SPECK_WINDOWS = (15, 31)  # samples of the medians that wider specks of dust stand above
+SPIKE_DEVIATIONS = (
+    8.0  # robust standard deviations from the running median; rough surfaces stay below 6
+)
+FOOT_DEVIATIONS = 3.0  # robust standard deviations down to which the foot of a speck is removed
+MAD_TO_DEVIATION = (
+    1.4826  # standard deviation of a normal distribution / its median absolute deviation
+)
+CHUNK = 1 << 17  # windows sorted at a time, which limits the memory
+MAX_SAMPLES = 1 << 21  # samples of a resampled trace
+EVEN_TOL = 1e-6  # relative scatter of the steps of an even trace
 
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Profile:
-    """A trace of heights z (n,) [m], NaN where none was measured, at increasing x (n,) [m]; straight lines between
-    them.
+    """Trace of heights z (n,) [m], NaN where none was measured, at increasing x (n,) [m].
 
-    source: a name of the trace for messages; notes: what was done to it on the way, one sentence each, for the
-    warnings.
+    Between samples the trace is straight. source: name of the trace for messages; notes: sentences
+    on its treatment.
     """
 
     x: np.ndarray
@@ -39,153 +46,187 @@ class Profile:
 
 
 def level(profile: Profile) -> Profile:
-    """Level a trace: its least-squares line over the measured samples, which all count alike, is subtracted."""
-    there = ~profile.missing
+    """Subtract the least-squares line of the measured samples."""
+    known = ~profile.missing
     x, z = profile.x, profile.z
-    if there.sum() < 2:
-        return replace(profile, z=frozen_array(z - z[there].mean() if there.any() else z))
-    s = (x - x[there].mean()) / profile.length
-    z = z - z[there].mean()
-    return replace(profile, z=frozen_array(z - s * (s[there] @ z[there] / (s[there] @ s[there]))))
+    if known.sum() < 2:
+        return replace(profile, z=frozen_array(z - z[known].mean() if known.any() else z))
+    s = (x - x[known].mean()) / profile.length
+    z = z - z[known].mean()
+    slope = s[known] @ z[known] / (s[known] @ s[known])
+    return replace(profile, z=frozen_array(z - s * slope))
 
 
 def even(profile: Profile) -> Profile:
-    """A trace without gaps on an even step, which filter and spectrum want; the notes tell what that took.
+    """Put a trace on an even step without gaps, as filters and spectra need.
 
-    A trace that is even and whole comes back as it is. Missing heights are bridged by straight lines. An uneven trace
-    is read off along its straight lines at its 10th percentile step, so that nothing between its samples is lost.
+    The notes state what that took.
+
+    Missing heights are bridged by straight lines. An uneven trace is resampled at the 10th
+    percentile of its steps, so that nothing between its samples is lost.
     """
-    there, steps = ~profile.missing, np.diff(profile.x)
-    whole, regular = bool(there.all()), bool(np.ptp(steps) <= 1e-6 * steps.mean())
-    if whole and regular:
+    known = ~profile.missing
+    steps = np.diff(profile.x)
+    is_whole = bool(known.all())
+    is_even = bool(np.ptp(steps) <= EVEN_TOL * steps.mean())
+    if is_whole and is_even:
         return profile
-    known, heights = profile.x[there], profile.z[there]
-    if known.size < 2:
-        raise PatchfemError(f"{profile.source}: {known.size} heights; a trace needs at least two")
-    x, notes = profile.x[(profile.x >= known[0]) & (profile.x <= known[-1])], profile.notes
-    if not whole:
-        notes += (f"{profile.source}: {(~there).sum()} of {there.size} heights are missing; the gaps are bridged by "
-                  f"straight lines, of which the longest spans {say(float(np.diff(known).max()))}",)
-    if not regular:
-        step = max(float(np.percentile(steps, 10)), float(x[-1] - x[0]) / _MOST)
+    places = profile.x[known]
+    if places.size < 2:
+        raise PatchfemError(f"{profile.source}: {places.size} heights; a trace needs at least two")
+    x = profile.x[(profile.x >= places[0]) & (profile.x <= places[-1])]
+    notes = profile.notes
+    if not is_whole:
+        notes += (_missing_note(profile, float(np.diff(places).max())),)
+    if not is_even:
+        step = max(float(np.percentile(steps, 10)), float(x[-1] - x[0]) / MAX_SAMPLES)
         count = int(np.ceil((x[-1] - x[0]) / step * (1 - 1e-9))) + 1
         x = np.linspace(x[0], x[-1], count)
-        notes += (f"{profile.source}: samples lie {say(float(steps.min()))} to {say(float(steps.max()))} apart; the "
-                  f"trace is resampled at every {say(float(x[1] - x[0]))} by linear interpolation",)
-    return replace(profile, x=frozen_array(x), z=frozen_array(np.interp(x, known, heights)), notes=notes)
+        notes += (
+            f"{profile.source}: samples lie {say(float(steps.min()))} to {say(float(steps.max()))} "
+            f"apart; the trace is resampled at every {say(float(x[1] - x[0]))} by linear "
+            "interpolation",
+        )
+    z = np.interp(x, places, profile.z[known])
+    return replace(profile, x=frozen_array(x), z=frozen_array(z), notes=notes)
 
 
-def cleaned(profile: Profile, longest: float) -> Profile:
-    """Clean a trace of spikes (`spikes`) and missing heights.
+def _missing_note(profile: Profile, longest: float) -> str:
+    count = profile.missing.sum()
+    return (
+        f"{profile.source}: {count} of {profile.z.size} heights are missing; the gaps are bridged "
+        f"by straight lines, of which the longest spans {say(longest)}"
+    )
 
-    Straight lines stand in their place; missing ends are cut off. longest: the distance that a line may bridge [m],
-    from one good sample to the next, such as two elements. The notes tell the counts. PatchfemError where a run is
-    longer or fewer than two heights are left.
+
+def clean(profile: Profile, max_gap: float) -> Profile:
+    """Bridge spikes and missing heights by straight lines, and cut off missing ends.
+
+    max_gap: longest distance [m] between good samples that a line may bridge. The notes state the
+    counts. Raises PatchfemError for a longer gap, and for fewer than two good heights.
     """
-    lost = profile.missing
-    peaked = spikes(profile)
-    bad = lost | peaked
-    good = np.flatnonzero(~bad)
+    is_spike = spikes(profile)
+    good = np.flatnonzero(~(profile.missing | is_spike))
     if good.size < 2:
-        raise PatchfemError(f"{profile.source}: {good.size} usable heights; a trace needs at least two")
-    if good.size == bad.size:
+        raise PatchfemError(
+            f"{profile.source}: {good.size} usable heights; a trace needs at least two"
+        )
+    if good.size == profile.z.size:
         return profile
     x = profile.x[good]
-    bridged = np.where(np.diff(good) > 1, np.diff(x), 0.0)
-    worst = int(np.argmax(bridged))
-    if bridged[worst] > longest * (1 + 1e-9):
+    gaps = np.where(np.diff(good) > 1, np.diff(x), 0.0)
+    longest = int(np.argmax(gaps))
+    if gaps[longest] > max_gap * (1 + 1e-9):
         raise PatchfemError(
-            f"{profile.source}: no usable height between x = {say(x[worst])} and {say(x[worst + 1])}, and a straight "
-            f"line may bridge at most {say(longest)}; measure this part of the trace anew or use a larger "
-            "contact.element_size")
-    keep = slice(good[0], good[-1] + 1)
-    z = np.interp(profile.x[keep], x, profile.z[good])
-    notes = tuple(_counts(profile, lost, peaked, float(bridged[worst])))
-    return replace(profile, x=frozen_array(profile.x[keep]), z=frozen_array(z), notes=profile.notes + notes)
+            f"{profile.source}: no usable height between x = {say(x[longest])} and "
+            f"{say(x[longest + 1])}, and a straight line may bridge at most {say(max_gap)}; "
+            "measure this part of the trace anew or use a larger contact.element_size"
+        )
+    notes = profile.notes
+    if is_spike.any():
+        notes += (
+            f"{profile.source}: {is_spike.sum()} of {profile.x.size} heights are spikes (the first "
+            f"at x = {say(profile.x[np.argmax(is_spike)])}), which lie more than "
+            f"{SPIKE_DEVIATIONS:g} robust standard deviations from the median of {WINDOW} samples; "
+            "straight lines replace these heights",
+        )
+    if profile.missing.any():
+        notes += (_missing_note(profile, float(gaps[longest])),)
+    places = profile.x[good[0] : good[-1] + 1]
+    z = np.interp(places, x, profile.z[good])
+    return replace(profile, x=frozen_array(places), z=frozen_array(z), notes=notes)
 
 
-def _counts(profile: Profile, lost, peaked, widest: float):
-    n, name = profile.x.size, profile.source
-    if peaked.any():
-        first = profile.x[np.argmax(peaked)]
-        yield (f"{name}: {peaked.sum()} of {n} heights are spikes (the first at x = {say(first)}), which lie more than "
-               f"{SPIKE:g} robust standard deviations from the median of {WINDOW} samples; straight lines replace "
-               "these heights")
-    if lost.any():
-        yield (f"{name}: {lost.sum()} of {n} heights are missing; the gaps are bridged by straight lines, of which the "
-               f"longest spans {say(widest)}")
+class RunningMedian(NamedTuple):
+    """Distance (n,) [m] of heights from the running median, and median absolute deviation (n,).
+
+    typical_spread: median of the deviations of all windows.
+    """
+
+    distance: np.ndarray
+    spread: np.ndarray
+    typical_spread: float
+
+
+def _running_median(z, window: int) -> RunningMedian:
+    """Compute running medians; windows at the ends serve all samples up to there."""
+    windows = np.lib.stride_tricks.sliding_window_view(z, window)
+    half = window // 2
+    median = np.empty(len(windows))
+    spread = np.empty(len(windows))
+    for start in range(0, len(windows), CHUNK):
+        part = slice(start, start + CHUNK)
+        median[part] = np.partition(windows[part], half, axis=1)[:, half]
+        spread[part] = np.partition(np.abs(windows[part] - median[part, None]), half, axis=1)[
+            :, half
+        ]
+    place = np.clip(np.arange(z.size) - half, 0, z.size - window)
+    return RunningMedian(z - median[place], spread[place], float(np.median(spread)))
 
 
 def spikes(profile: Profile) -> np.ndarray:
-    """Spikes of a trace, (n,) bool: heights more than SPIKE robust standard deviations off the median around them.
+    """Find the spikes of a trace, (n,) bool: heights far off the median of 7 samples.
 
-    The median is that of WINDOW samples. The standard deviation is 1.4826 times the largest of: the median deviation
-    inside the window, its median over all windows, and the smallest step between two heights (coarse digits). A feature
-    of more than half the window stays. Hampel, J. Am. Stat. Assoc. 69 (1974) 383.
+    They lie more than 8 robust standard deviations off.
+
+    The standard deviation is 1.4826 times the largest of the median absolute deviation in the
+    window, its median over all windows, and the smallest step between two heights (coarse digits).
+    A feature of more than half the window stays. Hampel, J. Am. Stat. Assoc. 69 (1974) 383.
     """
-    out, there = np.zeros(profile.x.size, bool), np.flatnonzero(~profile.missing)
-    if there.size < WINDOW:
-        return out
-    z = profile.z[there]
-    middle, spread = _running(z)
-    place = np.clip(np.arange(z.size) - WINDOW // 2, 0, z.size - WINDOW)
-    off = np.abs(z - middle[place])
-    digits = np.diff(np.unique(z)).min(initial=np.inf)
-    scale = np.maximum(spread[place], max(float(np.median(spread)), digits if np.isfinite(digits) else 0.0))
-    out[there] = off > SPIKE * 1.4826 * scale
-    return out
+    is_spike = np.zeros(profile.x.size, bool)
+    known = np.flatnonzero(~profile.missing)
+    if known.size < WINDOW:
+        return is_spike
+    z = profile.z[known]
+    running = _running_median(z, WINDOW)
+    digit = np.diff(np.unique(z)).min(initial=np.inf)
+    floor = max(running.typical_spread, digit if np.isfinite(digit) else 0.0)
+    deviation = MAD_TO_DEVIATION * np.maximum(running.spread, floor)
+    is_spike[known] = np.abs(running.distance) > SPIKE_DEVIATIONS * deviation
+    return is_spike
 
 
 def despiked(profile: Profile) -> Profile:
-    """A trace without its spikes, dropouts and specks of dust: they count as not measured, and a note tells how many.
+    """Mark spikes, dropouts and specks of dust with their feet as not measured.
 
-    Spikes and dropouts are those of `spikes`. A speck stands as far above the median of 15 or 31 samples, and both of
-    its walls are as many deviations steeper than the steps of the trace: up to 15 samples wide. A hollow as wide is
-    none: a scratch may look so. All are left out with their feet, down to 3 deviations.
+    A note states how many.
+
+    Spikes and dropouts are those of `spikes`. A speck stands as far above the median of 15 or 31
+    samples, and both of its walls are as many deviations steeper than the steps of the trace. A
+    hollow as wide stays, as it may be a scratch.
     """
-    there = np.flatnonzero(~profile.missing)
-    if there.size < max(WIDE):
+    known = np.flatnonzero(~profile.missing)
+    if known.size < max(SPECK_WINDOWS):
         return profile
-    z, struck = profile.z[there], spikes(profile)[there]
-    step = np.abs(z[2:] - z[:-2])
-    steep = SPIKE * 1.4826 * float(np.median(step))
-    out = np.zeros(z.size, bool)
-    for window in (WINDOW, *WIDE):
-        middle, spread = _running(z, window)
-        place = np.clip(np.arange(z.size) - window // 2, 0, z.size - window)
-        off = z - middle[place]
-        scale = 1.4826 * np.maximum(spread[place], float(np.median(spread)))
-        for first, last in runs_of(np.abs(off) > FOOT * scale):
-            low, high = max(first - 2, 0), min(last + 3, z.size)
-            walls = np.diff(z[low:high])
-            speck = off[first:last + 1].max() > SPIKE * scale[first:last + 1].max() and last - first < window // 2 \
-                and walls.max(initial=0.0) > steep / 2 and -walls.min(initial=0.0) > steep / 2
-            if struck[first:last + 1].any() or speck:
-                out[max(first - 1, 0):last + 2] = True
-    out |= struck
-    if not out.any():
+    z = profile.z[known]
+    is_spike = spikes(profile)[known]
+    min_wall = SPIKE_DEVIATIONS * MAD_TO_DEVIATION * float(np.median(np.abs(z[2:] - z[:-2]))) / 2
+    removed = is_spike.copy()
+    for window in (WINDOW, *SPECK_WINDOWS):
+        running = _running_median(z, window)
+        deviation = MAD_TO_DEVIATION * np.maximum(running.spread, running.typical_spread)
+        for first, last in runs_of(np.abs(running.distance) > FOOT_DEVIATIONS * deviation):
+            group = slice(first, last + 1)
+            walls = np.diff(z[max(first - 2, 0) : last + 3])
+            has_walls = min(walls.max(initial=0.0), -walls.min(initial=0.0)) > min_wall
+            is_high = running.distance[group].max() > SPIKE_DEVIATIONS * deviation[group].max()
+            is_speck = is_high and has_walls and last - first < window // 2
+            if is_speck or is_spike[group].any():
+                removed[max(first - 1, 0) : last + 2] = True
+    if not removed.any():
         return profile
     heights = np.array(profile.z)
-    heights[there[out]] = np.nan
-    count = len(runs_of(out))
-    note = (f"{profile.source}: spikes, dropouts or dust at {count} place{'s' * (count > 1)} (the first at x = "
-            f"{say(profile.x[there[np.argmax(out)]])}) are left out, {out.sum()} of {z.size} heights with their "
-            "neighbours; use --keep-spikes to keep them")
+    heights[known[removed]] = np.nan
+    count = len(runs_of(removed))
+    note = (
+        f"{profile.source}: spikes, dropouts or dust at {count} place{'s' * (count > 1)} (the "
+        f"first at x = {say(profile.x[known[np.argmax(removed)]])}) are left out, {removed.sum()} "
+        f"of {z.size} heights with their neighbours; use --keep-spikes to keep them"
+    )
     return replace(profile, z=frozen_array(heights), notes=(*profile.notes, note))
 
 
-def runs_of(flags) -> list:
-    """First and last index of each run of true flags (n,)."""
+def runs_of(flags) -> list[tuple[int, int]]:
+    """Return the first and last index of each run of true flags (n,)."""
     change = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(np.int8), [0]])))
     return list(zip(change[::2].tolist(), (change[1::2] - 1).tolist()))
-
-
-def _running(z, window: int = WINDOW) -> tuple:
-    """Median and median deviation of every full window."""
-    windows, half = np.lib.stride_tricks.sliding_window_view(z, window), window // 2
-    middle, spread = np.empty(len(windows)), np.empty(len(windows))
-    for start in range(0, len(windows), _BLOCK):
-        part = slice(start, start + _BLOCK)
-        middle[part] = np.partition(windows[part], half, axis=1)[:, half]
-        spread[part] = np.partition(np.abs(windows[part] - middle[part, None]), half, axis=1)[:, half]
-    return middle, spread

@@ -1,6 +1,6 @@
-"""A measured number with its interval, or the reason why there is none.
+"""Measured quantity with its interval, or the reason why there is none.
 
-The interval holds what it tells of in 95 of 100 cases where two surfaces are compared, and in 90 of 100, from 5 to
+The interval holds in 95 of 100 cases where two surfaces are compared, and in 90 of 100, from 5 to
 95 %, where the roughness of one is measured.
 """
 
@@ -8,13 +8,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-LEVEL = 0.95
-SIDE = 1.959964  # standard deviations to either side
+LEVEL = 0.95  # probability of the interval of a comparison
+SIDE = 1.959964  # standard deviations to either side that hold this probability
 
 
 class Quantity(NamedTuple):
-    """Value and interval [SI], unit and definition; reason: why there is no value, or no interval of one; name: of a
-    parameter of roughness."""
+    """Value and interval [SI], unit and definition.
+
+    reason: why there is no value, or no interval; name: of a parameter of roughness.
+    """
 
     value: float | None
     low: float | None
@@ -25,41 +27,78 @@ class Quantity(NamedTuple):
     name: str = ""
 
 
-def around(value: float, error: float, unit: str, text: str, least: float | None = None) -> Quantity:
-    """A quantity from its value and standard deviation; least: what it cannot be below."""
-    found = [float(value), float(value - SIDE * error), float(value + SIDE * error)]
-    return Quantity(*(found if least is None else [max(one, least) for one in found]), unit, text)
+def around(
+    value: float, error: float, unit: str, text: str, least: float | None = None
+) -> Quantity:
+    """Make a quantity of a value and its standard deviation.
+
+    Parameters
+    ----------
+    value, error : float
+    unit, text : str
+    least : float, optional
+        Smallest possible value.
+
+    Returns
+    -------
+    Quantity
+    """
+    bounds = [float(value), float(value - SIDE * error), float(value + SIDE * error)]
+    if least is not None:
+        bounds = [max(bound, least) for bound in bounds]
+    return Quantity(*bounds, unit, text)
 
 
 def refused(unit: str, text: str, reason: str) -> Quantity:
-    """No quantity, and why."""
+    """Make a quantity without a value.
+
+    Parameters
+    ----------
+    unit, text, reason : str
+
+    Returns
+    -------
+    Quantity
+    """
     return Quantity(None, None, None, unit, text, reason)
 
 
 class Mean(NamedTuple):
-    """A number that several measurements have: mean and its interval; scatter: standard deviation of one; count: how
-    many."""
+    """Mean of several measurements with its interval; standard deviation of a single one.
+
+    How many.
+    """
 
     mean: Quantity
     scatter: float
     count: int
 
 
-def mean_of(each: list, text: str) -> Mean | None:
-    """Mean of quantities that have a value, None of less than two.
+def mean_of(quantities: list, text: str) -> Mean | None:
+    """Average quantities that have a value, None for fewer than two.
 
-    Its 95 % interval is Student's t of their scatter, s t / sqrt(n), or that of their own intervals where this is
-    wider: a few may agree by chance. Where no interval reaches below zero, that of the mean does not.
+    The 95 % interval is Student's t of their scatter, s t / sqrt(n), or that of their own intervals
+    if this is wider, because a few may agree by chance. If no interval reaches below zero, that of
+    the mean does not.
     """
     from scipy.special import stdtrit
 
-    if len(each) < 2:
+    count = len(quantities)
+    if count < 2:
         return None
-    values = np.array([one.value for one in each])
-    own = np.array([(one.high - one.low) / 2 if one.high is not None else 0.0 for one in each])
-    scatter, middle = float(values.std(ddof=1)), float(values.mean())
-    side = max(float(stdtrit(values.size - 1, (1 + LEVEL) / 2)) * scatter, float(np.sqrt((own**2).mean())))
-    side = side / np.sqrt(values.size)
-    least = 0.0 if all(one.low is not None and one.low >= 0 for one in each) else -np.inf
-    return Mean(Quantity(middle, float(max(middle - side, least)), float(middle + side), each[0].unit, text), scatter,
-                values.size)
+    values = np.array([quantity.value for quantity in quantities])
+    own = np.array(
+        [
+            0.0 if quantity.high is None else (quantity.high - quantity.low) / 2
+            for quantity in quantities
+        ]
+    )
+    scatter = float(values.std(ddof=1))
+    mean = float(values.mean())
+    student = float(stdtrit(count - 1, (1 + LEVEL) / 2))
+    error = max(student * scatter, float(np.sqrt((own**2).mean()))) / np.sqrt(count)
+    is_positive = all(quantity.low is not None and quantity.low >= 0 for quantity in quantities)
+    low = max(mean - error, 0.0) if is_positive else mean - error
+    return Mean(
+        Quantity(mean, float(low), float(mean + error), quantities[0].unit, text), scatter, count
+    )

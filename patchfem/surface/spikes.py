@@ -1,63 +1,99 @@
-"""Spikes of an areal scan: single heights that stand far off all around them."""
+"""Spikes of an areal scan: single heights that stand far off all of their neighbours."""
 
 import numpy as np
 
 from .areal import Areal, filled
+from .profile import MAD_TO_DEVIATION
 
-SPIKE, WIDEST = (10.0, 40.0, 160.0), 12  # scatters off the medians of 5 x 5 heights; heights of a spike at most
-SOME, CHUNK = 100_000, 1 << 17  # heights whose scatter about medians is taken; medians at a time
+THRESHOLDS = (10.0, 40.0, 160.0)  # standard deviations; at the lowest a slope may join spikes
+MAX_SPIKE_POINTS = 12  # a larger group of points is a feature of the surface
+N_SAMPLED = 100_000  # heights whose scatter about the medians is measured; more do not change it
+CHUNK = 1 << 17  # medians computed at a time, which limits the memory
+WINDOW = 5  # points along each side of a median
 
 
 def spikes_of(scan: Areal) -> np.ndarray:
-    """Spikes of a scan, (m, n) bool: single heights that stand far off the median of 5 x 5 around them.
+    """Find the spikes of a scan, (m, n) bool.
 
-    A spike is twelve heights at most, all of which stand off all of its neighbours; more are a feature of the surface.
+    A spike stands off the median of the 5 x 5 heights around it. It has at most twelve points, all
+    of which stand off all of their neighbours.
     """
-    missing = scan.missing
-    scale, off = _off_median(filled(scan.z, missing), ~missing)
-    spikes = np.zeros(off.shape, bool)
-    for least in SPIKE if scale > 0 else ():  # a steep place would join a spike to its neighbours at the lowest
+    known = ~scan.missing
+    z = filled(scan.z, scan.missing)
+    scatter = _scatter_about_medians(z, known)
+    spikes = np.zeros(z.shape, bool)
+    if not scatter > 0:
+        return spikes
+    distance = _far_distances(z, known, THRESHOLDS[0] * scatter)
+    for threshold in THRESHOLDS:
         with np.errstate(invalid="ignore"):
-            spikes |= apart(scan.z, off > least * scale, least * scale)
+            spikes |= apart(scan.z, distance > threshold * scatter, threshold * scatter)
     return spikes
 
 
-def _off_median(z, known) -> tuple:
-    """(scatter of the known heights (m, n) about the medians of 5 x 5 around them, how far each stands off its own (m,
-    n)), 0 where that is less than the least spike: half of its neighbours would be as far below or above it. Heights
-    that are the median, as most are on a smooth slope, tell nothing of the scatter."""
+def _median_distances(z, places) -> np.ndarray:
+    """Return |height - median of 5 x 5| at places (k,) of the flat heights z (m, n)."""
+    windows = np.lib.stride_tricks.sliding_window_view(
+        np.pad(z, WINDOW // 2, "symmetric"), (WINDOW, WINDOW)
+    )
+    out = np.empty(places.size)
+    for start in range(0, places.size, CHUNK):
+        part = slice(start, start + CHUNK)
+        rows, columns = np.unravel_index(places[part], z.shape)
+        medians = np.median(windows[rows, columns].reshape(-1, WINDOW**2), axis=1)
+        out[part] = np.abs(z[rows, columns] - medians)
+    return out
+
+
+def _scatter_about_medians(z, known) -> float:
+    """Estimate the standard deviation of known heights (m, n) about the medians around them.
+
+    Heights that are the median, as most are on a smooth slope, say nothing about the scatter.
+    """
+    places = np.flatnonzero(known)
+    distance = _median_distances(z, places[:: max(places.size // N_SAMPLED, 1)])
+    return MAD_TO_DEVIATION * float(np.median(distance[distance > 0])) if distance.any() else 0.0
+
+
+def _far_distances(z, known, threshold: float) -> np.ndarray:
+    """Return how far heights (m, n) stand off their medians, 0 if all neighbours are near."""
     from scipy.ndimage import maximum_filter, minimum_filter
 
-    around = np.lib.stride_tricks.sliding_window_view(np.pad(z, 2, "symmetric"), (5, 5))
-
-    def distance(places) -> np.ndarray:
-        rows, columns = np.unravel_index(places, z.shape)
-        parts = [slice(k, k + CHUNK) for k in range(0, places.size, CHUNK)]
-        return np.concatenate([np.abs(z[rows[one], columns[one]] - np.median(
-            around[rows[one], columns[one]].reshape(-1, 25), axis=1)) for one in parts] or [np.zeros(0)])
-
-    there = np.flatnonzero(known)
-    off = distance(there[::max(there.size // SOME, 1)])
-    scale = 1.4826 * float(np.median(off[off > 0])) if off.any() else 0.0
-    far = np.maximum(z - minimum_filter(z, 5), maximum_filter(z, 5) - z) > SPIKE[0] * scale
-    out, places = np.zeros(z.shape), np.flatnonzero(far & known)
-    out.ravel()[places] = distance(places)
-    return scale, out
+    span = np.maximum(z - minimum_filter(z, WINDOW), maximum_filter(z, WINDOW) - z)
+    places = np.flatnonzero((span > threshold) & known)
+    out = np.zeros(z.shape)
+    out.ravel()[places] = _median_distances(z, places)
+    return out
 
 
-def apart(z, far, least: float) -> np.ndarray:
-    """Which far heights (m, n) bool of z (m, n) [m] belong to a small group that stands off all of its neighbours by
-    half of a least height [m], as no slope does."""
+def apart(z, far, threshold: float) -> np.ndarray:
+    """Select the far heights that form small groups off all of their neighbours, as no slope does.
+
+    Parameters
+    ----------
+    z : (m, n) array [m]
+    far : (m, n) bool array
+    threshold : float [m]
+        A group stands off its neighbours by half of it.
+
+    Returns
+    -------
+    (m, n) bool array
+    """
     from scipy.ndimage import find_objects, label
 
-    names, _ = label(far, np.ones((3, 3)))
-    out, sizes = np.zeros(far.shape, bool), np.bincount(names.ravel())
-    for name, place in enumerate(find_objects(names), 1):
-        if sizes[name] > WIDEST:
+    groups, _ = label(far, np.ones((3, 3)))
+    sizes = np.bincount(groups.ravel())
+    out = np.zeros(far.shape, bool)
+    for number, place in enumerate(find_objects(groups), 1):
+        if sizes[number] > MAX_SPIKE_POINTS:
             continue
-        wide = tuple(slice(max(one.start - 1, 0), one.stop + 1) for one in place)
-        own = names[wide] == name
-        rim, top = z[wide][~own & np.isfinite(z[wide])], z[wide][own]
-        if rim.size and (top.min() > rim.max() + least / 2 or top.max() < rim.min() - least / 2):
-            out[wide] |= own
+        around = tuple(slice(max(part.start - 1, 0), part.stop + 1) for part in place)
+        own = groups[around] == number
+        group = z[around][own]
+        rim = z[around][~own & np.isfinite(z[around])]
+        if not rim.size:
+            continue
+        if group.min() > rim.max() + threshold / 2 or group.max() < rim.min() - threshold / 2:
+            out[around] |= own
     return out

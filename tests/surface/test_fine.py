@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from synthetic import self_affine, sine, waves
 
 from patchfem.core import PatchfemError
-from patchfem.surface.fine import element_for, fine_share, spectrum, too_fine
+from patchfem.surface.fine import describe_lost_waves, fine_fraction, wave_spectrum
 from patchfem.surface.profile import Profile, level
 
 LENGTH = 12.7e-3
@@ -30,7 +30,7 @@ def test_exact_mean_squares_add_up(seed, count):
     weight[[0, -1]] = 0.5
     flat = level(profile).z
     mean = weight @ flat / weight.sum()
-    waves_, power = spectrum(profile)
+    waves_, power = wave_spectrum(profile)
     assert power.sum() == pytest.approx(weight @ (flat - mean) ** 2 / weight.sum(), rel=1e-10)
     assert waves_ == pytest.approx(4 / np.arange(1, count))
 
@@ -40,21 +40,21 @@ def test_exact_mean_squares_add_up(seed, count):
     (2 * LENGTH / 39, np.sqrt(5.0)), (2 * LENGTH / 6, np.sqrt(5.0)), (2 * LENGTH / 5, np.sqrt(14.0)),
     (2 * LENGTH, np.sqrt(14.0))])  # fmt: skip
 def test_exact_share_of_three_waves(length, share):
-    assert fine_share(cosines([6, 40, 300], [3.0, 2.0, 1.0]), length) == pytest.approx(share / np.sqrt(14), abs=1e-9)
+    assert fine_fraction(cosines([6, 40, 300], [3.0, 2.0, 1.0]), length) == pytest.approx(share / np.sqrt(14), abs=1e-9)
 
 
 def test_exact_elements_that_keep_three_waves():
     profile = cosines([6, 40, 300], [3.0, 2.0, 1.0])  # lost: 27 % without the finest, 60 % without the finest two
     for kept, order in ((0.99, 300), (0.74, 300), (0.72, 40), (0.41, 40), (0.39, 6)):
-        assert element_for(*spectrum(profile), kept) == pytest.approx(LENGTH / order, rel=1e-12)
+        assert wave_spectrum(profile).element_length(kept) == pytest.approx(LENGTH / order, rel=1e-12)
 
 
 @given(st.integers(0, 1000), st.floats(0.05, 0.95))
 def test_always_the_element_just_keeps_what_was_asked(seed, kept):
     profile = self_affine(LENGTH, 1000, 2e-6, 0.6, 3e-3, 40e-6, seed)
-    element = element_for(*spectrum(profile), kept)
-    assert fine_share(profile, 2 * element) <= 1 - kept + 1e-12
-    assert fine_share(profile, 2 * element * 1.3) >= fine_share(profile, 2 * element * 1.001) > 1 - kept
+    element = wave_spectrum(profile).element_length(kept)
+    assert fine_fraction(profile, 2 * element) <= 1 - kept + 1e-12
+    assert fine_fraction(profile, 2 * element * 1.3) >= fine_fraction(profile, 2 * element * 1.001) > 1 - kept
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -65,14 +65,14 @@ def test_exact_share_of_a_known_spectrum(seed):
     power = np.maximum(k * 1e-3 / LENGTH, 1) ** -2.0
     for cut in (100e-6, 200e-6, 400e-6):
         wanted = np.sqrt(power[LENGTH / k < cut].sum() / power.sum())
-        assert fine_share(profile, cut) == pytest.approx(wanted, abs=0.03)
+        assert fine_fraction(profile, cut) == pytest.approx(wanted, abs=0.03)
 
 
 def test_exact_tilt_and_height_do_not_count():
     profile = cosines([40, 300], [2.0, 1.0])
     for z in (5 * profile.z, profile.z + 100.0, profile.z - 3e3 * X):
-        assert fine_share(Profile(X, z, "a"), 2 * LENGTH / 200) == pytest.approx(1 / np.sqrt(5), abs=1e-9)
-    assert fine_share(Profile(X, 2 * X + 1, "a"), LENGTH) == 0.0 or fine_share(Profile(X, 0 * X, "a"), LENGTH) == 0.0
+        assert fine_fraction(Profile(X, z, "a"), 2 * LENGTH / 200) == pytest.approx(1 / np.sqrt(5), abs=1e-9)
+    assert fine_fraction(Profile(X, 0 * X, "a"), LENGTH) == 0.0
 
 
 def test_exact_a_long_wave_is_not_fine_whatever_its_ends():
@@ -80,7 +80,7 @@ def test_exact_a_long_wave_is_not_fine_whatever_its_ends():
     fourier = []
     for phase in np.linspace(0, 3, 7):
         profile = sine(X, 1.0, 3 * LENGTH, phase)
-        assert fine_share(profile, LENGTH / 50) < 5e-3
+        assert fine_fraction(profile, LENGTH / 50) < 5e-3
         power = np.abs(np.fft.rfft(level(profile).z[:-1]))[1:] ** 2
         fourier.append(np.sqrt(power[50:].sum() / power.sum()))
     assert max(fourier) > 0.1
@@ -91,24 +91,24 @@ def test_exact_uneven_samples_give_the_same_share():
     x = np.unique(np.concatenate([[0, LENGTH], rng.uniform(0, LENGTH, 20000)]))
     parts = [(np.pi / 2, 3.0, 6), (np.pi / 2, 1.0, 80)]
     profile = waves(x, [h for _, h, _ in parts], [2 * LENGTH / k for _, _, k in parts], [p for p, _, _ in parts])
-    assert fine_share(profile, 2 * LENGTH / 40) == pytest.approx(1 / np.sqrt(10), rel=1e-3)
+    assert fine_fraction(profile, 2 * LENGTH / 40) == pytest.approx(1 / np.sqrt(10), rel=1e-3)
 
 
 def test_refuses_fine_waves_with_the_numbers_and_the_remedy():
     profile = Profile(X, cosines([20, 500], [2.0, 1.0]).z, "profile.csv")
-    assert too_fine(profile, 100e-6) == (
+    assert describe_lost_waves(profile, 100e-6) == (
         'profile.csv has 45 % of its rms height in waves shorter than 2 elements (200 um), which the mesh cannot '
         'resolve: add [contact.asperities], or set element_size = "25 um", which keeps 90 % of the height '
         '("25 um" keeps 99 %)')
-    assert too_fine(profile, 25e-6) is None
-    assert too_fine(cosines([20, 500], [2.0, 0.1]), 100e-6) is None
-    assert too_fine(Profile(X, 0 * X, "flat.csv"), 1.0) is None
-    assert too_fine(profile, 100e-6, limit=0.5) is None
+    assert describe_lost_waves(profile, 25e-6) is None
+    assert describe_lost_waves(cosines([20, 500], [2.0, 0.1]), 100e-6) is None
+    assert describe_lost_waves(Profile(X, 0 * X, "flat.csv"), 1.0) is None
+    assert describe_lost_waves(profile, 100e-6, max_lost=0.5) is None
 
 
 def test_refuses_missing_heights_and_no_share():
     with pytest.raises(PatchfemError, match=r"a\.csv: 1 heights are missing; clean the trace first"):
-        fine_share(Profile(X, np.where(X == X[7], np.nan, X), "a.csv"), 1.0)
+        fine_fraction(Profile(X, np.where(X == X[7], np.nan, X), "a.csv"), 1.0)
     with pytest.raises(PatchfemError, match="must lie between 0 and 1, but is 1"):
-        element_for(*spectrum(sine(X, 1.0, LENGTH)), 1.0)
-    assert element_for(*spectrum(Profile(X, 0 * X, "a")), 0.9) == np.inf
+        wave_spectrum(sine(X, 1.0, LENGTH)).element_length(1.0)
+    assert wave_spectrum(Profile(X, 0 * X, "a")).element_length(0.9) == np.inf

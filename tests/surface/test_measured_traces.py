@@ -13,9 +13,9 @@ from scipy.io import loadmat
 from patchfem.core import PatchfemError
 from patchfem.surface.areal import level_plane
 from patchfem.surface.files.read import read_surface
-from patchfem.surface.fine import spectrum, too_fine
-from patchfem.surface.nodes import on_nodes, placed
-from patchfem.surface.profile import Profile, cleaned, level, spikes
+from patchfem.surface.fine import describe_lost_waves, wave_spectrum
+from patchfem.surface.nodes import average_at_nodes, place_over_patch
+from patchfem.surface.profile import Profile, clean, level, spikes
 
 pytestmark = pytest.mark.skipif("PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans")
 
@@ -115,22 +115,22 @@ def test_exact_spectrum_of_a_rough_trace_by_its_filtered_height(data, truth):
     """Rq behind a Gaussian filter from another code: the spectrum with each wave less the 2^-(cut/wave)^2 let by."""
     profile = mitutoyo(data)
     known = truth["mitutoyo-2.csv.gz"]
-    waves, power = spectrum(profile)
+    waves, power = wave_spectrum(profile)
     assert np.sqrt(power.sum()) == pytest.approx(known["Pq"] * 1e-6, rel=1e-4)
     for cut, name, near in ((80e-6, "own_gauss_lc80", 0.01), (250e-6, "own_gauss_lc250", 0.01),
                             (800e-6, "own_gauss_lc800", 0.05)):
         rough = np.sqrt((power * (1 - 2.0 ** -((cut / waves) ** 2)) ** 2).sum())
         assert rough == pytest.approx(known[name]["Rq"] * 1e-6, rel=near)
     assert ('% of its rms height in waves shorter than 2 elements (200 um), which the mesh cannot resolve: add '
-            '[contact.asperities], or set element_size = "20 um"') in str(too_fine(profile, 100e-6))
+            '[contact.asperities], or set element_size = "20 um"') in str(describe_lost_waves(profile, 100e-6))
 
 
 def test_exact_a_measured_trace_on_the_nodes_of_a_patch(data):
     """Coarse nodes see the means: their variance is what the waves keep after a box of one element."""
     nodes = np.linspace(-4.9e-3, 4.9e-3, 197)
-    trace = level(cleaned(placed(mitutoyo(data), nodes), 1e-4))
+    trace = level(clean(place_over_patch(mitutoyo(data), nodes), 1e-4))
     assert "the trace is centred on the patch, which adds -4.997 mm to x" in trace.notes[0]
-    gap = on_nodes(trace, nodes)
+    gap = average_at_nodes(trace, nodes)
     fine = np.interp(np.linspace(nodes[0], nodes[-1], 196 * 50 + 1), trace.x, trace.z)
     box = np.convolve(fine, np.r_[0.5, np.ones(49), 0.5] / 50, "valid")[25::50]
     assert gap[1:-1] == pytest.approx(box[:195], abs=2e-8)

@@ -12,7 +12,7 @@ from synthetic import peaks, self_affine, sine
 from traces import UM, bumpy
 
 from patchfem.core import PatchfemError, say
-from patchfem.surface.profile import SPIKE, Profile, cleaned, level, spikes
+from patchfem.surface.profile import SPIKE_DEVIATIONS, Profile, clean, level, spikes
 
 
 def rough(count=4000, seed=0) -> Profile:
@@ -33,7 +33,7 @@ def test_exact_a_line_is_taken_out_and_nothing_else(slope, offset, seed):
 
 def test_exact_a_good_trace_is_not_touched():
     trace = rough()
-    assert cleaned(trace, 100e-6) is trace
+    assert clean(trace, 100e-6) is trace
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -45,7 +45,7 @@ def test_exact_planted_spikes_are_found_all_and_only(seed):
     hit = np.flatnonzero(z != trace.z)
     spiked = replace(trace, z=z)
     assert np.array_equal(np.flatnonzero(spikes(spiked)), hit)
-    back = cleaned(spiked, 100e-6)
+    back = clean(spiked, 100e-6)
     assert np.array_equal(back.x, trace.x)
     smooth = np.abs(trace.z[hit] - np.interp(trace.x[hit], np.delete(trace.x, hit), np.delete(trace.z, hit)))
     assert np.abs(back.z - trace.z).max() == pytest.approx(smooth.max(), rel=1e-12)
@@ -71,7 +71,8 @@ def test_exact_the_threshold_is_the_stated_one():
     noise = np.random.default_rng(4).normal(size=200)
     for factor, found in ((0.999, False), (1.001, True)):
         z = noise.copy()
-        z[90:97] = [-2.0, -1.0, 0.5, 0.5 + factor * SPIKE * 1.4826 * 1.5, -0.5, 1.0, 2.0]  # median 0.5, deviation 1.5
+        high = 0.5 + factor * SPIKE_DEVIATIONS * 1.4826 * 1.5
+        z[90:97] = [-2.0, -1.0, 0.5, high, -0.5, 1.0, 2.0]  # median 0.5, deviation 1.5
         assert spikes(Profile(x, z, "a"))[93] == found
 
 
@@ -81,7 +82,7 @@ def test_exact_missing_runs_on_a_line_come_back(slope, seed):
     x = np.cumsum(rng.uniform(0.5, 1.5, 60)) * UM
     lost = rng.random(60) < 0.4
     lost[[0, -1]] = False
-    back = cleaned(Profile(x, np.where(lost, np.nan, slope * x), "a"), 1.0)
+    back = clean(Profile(x, np.where(lost, np.nan, slope * x), "a"), 1.0)
     assert np.array_equal(back.x, x) and back.z == pytest.approx(slope * x, abs=1e-18)
     assert len(back.notes) == bool(lost.any())
 
@@ -89,7 +90,7 @@ def test_exact_missing_runs_on_a_line_come_back(slope, seed):
 def test_exact_missing_ends_are_cut_off_and_counted():
     x = np.arange(12.0) * UM
     z = np.array([np.nan, np.nan, 1, 2, 3, np.nan, np.nan, 6, 7, 8, 9, np.nan]) * UM
-    back = cleaned(Profile(x, z, "before.csv", ("first",)), 3 * UM)
+    back = clean(Profile(x, z, "before.csv", ("first",)), 3 * UM)
     assert back.x == pytest.approx(x[2:11]) and back.z == pytest.approx((x - UM)[2:11])
     assert back.notes == ("first", "before.csv: 5 of 12 heights are missing; the gaps are bridged by straight lines, "
                                    "of which the longest spans 3 um")
@@ -99,12 +100,12 @@ def test_refuses_a_long_hole_and_an_empty_trace():
     x = np.arange(12.0) * UM
     z = np.where((x > 2.5 * UM) & (x < 8.5 * UM), np.nan, 0.0)
     with pytest.raises(PatchfemError) as caught:
-        cleaned(Profile(x, z, "before.csv"), 5 * UM)
+        clean(Profile(x, z, "before.csv"), 5 * UM)
     assert str(caught.value) == (
         "before.csv: no usable height between x = 2 um and 9 um, and a straight line may bridge at most 5 um; measure "
         "this part of the trace anew or use a larger contact.element_size")
     with pytest.raises(PatchfemError, match=r"before\.csv: 0 usable heights; a trace needs at least two"):
-        cleaned(Profile(x, np.full(12, np.nan), "before.csv"), 1.0)
+        clean(Profile(x, np.full(12, np.nan), "before.csv"), 1.0)
 
 
 @pytest.mark.parametrize("length, words", [(12.7e-3, "12.7 mm"), (200e-6, "200 um"), (1e-3, "1 mm"), (2.5, "2.5 m"),

@@ -14,7 +14,7 @@ from ...core import PatchfemError
 from ...inputs.matlab import variables
 from ..areal import Areal
 from ..profile import Profile
-from ..samples import GIVEN, checked
+from ..samples import GIVEN, make_trace
 from .raster import areal, raster
 from .raw import MAX_POINTS, Raw, shorten
 from .units import GIVE, LISTED, PIXEL, length_unit, pixel_size
@@ -108,7 +108,7 @@ def _read_table(raw: Raw, table, factors: LengthFactors) -> Profile | Areal:
     if len(columns[0]) < 2:
         raise PatchfemError(f"{raw.path}: {len(columns[0])} rows; a trace needs at least two")
     if len(columns) == 2:
-        return checked(raw.path, *columns, None, factors, GIVEN)
+        return make_trace(raw.path, *columns, None, factors, GIVEN)
     return raster(raw.path, columns, None, (factors.lateral, *factors), GIVEN)
 
 

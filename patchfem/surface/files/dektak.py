@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core import PatchfemError, say
 from ..profile import Profile
-from ..samples import checked
+from ..samples import make_trace, printed_digit
 from .head import Head
 from .raw import Raw, shorten
 from .rows import read_columns
@@ -20,9 +20,7 @@ from .text import decode_text
 from .units import length_unit
 
 FIRST_WORDS = b"Scan Parameters"  # of an export
-MAX_DIGIT_ERROR = (
-    1e-4  # of a printed digit; x that are multiples of it within this were printed with it
-)
+MIN_DIGIT = 1e-5  # smallest digit of x in the unit of the file; no export prints more
 MAX_STEP_ERROR = 0.6  # of a printed digit: half a digit, and the round-off of the printing
 _LENGTH = re.compile(
     r"^Length,\s*([+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?)\s*([^\W\d_]*)\s*$", re.MULTILINE
@@ -63,7 +61,7 @@ def read_dektak(raw: Raw) -> Profile:
     x, note = values["x"], ""
     if factor and np.isfinite(float(length[1])):
         x, note = _true_places(x, float(length[1]) * factor, factors[0])
-    trace = checked(path, x, values["z"], lines, tuple(factors))
+    trace = make_trace(path, x, values["z"], lines, tuple(factors))
     return replace(trace, notes=(f"{path}: {note}", *trace.notes)) if note else trace
 
 
@@ -80,11 +78,7 @@ def _true_places(x, length: float, factor: float) -> tuple[np.ndarray, str]:
     if x.size < 3 or not np.isfinite(x).all() or not x[-1] > x[0]:
         return x, ""
     numbers = np.arange(x.size)
-    digits = 10.0 ** np.arange(3, -6, -1)
-    multiples = (
-        digit for digit in digits if np.abs(x / digit - np.rint(x / digit)).max() < MAX_DIGIT_ERROR
-    )
-    digit = next(multiples, digits[-1])
+    digit = max(printed_digit(x), MIN_DIGIT)
     for count in (x.size, x.size - 1):
         step = length / factor / count
         places = x[0] + step * numbers

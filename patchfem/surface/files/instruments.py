@@ -17,7 +17,7 @@ import numpy as np
 from ...core import Missing, PatchfemError
 from ..areal import Areal
 from ..profile import Profile
-from ..samples import GIVEN, checked
+from ..samples import GIVEN, make_trace
 from .arrays import length_factors
 from .raster import areal
 from .raw import DAMAGED, MAX_POINTS, Raw, shorten, shorten_reason
@@ -61,7 +61,7 @@ def read_instrument(raw: Raw, units: tuple | None) -> Profile | Areal:
         notes += (f"{raw.path}: {IGNORED}",)
     if len(arrays) == 3:
         return areal(raw.path, *arrays, stated, notes)
-    trace = checked(raw.path, *arrays, None, (1.0, 1.0), stated)
+    trace = make_trace(raw.path, *arrays, None, (1.0, 1.0), stated)
     return replace(trace, notes=(*notes, *trace.notes))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from ...core import PatchfemError
 from ..areal import Areal
 from ..profile import Profile
-from ..samples import GIVEN, checked
+from ..samples import GIVEN, make_trace
 from .head import Fact, Head, names_columns
 from .raster import areal
 from .raw import shorten
@@ -106,7 +106,7 @@ def read_scan(path, head: Head, facts: dict, units: tuple | None, body: str) -> 
     x = np.arange(columns) * step_x.value
     z = table * factor.value
     if rows == 1:
-        trace = checked(path, x, z[0], None, (1.0, 1.0), stated)
+        trace = make_trace(path, x, z[0], None, (1.0, 1.0), stated)
         return Profile(trace.x, trace.z, trace.source, (*notes, *trace.notes))
     return areal(path, x, np.arange(rows) * step_y.value, z, stated, notes)
 

@@ -7,7 +7,7 @@ import numpy as np
 from ...core import PatchfemError, frozen_array, say
 from ..areal import Areal
 from ..profile import Profile
-from ..samples import bounded, checked, evened, plausible
+from ..samples import check_span, make_trace, require_finite, undo_rounding
 from .raw import MAX_POINTS
 
 MAX_CELLS_PER_POINT = 4  # cells of the raster for each point; more is a cloud of points
@@ -45,14 +45,14 @@ def raster(path, columns: list, lines, factors: tuple, stated: str = "") -> Prof
         Cells without a point are missing.
     """
     x, y, z = columns
-    bounded(path, columns, ("x", "y", "z"), lines, factors)
+    require_finite(path, columns, ("x", "y", "z"), lines, factors)
     along_x = _find_axis(x)
     along_y = _find_axis(y)
     shape = (along_y.places.size, along_x.places.size)
     if shape[0] == 1:
-        return checked(path, x, z, lines, (factors[0], factors[2]), stated)
+        return make_trace(path, x, z, lines, (factors[0], factors[2]), stated)
     if shape[1] == 1:
-        return checked(path, y, z, lines, (factors[1], factors[2]), stated)
+        return make_trace(path, y, z, lines, (factors[1], factors[2]), stated)
     cells = shape[0] * shape[1]
     if cells > max(MAX_CELLS_PER_POINT * z.size, 16) or cells > MAX_POINTS:
         raise PatchfemError(
@@ -95,7 +95,7 @@ def areal(path, x, y, z, stated: str = "", notes: tuple = ()) -> Profile | Areal
     Profile or Areal
     """
     if len(y) == 1:
-        trace = checked(path, x, z[0], None, (1.0, 1.0), stated)
+        trace = make_trace(path, x, z[0], None, (1.0, 1.0), stated)
         return Profile(trace.x, trace.z, trace.source, notes + trace.notes)
     axes = []
     for axis, (name, places) in enumerate((("y", y), ("x", x))):
@@ -103,22 +103,22 @@ def areal(path, x, y, z, stated: str = "", notes: tuple = ()) -> Profile | Areal
             raise PatchfemError(
                 f"{path}: {len(places)} positions along {name}; a scan needs at least two"
             )
-        bounded(path, (places,), (name,), None, (1.0,))
+        require_finite(path, (places,), (name,), None, (1.0,))
         if places[-1] < places[0]:
             places = places[::-1]
             z = np.flip(z, axis)
-        places, more = evened(path, places, 1.0, name)
+        places, more = undo_rounding(path, places, 1.0, name)
         if not (np.diff(places) > 0).all():
             raise PatchfemError(
                 f"{path}: {name} reverses; each coordinate of a scan must only rise or only fall"
             )
         axes.append(places)
         notes += more
-    bounded(path, (z.ravel(),), ("z",), None, (1.0,))
+    require_finite(path, (z.ravel(),), ("z",), None, (1.0,))
     known = np.isfinite(z)
     if known.sum() < 3:
         raise PatchfemError(f"{path}: {known.sum()} heights; a scan needs at least three")
-    notes += plausible(path, max(axes, key=np.ptp), z[known], stated)
+    notes += check_span(path, max(axes, key=np.ptp), z[known], stated)
     return Areal(
         frozen_array(axes[1]), frozen_array(axes[0]), frozen_array(z), str(path), tuple(notes)
     )

@@ -18,7 +18,7 @@ import numpy as np
 from ...core import PatchfemError
 from ..areal import Areal
 from ..profile import Profile
-from ..samples import GIVEN, checked
+from ..samples import GIVEN, make_trace
 from .head import EXAMPLE, ColumnNames, Fact, parse_column, read_head
 from .matrix import is_matrix, read_scan
 from .raster import raster
@@ -102,7 +102,7 @@ def read_text(raw: Raw, units: tuple | None = None) -> Profile | Areal:
     if "y" in columns:
         surface = raster(path, [values[name] for name in "xyz"], lines, factors.values, stated)
     else:
-        surface = checked(path, values["x"], values["z"], lines, factors.values, stated)
+        surface = make_trace(path, values["x"], values["z"], lines, factors.values, stated)
     return replace(surface, notes=(*notes, *factors.notes, *surface.notes))
 
 
