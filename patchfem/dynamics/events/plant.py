@@ -173,7 +173,7 @@ class Room(NamedTuple):
     Of slides that rigid elements hold (`stick_kernels`): mask (i,) which, held (2,) how many and whether nothing can
     move, react (i, n) and tied (i,) as `constrain` leaves them, reactions (i, terms) [N] over a piece; orders (i, 2) of
     the terms that vanish where a piece begins after an event, -1 before the first choice; resting, signs, guess (i,) of
-    a choice, scales (terms, n) and spans (i, terms) of its round-off, turned (i, n), mix and gram (i, i), row (8, i).
+    a choice, scales (terms, n) and spans (i, terms) of its round-off, turned (i, n), mix and gram (i, i), row (2, i).
     """
 
     coefs: np.ndarray
@@ -207,7 +207,7 @@ def room_of(plant: Plant) -> Room:
     fields = {"coefs": (wide, n), "waves": (3, wide), "polys": (faces + 3, wide), "nodes": (n, 4),
               "hulls": (series.DEEP + 2, series.WIDE), "held": (2,), "react": (faces, n), "reactions": (faces, wide),
               "orders": (faces, 2), "scales": (wide, n), "spans": (faces, wide), "turned": (faces, n),
-              "mix": (faces, faces), "gram": (faces, faces), "row": (8, faces)}
+              "mix": (faces, faces), "gram": (faces, faces), "row": (2, faces)}
     return cleared(Room(*(np.empty(fields.get(name, (faces,))) for name in Room._fields)))
 
 

@@ -9,10 +9,10 @@ from math import sqrt
 
 from ...compiled.inner import njit
 from ...friction.flags_kernels import FAST, LEAN
+from ..dense_kernels import factor, solve
 from .drive_kernels import drive_series, rate_of
 from .memory_kernels import RIGID
 from .series_kernels import EPS, REACH, powers
-from .stick_kernels import solved
 
 DEAD = 64 * EPS  # of the motion that follows: less that rings is round-off
 LATER = 16.0  # short pieces before it is looked again whether what rings has died out
@@ -20,23 +20,24 @@ LATER = 16.0  # short pieces before it is looked again whether what rings has di
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
 def compliances(springs, plant, room):
-    """Fill room.gram (i, i) with slide w^-2 slide^T/mass + 1/spring of the interfaces that carry a force, of which
-    room.row[5] (i,) is 1. Of those that are held the turned rows stand for the slides."""
-    n, faces, carries = len(plant.square), len(plant.reach), room.row[5]
+    """Factor slide w^-2 slide^T/mass + 1/spring of the interfaces into room.gram (i, i), 1 for one without force.
+
+    The rows room.turned stand for the slides: of those that are held as `constrain` leaves them, 0 without force.
+    """
+    n, faces = len(plant.square), len(plant.reach)
     for f in range(faces):
         size = 0.0
         for i in range(n):
             if springs[f] < RIGID:
-                room.turned[f, i] = plant.faces[f, i]
+                room.turned[f, i] = plant.faces[f, i] if springs[f] > 0.0 else 0.0
             size += room.turned[f, i]**2
-        carries[f] = 1.0 if size > 0.0 and springs[f] > 0.0 else 0.0
         for g in range(f + 1):
             part = 0.0
             for i in range(n):
                 part += room.turned[f, i] * room.turned[g, i] / plant.square[i]
             room.gram[f, g] = part / plant.mass
-        if carries[f] == 1.0:
-            room.gram[f, f] += 1 / springs[f]
+        room.gram[f, f] = room.gram[f, f] + 1 / springs[f] if size > 0.0 else 1.0
+    factor(room.gram)
 
 
 @njit(error_model="numpy", fastmath=FAST, **LEAN)
@@ -66,10 +67,10 @@ def balance(force, place, springs, plant, left, room):
             for i in range(len(plant.square)):
                 off = place[i] if springs[f] == RIGID else 0.0
                 room.row[1, f] += room.turned[f, i] * (left[i] / plant.square[i] + off)
-        solved(room.row[5], room)
+        solve(room.gram, room.row[1])
         for i in range(len(plant.square)):
             for f in range(len(plant.reach)):
-                left[i] -= room.turned[f, i] * room.row[2, f] / plant.mass
+                left[i] -= room.turned[f, i] * room.row[1, f] / plant.mass
             place[i] += left[i] / plant.square[i]
     unbalanced(force, place, springs, plant, left)
 

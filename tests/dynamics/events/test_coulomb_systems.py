@@ -11,7 +11,7 @@ from event_run import combine, rows_of, run, simulate, starts
 from hypothesis import given
 from hypothesis import strategies as st
 
-from patchfem.core import BaseSine, Outcome, PatchfemError, Segment, Start
+from patchfem.core import BaseSine, NotConverged, Outcome, PatchfemError, Segment, Start
 from patchfem.dynamics.events.event_list import BORDER, RELEASE, REVERSAL, STOP
 from patchfem.response.measures import energy_balance
 from patchfem.structure import drives
@@ -188,11 +188,9 @@ def test_exact_many_interfaces_stop_and_slip_together(count):
     assert energy_balance(many.ledger) < 1e-10
 
 
-@given(st.integers(0, 10**6), st.integers(5, 11), st.floats(0.3, 1.0))
-def test_always_states_of_many_interfaces_satisfy_the_law(seed, faces, ratio):
-    """All at rest at once: the accelerations of the choice agree with its signs, the forces with their limits."""
+def choice_at_rest(seed, n, faces, ratio):
+    """Require that accelerations agree with the signs of slip and forces with their limits, of faces that all rest."""
     rng = np.random.default_rng(seed)
-    n = 8
     modes = random_basis(rng, n, faces)
     static = rng.uniform(0.1, 1.0, faces)
     z, v, rows = rng.normal(size=n), np.zeros(n), np.asarray(modes.interfaces)
@@ -209,6 +207,30 @@ def test_always_states_of_many_interfaces_satisfy_the_law(seed, faces, ratio):
             assert sign * accel[c] > 0 and forces[c] == pytest.approx(sign * ratio * static[c], rel=1e-12)
         else:
             assert abs(accel[c]) < 1e-9
+
+
+@given(st.integers(0, 10**6), st.integers(5, 16), st.floats(0.3, 1.0))
+def test_always_many_interfaces_that_rest_at_once_satisfy_the_law(seed, faces, ratio):
+    """Independent ones: no more of them than modes."""
+    choice_at_rest(seed, max(8, faces), faces, ratio)
+
+
+@given(st.integers(0, 10**6), st.integers(5, 8), st.floats(0.3, 1.0))
+def test_always_dependent_interfaces_that_rest_at_once_satisfy_the_law(seed, faces, ratio):
+    """Up to eight, of which every choice is tried."""
+    choice_at_rest(seed, 4, faces, ratio)
+
+
+def test_always_a_choice_that_is_not_found_is_said():
+    """Sixteen interfaces of eight modes: found and right, or refused with what to use."""
+    refused = 0
+    for seed in range(10):
+        try:
+            choice_at_rest(seed, 8, 16, 0.6)
+        except NotConverged as error:
+            assert 'use accuracy.method = "march"' in str(error)
+            refused += 1
+    assert 0 < refused < 10
 
 
 # starts, drives and printed numbers
