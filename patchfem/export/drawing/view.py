@@ -1,7 +1,7 @@
 """The pressed pieces in a window or a picture: von Mises stress, motion magnified, stress along the interface.
 
-Pictures are drawn by matplotlib (`flat`), the window by pyvista, which nothing else touches. Whether OpenGL can draw
-the window is found out in a child process, because a broken driver ends the process that asks.
+Pictures are drawn by matplotlib (`flat`), the window by pyvista, which nothing else touches. A child process finds out
+whether OpenGL can draw the window: without a working driver VTK 9.7 ends its process by a segmentation fault.
 """
 
 import os
@@ -19,7 +19,7 @@ from . import film, flat
 from .panels import Panel, borders, curves, panels
 
 ENDINGS = (".png", ".svg", ".pdf")
-SECONDS = 60  # for the child
+SECONDS = 60  # the child may take; starting pyvista and drawing takes 6 s to 9 s on a busy machine
 PROBE = """\
 import pyvista
 plotter = pyvista.Plotter(off_screen=True, window_size=(32, 32))

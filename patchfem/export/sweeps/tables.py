@@ -8,6 +8,7 @@ import tomllib
 from collections.abc import Iterator, Sequence
 from itertools import chain
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -32,28 +33,49 @@ FACTS = {"tolerance": ("accuracy", "tolerance"), "patch_length": ("contact", "le
          "patch_width": ("contact", "width"), "drive_from": ("drive", "from"), "drive_to": ("drive", "to")}
 
 
+class Column(NamedTuple):
+    """A column of numbers of a sweep, (n,) [unit], "1" for plain numbers."""
+
+    name: str
+    values: np.ndarray
+    unit: str
+    long_name: str
+
+
 def names_of(found: Answers) -> list[str]:
-    """Measures of the cases in the order of the reference, whatever order the cases came in."""
+    """Sort the measures of the cases in the order of the reference, whatever order the cases came in."""
     return sorted(found.values, key=lambda name: (ORDER.get(rows.of_first(name), len(ORDER)), name))
 
 
+def columns_of(found: Answers, name: str) -> list[Column]:
+    """Return the columns of a measure: its values and their errors."""
+    unit = found.units[name]
+    return [
+        Column(name, found.values[name], unit, meaning(name)),
+        Column(f"{name}_error", found.errors[name], unit, f"estimated numerical half-width of {name}"),
+    ]
+
+
 def head(cases: Cases, found: Answers, keys: Sequence[str] = ()) -> list[str]:
-    """Names of the columns of `lines`."""
-    measures = [text for name in names_of(found) for text in (name, f"{name}_error")]
+    """Return the names of the columns of `lines`."""
+    measures = [column.name for name in names_of(found) for column in columns_of(found, name)]
     return [*(axis.key for axis in cases.axes), "outcome", *measures, "message", *(["case"] if keys else [])]
 
 
 def lines(cases: Cases, found: Answers, keys: Sequence[str] = ()) -> Iterator[list[str]]:
-    """A line of sweep.csv per case: the swept keys as written, outcome, every measure with its error in SI, then the
-    message of a failed case and the name of its folder where `keys` are given. "" stands for what a case has not."""
-    names = names_of(found)
+    """Yield a line of sweep.csv per case; "" stands for what a case has not.
+
+    The swept keys as written, outcome, every measure with its error in SI, the message of a failed case, and the name
+    of its folder where `keys` are given.
+    """
+    columns = [column for name in names_of(found) for column in columns_of(found, name)]
     for first in range(0, len(cases), BLOCK):  # the texts of all cases would fill the memory
         numbers = range(first, min(first + BLOCK, len(cases)))
-        block = [["" if value != value else repr(value) for value in part[name][first:numbers.stop].tolist()]
-                 for name in names for part in (found.values, found.errors)]
+        block = [["" if value != value else repr(value) for value in column.values[first:numbers.stop].tolist()]
+                 for column in columns]
         for number, *cells in zip(numbers, *block):
-            yield [*cases.texts(number), str(found.outcome[number]), *cells, found.messages.get(number, ""),
-                   *([keys[number]] if keys else [])]
+            folder = [keys[number]] if keys else []
+            yield [*cases.texts(number), str(found.outcome[number]), *cells, found.messages.get(number, ""), *folder]
 
 
 def write_csv(cases: Cases, found: Answers, keys: Sequence[str], path: Path) -> Path:
@@ -63,27 +85,27 @@ def write_csv(cases: Cases, found: Answers, keys: Sequence[str], path: Path) -> 
 
 
 def contents(asked: Asked, cases: Cases, found: Answers, keys: Sequence[str] = (), answer: str = "") -> netcdf.Contents:
-    """What sweep.nc holds, in SI.
+    """Return what sweep.nc holds, in SI.
 
     A dimension per swept key, dots as underscores, or the one dimension `case` where the cases are rows; a variable
-    and an error per measure, outcome, the message of failed cases and the names of their folders; answer: what the
-    sweep comes to, in a sentence.
+    and an error per measure, outcome, the message of failed cases and the names of their folders; answer: the main
+    conclusion of the sweep in a sentence.
     """
     dims = ("case",) if cases.rows else tuple(axis.name for axis in cases.axes)
     coordinates = {axis.name: ("case" if cases.rows else axis.name, _numbers(axis.values), _about(axis))
                    for axis in cases.axes}
     if cases.rows:
         coordinates["case"] = ("case", np.arange(len(cases)), {"units": "1", "long_name": "number of the case"})
-    data = {}
-    for name in (one for one in names_of(found) if one not in coordinates):  # normal.load is the measure of its name
-        about = {"units": found.units[name], "long_name": meaning(name)}
-        data[name] = (dims, found.values[name].reshape(cases.shape), about)
-        error = {"units": found.units[name], "long_name": f"estimated numerical half-width of {name}"}
-        data[f"{name}_error"] = (dims, found.errors[name].reshape(cases.shape), error)
+    columns = []
+    for name in names_of(found):
+        if name in coordinates:  # normal.load is the measure of its name
+            continue
+        columns += columns_of(found, name)
         if np.nan_to_num(found.floors[name]).any():
-            data[f"{name}_floor"] = (dims, found.floors[name].reshape(cases.shape), {
-                "units": found.units[name], "long_name": f"error of {name} that is allowed in addition to the "
-                                                         "tolerance"})
+            text = f"error of {name} that is allowed in addition to the tolerance"
+            columns.append(Column(f"{name}_floor", found.floors[name], found.units[name], text))
+    data = {column.name: (dims, column.values.reshape(cases.shape),
+                          {"units": column.unit, "long_name": column.long_name}) for column in columns}
     texts = {"outcome": (found.outcome, "how the case ended")}
     if found.messages:
         messages = [found.messages.get(number, "") for number in range(len(cases))]
@@ -92,12 +114,25 @@ def contents(asked: Asked, cases: Cases, found: Answers, keys: Sequence[str] = (
         texts["folder"] = (keys, "folder of the case inside cases/")
     for name, (values, text) in texts.items():
         data[name] = (dims, np.array(values, object).reshape(cases.shape), {"long_name": text})
-    return netcdf.Contents(data, coordinates, {
-        "Conventions": "CF-1.11", "title": f"sweep over {', '.join(axis.key for axis in cases.axes)}",
-        "source": f"patchfem {__version__}", "scene": asked.text, "scene_file": asked.path.name,
-        "sets": json.dumps(list(asked.sets)), "answer": answer, "drawn": int(cases.drawn),
-        "words": json.dumps(list(cases.words)), **facts(asked, cases),
-        "scene_sha256": hashlib.sha256(asked.text.encode()).hexdigest(), "versions": json.dumps(versions())})
+    return netcdf.Contents(data, coordinates, _attributes(asked, cases, answer))
+
+
+def _attributes(asked: Asked, cases: Cases, answer: str) -> dict:
+    """Return the attributes of sweep.nc: its scene, its command and the versions."""
+    return {
+        "Conventions": "CF-1.11",
+        "title": f"sweep over {', '.join(axis.key for axis in cases.axes)}",
+        "source": f"patchfem {__version__}",
+        "scene": asked.text,
+        "scene_file": asked.path.name,
+        "sets": json.dumps(list(asked.sets)),
+        "answer": answer,
+        "drawn": int(cases.drawn),
+        "words": json.dumps(list(cases.words)),
+        **facts(asked, cases),
+        "scene_sha256": hashlib.sha256(asked.text.encode()).hexdigest(),
+        "versions": json.dumps(versions()),
+    }
 
 
 def facts(asked: Asked, cases: Cases) -> dict:
