@@ -10,19 +10,7 @@ from .profile import Profile
 N_ROUNDS = 40  # rounds of relaxation, the first half by the Laplacian; they settle single holes
 DAMPING = 0.6  # fraction of each round's change; the bi-Laplacian diverges from 5/8 on
 RANK_TOL = 1e-12  # smaller singular values of the normal equations / count are round-off
-_LAPLACIAN = np.array([[0, 1, 0], [1, 0, 1], [0, 1, 0]]) / 4
-_BILAPLACIAN = (
-    np.array(
-        [
-            [0, 0, -1, 0, 0],
-            [0, -2, 8, -2, 0],
-            [-1, 8, 0, 8, -1],
-            [0, -2, 8, -2, 0],
-            [0, 0, -1, 0, 0],
-        ]
-    )
-    / 20
-)
+_LAPLACIAN = np.array([[0, -1, 0], [-1, 4, -1], [0, -1, 0]])  # times minus the squared step
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -70,20 +58,21 @@ def filled(z, missing) -> np.ndarray:
     fourth order of the step.
     """
     from scipy.ndimage import distance_transform_edt
+    from scipy.signal import convolve2d
 
     if not missing.any():
         return z
     nearest = distance_transform_edt(missing, return_distances=False, return_indices=True)
     padded = np.pad(z[tuple(nearest)], 2, "reflect", reflect_type="odd")
     rows, columns = np.nonzero(missing)
+    bilaplacian = convolve2d(_LAPLACIAN, _LAPLACIAN)
     for turn in range(N_ROUNDS):
-        stencil = _LAPLACIAN if turn < N_ROUNDS // 2 else _BILAPLACIAN
-        reach = len(stencil) // 2
-        mean = 0.0
+        stencil = np.pad(_LAPLACIAN, 1) if turn < N_ROUNDS // 2 else bilaplacian
+        residual = 0.0
         for (down, right), weight in np.ndenumerate(stencil):
             if weight:
-                mean = mean + weight * padded[rows + 2 + down - reach, columns + 2 + right - reach]
-        padded[rows + 2, columns + 2] += DAMPING * (mean - padded[rows + 2, columns + 2])
+                residual = residual + weight * padded[rows + down, columns + right]
+        padded[rows + 2, columns + 2] -= DAMPING * residual / stencil[2, 2]
     return padded[2:-2, 2:-2]
 
 

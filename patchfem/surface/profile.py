@@ -16,8 +16,8 @@ FOOT_DEVIATIONS = 3.0  # robust standard deviations down to which the foot of a 
 MAD_TO_DEVIATION = (
     1.4826  # standard deviation of a normal distribution / its median absolute deviation
 )
-CHUNK = 1 << 17  # windows sorted at a time, which limits the memory
-MAX_SAMPLES = 1 << 21  # samples of a resampled trace
+CHUNK = 131_072  # windows sorted at a time, which limits the memory
+MAX_SAMPLES = 2_097_152  # samples of a resampled trace
 EVEN_TOL = 1e-6  # relative scatter of the steps of an even trace
 
 

@@ -6,9 +6,9 @@ from .areal import Areal, filled
 from .profile import MAD_TO_DEVIATION
 
 THRESHOLDS = (10.0, 40.0, 160.0)  # standard deviations; at the lowest a slope may join spikes
-MAX_SPIKE_POINTS = 12  # a larger group of points is a feature of the surface
+MAX_SPIKE_POINTS = 12  # larger groups of points are features of the surface
 N_SAMPLED = 100_000  # heights whose scatter about the medians is measured; more do not change it
-CHUNK = 1 << 17  # medians computed at a time, which limits the memory
+CHUNK = 131_072  # medians computed at a time, which limits the memory
 WINDOW = 5  # points along each side of a median
 
 

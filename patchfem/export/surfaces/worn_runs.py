@@ -31,7 +31,7 @@ OPTIONAL = (
 )
 FLOOR_PARTS = 5  # the floor of a worn part is its deepest fifth, as for measured tracks
 FLOOR_POINTS = 100  # points of a fifth; more change the floor by less than the run's own error
-MIN_WORN_FRACTION = 1e-3  # of the largest depth; nodes that wore less count as unworn
+MIN_WORN_FRACTION = 1e-3  # nodes that wore less / largest depth count as unworn
 MIN_ROUGHNESS = (
     1e-12  # [m] standard deviation below which an unworn surface is flat and has no waves
 )

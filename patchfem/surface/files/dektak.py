@@ -19,9 +19,9 @@ from .rows import read_columns
 from .text import decode_text
 from .units import length_unit
 
-FIRST_WORDS = b"Scan Parameters"  # of an export
+FIRST_WORDS = b"Scan Parameters"  # every export begins with these
 MIN_DIGIT = 1e-5  # smallest digit of x in the unit of the file; no export prints more
-MAX_STEP_ERROR = 0.6  # of a printed digit: half a digit, and the round-off of the printing
+MAX_STEP_ERROR = 0.6  # printed digits off even steps: half a digit, and round-off
 _LENGTH = re.compile(
     r"^Length,\s*([+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?)\s*([^\W\d_]*)\s*$", re.MULTILINE
 )

@@ -10,15 +10,16 @@ from typing import NamedTuple
 
 from ...core import Missing, PatchfemError
 
-MAX_BYTES = 512 * 2**20  # bytes of a file, or of its unpacked content
-MAX_TEXT_BYTES = 64 * 2**20  # bytes of text: four million samples
-MAX_POINTS = 5 * 10**7  # heights
+MIB = 2**20  # bytes
+MAX_BYTES = 512 * MIB  # bytes of a file, or of its unpacked content
+MAX_TEXT_BYTES = 64 * MIB  # bytes of text: four million samples
+MAX_POINTS = 50_000_000  # heights
 MAX_UNPACK_RATIO = 200  # unpacked / packed size; no surface packs better, a bomb does
 MIN_LIMIT = (
     2**20
 )  # bytes that may unpack at any ratio, and that the list of members of a zip file may have
 HEAD_BYTES = 4096  # bytes that decide the format
-BLOCK_BYTES = 2**16  # bytes counted at a time: larger blocks are mapped anew each time
+BLOCK_BYTES = 65_536  # bytes counted at a time: larger blocks are mapped anew each time
 MARKS = {
     b"\x1f\x8b": "gzip",
     b"PK\x03\x04": "zip",

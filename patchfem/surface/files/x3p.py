@@ -21,9 +21,9 @@ from ..areal import Areal
 from ..profile import Profile
 from ..samples import METRES
 from .raster import areal, raster
-from .raw import MAX_POINTS, Raw, open_zip, read_member, shorten, shorten_reason
+from .raw import MAX_POINTS, MIB, Raw, open_zip, read_member, shorten, shorten_reason
 
-MAX_XML_BYTES = 16 * 2**20  # bytes of main.xml; with its heights as a list it has 30 for each
+MAX_XML_BYTES = 16 * MIB  # bytes of main.xml; with its heights as a list it has 30 for each
 MAX_DEPTH = 50  # elements inside one another; the standard has six
 MAX_ELEMENTS = 500_000  # elements; more take over 100 MB
 MAX_CHECKSUM_BYTES = 4096  # bytes of the file with the checksum of main.xml, which has 45

@@ -13,7 +13,7 @@ from ...core import say
 from .parameters import Heights
 
 DECAY_LEVEL = 0.2  # value of the autocorrelation at its length (ISO 25178-3)
-MIN_LENGTH_STEPS = 2.0  # a shorter length of autocorrelation, in steps, is that of the raster
+MIN_LENGTH_STEPS = 2.0  # shorter lengths of autocorrelation, in steps, are those of the raster
 
 
 class Lobe(NamedTuple):

@@ -12,7 +12,7 @@ ALPHA = np.sqrt(
     np.log(2) / np.pi
 )  # width of the weights / cut-off; a wave of one cut-off passes with half its height
 REACH_FACTOR = 1.25  # half-length of the weights / cut-off; only 1.5e-10 of their sum lies beyond
-MIN_CUTOFF_STEPS = 4  # a shorter cut-off, in steps, is not resolved by the samples
+MIN_CUTOFF_STEPS = 4  # shorter cut-offs, in steps, are not resolved by the samples
 
 
 def filter_trace(profile: Profile, cutoff: float) -> tuple[Profile, Profile]:

@@ -11,14 +11,12 @@ from ..areal import Areal
 from ..areal import level as level_scan
 from ..profile import Profile, level
 
-MAX_DEGREE = 9  # above this a polynomial follows the waves of the surface
+MAX_DEGREE = 9  # higher polynomials follow the waves of the surface
 CYLINDER = "cylinder"
-MAX_FITTED = (
-    1 << 16
-)  # heights that a cylinder is fitted to; more do not change it, and cost seconds
-MAX_JACKKNIFE = 1 << 13  # heights that each fit of the jackknife uses
+MAX_FITTED = 65_536  # heights that a cylinder is fitted to; more do not change it, and cost seconds
+MAX_JACKKNIFE = 8_192  # heights that each fit of the jackknife uses
 N_PARTS = 10  # parts of the surface that the jackknife leaves out in turn
-STUDENT_T = 1.833  # of 90 % with N_PARTS - 1 degrees of freedom
+STUDENT_T = 1.833  # Student's t of 90 % with N_PARTS - 1 degrees of freedom
 
 
 class Cylinder(NamedTuple):

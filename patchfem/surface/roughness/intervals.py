@@ -28,7 +28,8 @@ from .parameters import Heights, kurtosis, skewness
 from .rows import Parameter
 from .spectrum import BAND, Spectrum, chi_square_factor, spectrum_of
 
-LOW, HIGH = 0.05, 0.95
+LOW = 0.05  # probability below the interval
+HIGH = 0.95  # probability below its upper bound
 N_TRACES = 200  # simulated traces; a quantile of 5 % scatters by 1.5 %
 MAX_SAMPLES = 2048  # of a simulated trace: keeps the 200 traces below 10 MB
 SPENT_FREEDOM = (

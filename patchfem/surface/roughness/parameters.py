@@ -11,6 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+MIN_SAMPLES = 16  # samples of a trace; fewer give neither a spectrum nor a curvature
+ROUND_OFF = 1e-12  # fraction of the heights that levelling leaves of a straight line
 MIN_HEIGHT_FRACTION = 0.10  # lower hills and dales, as a fraction of Rz, do not count (ISO 21920-2)
 MIN_WIDTH_FRACTION = 0.01  # narrower ones, as a fraction of the section, do not count either
 CORE_FRACTION = 0.40  # fraction of the length under the secant of the core (ISO 13565-2)

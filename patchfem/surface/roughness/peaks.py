@@ -17,17 +17,16 @@ from ...core import PatchfemError, say
 from ...scales import plain
 from ..profile import Profile, despiked, even, level
 from .filter import filter_trace
+from .parameters import MIN_SAMPLES, ROUND_OFF
 
 SUMMIT_FACTOR = (
     0.8968  # alpha (1 - variance of summit heights / variance of heights), Bush et al. 1976
 )
 MIN_ALPHA = 1.5  # alpha of waves of one length in all directions
 PERSSON = (0.4, 0.5)  # u_0 / rms height: Persson 2007, and Pastewka et al. 2013 by simulation
-MIN_SAMPLES = 16  # samples of a trace; fewer give no mean square of the curvature
 SHARPEST_FRACTION = 0.005  # fraction of the heights; Gaussian ones have 5 % of the curvature
 MAX_SHARPEST_POWER = 0.5  # fraction of the mean square curvature; sharper heights may be dust
 MAX_SPIKE_FRACTION = 0.1  # fraction of the samples; more "spikes" than that are the surface itself
-ROUND_OFF = 1e-12  # fraction of the heights that levelling leaves of a straight line
 MAX_SKEWNESS = (
     0.5  # larger skewness changes the stiffness by more than the theory's own uncertainty
 )

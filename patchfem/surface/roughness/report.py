@@ -15,13 +15,11 @@ from .areal import Surface, missing_reason
 from .filter import filter_scan, filter_trace
 from .form import form_degree, subtract_form
 from .intervals import LATERAL, SIZES, Intervals
-from .parameters import Heights
+from .parameters import MIN_SAMPLES, ROUND_OFF, Heights
 from .rows import Parameter
 from .scan_intervals import scan_intervals
 from .spectrum import BAND, Spectrum, amplitude_of, refuse_band
 
-MIN_SAMPLES = 16  # samples of a trace; fewer give no spectrum
-ROUND_OFF = 1e-14  # fraction of the largest height that levelling leaves of a straight line
 STANDARD_CUTOFFS = (
     25e-6,
     80e-6,

@@ -9,7 +9,7 @@ from ...core import PatchfemError, frozen_array, say
 
 MIN_TAPERS = 3  # averaged spectra of the first estimate; fewer miss the dominant wave
 MAX_TAPERS = 16  # more blur the dominant wave of a long trace without making the intervals narrower
-MAX_UNTRIMMED = 1 << 16  # samples; longer traces lose a few at the end, for a fast transform
+MAX_UNTRIMMED = 65_536  # samples; longer traces lose a few at the end, for a fast transform
 BLUR_FRACTION = 0.15  # half-width of the smoothing / frequency of the dominant wave
 BAND = (60e-6, 110e-6)  # wavelengths [m] of the waves of 80 um in the 1985 report
 
