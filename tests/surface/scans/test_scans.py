@@ -210,7 +210,8 @@ def test_always_kept_spikes_count_and_the_others_do_not(grooved, worn):
 def test_exact_a_scan_beside_itself_shows_no_change(grooved, tmp_path):
     """Rounding is no wear; a later answer takes the folder, and neither a shift nor a trace goes with scans."""
     scan = grooved[0]
-    file = write_x3p(tmp_path / "scan.x3p", scan.x, scan.y, scan.z, "a scan")
+    file = tmp_path / "scan.x3p"
+    write_x3p(file, scan.x, scan.y, scan.z, "a scan")
     answer = cli("compare", file, file, "-o", tmp_path / "out")
     assert answer.code == 0 and answer.out.startswith("no wear shown\n  The heights of both scans are the same")
     assert "Another part" not in answer.out and "<title>scan.x3p and scan.x3p" in \
