@@ -23,7 +23,7 @@ from .plan import Plan, compiled_kind, plan, refuse_size
 from .results.patch_rows import unknown_measures
 from .results.result import Result, with_meanings, without_folders
 from .rig import engines
-from .self_checks import with_self_checks
+from .self_checks.checks import with_self_checks
 from .wear import evolve, measures
 
 __all__ = ["KeptState", "Plan", "Result", "plan", "run"]

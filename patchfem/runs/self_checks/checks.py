@@ -1,0 +1,48 @@
+"""The table of all checks, and the result of a run whose checks failed."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+from ...core import Outcome
+from ..results.result import Result, without_errors
+from . import motion, patch, structure
+from .evidence import Evidence
+from .finding import Finding
+
+CHECKS: tuple[Callable[[Evidence], Iterator[Finding]], ...] = (
+    patch.check_interface_area,
+    patch.check_normal_load,
+    patch.check_stiffness_bounds,
+    patch.check_pressure_measures,
+    structure.check_modes,
+    motion.check_friction_harmonic,
+    motion.check_friction_limit,
+    motion.check_loop_area,
+    motion.check_motion_measures,
+    motion.check_energy_balance,
+)
+
+
+def failed_findings(result: Result) -> list:
+    """All Findings of a Result that exceed their thresholds."""
+    run = Evidence(result)
+    return [finding for check in CHECKS for finding in check(run) if finding.is_failed]
+
+
+def with_self_checks(result: Result) -> Result:
+    """Return the result, as `not_converged` with a sentence for each of CHECKS that failed.
+
+    A model that was changed after it was built from its scene is not checked against the scene.
+    """
+    model = result.plan.model
+    if result.outcome is Outcome.NOT_CONVERGED or not model.source.describes(model):
+        return result
+    failed = failed_findings(result)
+    if not failed:
+        return result
+    return replace(
+        result,
+        outcome=Outcome.NOT_CONVERGED,
+        measures=without_errors(result.measures, False),
+        warnings=[*(finding.sentence for finding in failed), *result.warnings],
+    )

@@ -1,0 +1,256 @@
+"""What the checks read of a result: numbers of the scene, its modes, its last cycles, its friction by two routes."""
+
+import tomllib
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import Outcome
+from ..results.result import Result
+from ..rig import engines
+from .finding import CUBIC_QUADRATURE
+
+MIN_CYCLE_SAMPLES = 40  # samples of a cycle; a coarser window is not read
+
+
+class Evidence:
+    """What the checks read: a Result, and the scene as a table of numbers in SI."""
+
+    def __init__(self, result: Result):
+        self.result = result
+        self.model = result.plan.model
+        self.scene = tomllib.loads(self.model.source.resolved)
+
+    def number(self, *keys) -> float | None:
+        """Value of a key of the scene in SI, None if the scene does not have it."""
+        value = self.scene
+        for key in keys:
+            if not isinstance(value, dict) or key not in value:
+                return None
+            value = value[key]
+        return quantity(value)
+
+    def value(self, name: str) -> float | None:
+        """Value of a measure, None if the run does not have it."""
+        measure = self.result.measures.get(name)
+        return None if measure is None else measure.value
+
+    def error(self, name: str) -> float:
+        """Stated error of a measure with its floor, 0 where none is known."""
+        measure = self.result.measures.get(name)
+        return 0.0 if measure is None else (measure.error or 0.0) + measure.floor
+
+    @property
+    def area(self) -> float:
+        """Area [m2] of the interface of all pairs."""
+        contact = self.scene["contact"]
+        return self.number("contact", "width") * self.model.patch.length * contact.get("pairs", 1)
+
+    @cached_property
+    def load(self) -> float | None:
+        """Normal load [N] of the scene, None where an approach is given instead."""
+        return self.number("normal", "load") or self.number("contact", "load")
+
+    @cached_property
+    def has_plain_friction(self) -> bool:
+        """Whether one interface rubs under a load that does not change, with coefficients that do
+        not change."""
+        friction, model = self.scene.get("friction"), self.model
+        if (
+            friction is None
+            or self.load is None
+            or "wear" in self.scene
+            or model.grooves is not None
+        ):
+            return False
+        if model.load_varies if model.rig is None else model.rig.load_varies:
+            return False
+        across = model.slide is not None and model.slide.across is not None
+        several = model.rig is not None and (
+            len(model.rig.modes.interfaces) > 1 or bool(model.rig.names)
+        )
+        in_plane = model.rig is not None and model.rig.modes.lateral_faces is not None
+        lists = "temperature" in friction or "spread" in friction
+        return not (across or several or in_plane or lists)
+
+    @cached_property
+    def modes(self) -> "SceneModes | None":
+        """Modes of [[structure.mode]], None where others or a bonded spring replace them."""
+        structure = self.scene.get("structure", {})
+        if (
+            "mode" not in structure
+            or "bonded" in structure
+            or structure.get("measured", "free") != "free"
+        ):
+            return None
+        columns = {
+            key: np.array([quantity(mode[key]) for mode in structure["mode"]])
+            for key in ("frequency", "damping", "slide", "base", "accelerometer")
+        }
+        if self.scene["drive"]["kind"] == "force":
+            columns["base"] = -np.array([quantity(mode["output"]) for mode in structure["mode"]])
+        return SceneModes(
+            2 * np.pi * columns["frequency"],
+            columns["damping"],
+            columns["slide"],
+            columns["base"],
+            columns["accelerometer"],
+            quantity(structure["moving_mass"]),
+        )
+
+    @cached_property
+    def window(self):
+        """Last cycles of a run under a sine, as a Response or BenchRun; None of other drives and of
+        few samples."""
+        window, frequency = self.result.window, self.frequency
+        if window is None or frequency is None or window.time.size < 3:
+            return None
+        if self.model.rig is None:
+            window = LastCycle(
+                window.time[window.first :],
+                window.slide[window.first :],
+                window.force[window.first :],
+            )
+        cycles = (window.time[-1] - window.time[0]) * frequency
+        is_whole = cycles > 0.5 and abs(cycles - round(cycles)) < 1e-6 * max(cycles, 1.0)
+        return window if is_whole and (window.time.size - 1) / cycles >= MIN_CYCLE_SAMPLES else None
+
+    @cached_property
+    def frequency(self) -> float | None:
+        """Frequency [Hz] of a drive or a slide that is a sine to the end, None of any other."""
+        drive, slide = self.scene.get("drive"), self.scene.get("slide", {})
+        if drive is None:
+            return self.number("slide", "frequency") if slide.get("kind") == "sine" else None
+        is_sine = drive.get("kind") in ("base", "force") and drive.get("waveform") == "sine"
+        return self.number("drive", "frequency") if is_sine else None
+
+    @cached_property
+    def balance(self) -> "ForceBalance | None":
+        """Friction by the equation of motion and by its samples, None where something else acts as
+        well."""
+        rig, modes, window = self.model.rig, self.modes, self.window
+        if (
+            rig is None
+            or modes is None
+            or window is None
+            or not self.has_plain_friction
+            or rig.bends
+        ):
+            return None
+        engine = engines.ENGINES.get(self.result.extra.get("engine"))
+        if engine is None or rig.strips_slide_apart or not modes.slide.any():
+            return None
+        if self.result.outcome in (Outcome.EXCEEDS_TRAVEL, Outcome.GROWS, Outcome.NOT_CONVERGED):
+            return None
+        size = self.number("drive", "acceleration")
+        force = self.number("drive", "force")
+        if size is None and force is None:  # of another kind, such as a displacement of the base
+            return None
+        drive = force / modes.mass if size is None else size
+        return balance_of(modes, window, drive, 2 * np.pi * self.frequency)
+
+
+class LastCycle(NamedTuple):
+    """Time [s], slide [m] and friction force [N] of the last cycle of a bench, (k,) each."""
+
+    time: np.ndarray
+    slide: np.ndarray
+    force: np.ndarray
+
+
+class SceneModes(NamedTuple):
+    """Modes as the scene writes them: omega [rad/s], zeta, slide, base, output [1], (n,) each, and
+    the mass [kg]."""
+
+    omega: np.ndarray
+    zeta: np.ndarray
+    slide: np.ndarray
+    base: np.ndarray
+    output: np.ndarray
+    mass: float
+
+
+class ForceBalance(NamedTuple):
+    """First harmonics [N] of the friction force by the equation of motion and by its samples, of
+    the slide [m]; what the samples leave open of the second [N], and the size [N] of the terms that
+    the first is a difference of.
+    """
+
+    from_motion: complex
+    from_samples: complex
+    slide: complex
+    sampling: float
+    terms: float
+
+    @property
+    def threshold(self) -> float:
+        """Largest difference [N] of the two first harmonics on a right run."""
+        return self.sampling + CUBIC_QUADRATURE * self.terms
+
+
+def quantity(value) -> float | None:
+    """Number of a value in a resolved scene, such as 0.3 or "700.0 N"; None of other texts."""
+    if isinstance(value, str):
+        head = value.split()[0] if value else ""
+        try:
+            return float(head)
+        except ValueError:
+            return None
+    return float(value) if isinstance(value, int | float) else None
+
+
+def cubic_harmonic(time, value, rate, omega: float) -> complex:
+    """Compute 2/T int y exp(-i omega t) dt of the cubics through samples (k,) and their rates, by
+    Simpson's rule."""
+    step = np.diff(time)
+    middle = (value[1:] + value[:-1]) / 2 + step * (rate[:-1] - rate[1:]) / 8
+    wave = np.exp(-1j * omega * time)
+    wave_middle = np.exp(-1j * omega * (time[1:] + time[:-1]) / 2)
+    ends = value * wave
+    total = np.sum(step / 6 * (ends[:-1] + 4 * middle * wave_middle + ends[1:]))
+    return complex(2 / (time[-1] - time[0]) * total)
+
+
+def balance_of(modes: SceneModes, window, acceleration: float, omega: float) -> ForceBalance:
+    """Compute the first harmonic of the friction force by its two routes.
+
+    The equation of motion times exp(-i omega t), integrated by parts over the window: the harmonic
+    of z'' is [v e + i omega z e] 2/T - omega^2 z1, that of v is [z e] 2/T + i omega z1. By the
+    samples it is the trapezoidal rule; where the force is monotonic between two samples, that rule
+    misses at most h |change of F|/2 per step. Twice as much is allowed, for a force that turns
+    within a step.
+    """
+    time, span = window.time, window.time[-1] - window.time[0]
+    wave = np.exp(-1j * omega * time)
+    first, rest, size = (
+        np.zeros(modes.omega.size, complex),
+        np.zeros(modes.omega.size, complex),
+        0.0,
+    )
+    drive = -1j * acceleration
+    for i in range(modes.omega.size):
+        z, v = window.modal[:, i], window.modal_rate[:, i]
+        first[i] = cubic_harmonic(time, z, v, omega)
+        ends = 2 / span * (z[-1] * wave[-1] - z[0] * wave[0])
+        speed = ends + 1j * omega * first[i]
+        inertia = 2 / span * (v[-1] * wave[-1] - v[0] * wave[0]) + 1j * omega * speed
+        terms = (
+            inertia,
+            2 * modes.zeta[i] * modes.omega[i] * speed,
+            modes.omega[i] ** 2 * first[i],
+            modes.base[i] * drive,
+        )
+        rest[i] = -sum(terms)
+        size += abs(modes.slide[i]) * sum(abs(term) for term in terms)
+    scale = modes.mass / (modes.slide @ modes.slide)
+    step, product = np.diff(time), window.force * wave
+    samples = 2 / span * np.sum(step * (product[1:] + product[:-1]) / 2)
+    sampling = 2 / span * np.sum(step * np.abs(np.diff(window.force)))
+    return ForceBalance(
+        complex(scale * (modes.slide @ rest)),
+        complex(samples),
+        complex(modes.slide @ first),
+        float(sampling),
+        float(scale * size),
+    )

@@ -1,0 +1,223 @@
+"""Checks of a motion: friction force, loop, amplitudes, energies."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...core import Outcome
+from ..rig import engines
+from .evidence import Evidence, quantity
+from .finding import (
+    AT_LEAST,
+    AT_MOST,
+    CONTACT_RESIDUAL,
+    CUBIC_QUADRATURE,
+    READING,
+    STATED_ERRORS,
+    Finding,
+)
+
+SAMPLED_PEAK = 0.05  # relative; a peak between two of 40 samples a cycle of the fastest motion
+LIMITED_LAWS = ("coulomb", "tanh", "elastic-plastic", "iwan", "bouc-wen", "convolution")
+MAX_SLIP_CORRECTION = 0.05  # relative; equivalent damping of a window whose cycles differ a little
+
+
+def check_friction_harmonic(run: Evidence) -> Iterator[Finding]:
+    """Compare the first harmonic of the friction force from the equation of motion with that from
+    its samples.
+
+    See `balance_of` for both routes and the threshold. `equivalent_stiffness` is Re(F1/q1) by
+    definition.
+    """
+    balance = run.balance
+    if balance is None:
+        return
+    size = abs(balance.from_samples)
+    yield Finding(
+        "the first harmonic of the friction force",
+        size,
+        abs(balance.from_motion),
+        balance.threshold,
+        "N",
+        "from the equation of motion of the scene",
+        abs(balance.from_motion - balance.from_samples),
+    )
+    stiffness = run.value("equivalent_stiffness")
+    if stiffness is not None and abs(balance.slide) > 0:
+        expected = (balance.from_samples / balance.slide).real
+        # the slide enters as a divisor, so its quadrature counts in proportion
+        slack = (balance.threshold + CUBIC_QUADRATURE * size) / abs(balance.slide)
+        yield Finding(
+            "equivalent_stiffness",
+            stiffness,
+            expected,
+            slack + STATED_ERRORS * run.error("equivalent_stiffness"),
+            "N/m",
+        )
+
+
+def check_friction_limit(run: Evidence) -> Iterator[Finding]:
+    """Compare `friction_force_peak` with static × load, which no friction of a limited law exceeds.
+
+    Laws that overshoot (lugre, growing bonds) are left out. A Coulomb contact of rigid pieces that
+    slips bears at least kinetic × load; an elastic-plastic one that slides 4 bond lengths on a
+    bench bears static × load.
+    """
+    peak = run.value("friction_force_peak")
+    if (
+        peak is None
+        or run.result.outcome
+        is Outcome.GROWS  # without bound, so that no error of the peak is known
+        or not run.has_plain_friction
+        or run.scene["friction"]["law"] not in LIMITED_LAWS
+    ):
+        return
+    friction = run.scene["friction"]
+    static = quantity(friction["static"])
+    limit = static * run.load
+    slack = CONTACT_RESIDUAL * limit + run.error("friction_force_peak")
+    yield Finding("friction_force_peak", peak, min(peak, limit), slack, "N", AT_MOST)
+    if run.result.patch is not None and (run.model.soft or run.model.side == "lower"):
+        return
+    slip, length = run.value("slip_amplitude"), quantity(friction.get("bond_length", "none"))
+    least = None
+    if (
+        friction["law"] == "coulomb"
+        and slip
+        and run.result.outcome is not Outcome.STUCK
+        and not run.model.soft
+    ):
+        least = (quantity(friction.get("kinetic", static)) or 0.0) * run.load
+    elif (
+        friction["law"] == "elastic-plastic"
+        and run.model.rig is None
+        and length is not None
+        and (run.number("slide", "amplitude") or 0.0) > 4 * length
+    ):
+        least = limit
+    if least is not None:
+        yield Finding(
+            "friction_force_peak", peak, max(peak, least), READING * limit + slack, "N", AT_LEAST
+        )
+
+
+def check_loop_area(run: Evidence) -> Iterator[Finding]:
+    """Compare `loop_area` with the trapezoidal rule over slide and force, and with the damping
+    ratio.
+
+    Between two samples force and slide stay within their ranges where they are monotonic, so a step
+    is missed by at most |change of F| |change of q|/2; twice as much is allowed.
+    `equivalent_damping` is loop_area/(2 pi K A^2) with K and A of the first mode of the scene.
+    """
+    window, area = run.window, run.value("loop_area")
+    if window is None or area is None or not run.has_plain_friction:
+        return
+    if run.model.rig is not None and engines.ENGINES[run.result.extra["engine"]].closes == np.inf:
+        return
+    cycles = round((window.time[-1] - window.time[0]) * run.frequency)
+    move, force = np.diff(window.slide), window.force
+    expected = float(np.sum(move * (force[1:] + force[:-1]) / 2)) / cycles
+    missed = float(np.sum(np.abs(move) * np.abs(np.diff(force)))) / cycles
+    largest = float(np.sum(np.abs(move) * np.abs(force[1:]))) / cycles
+    yield Finding(
+        "loop_area",
+        area,
+        expected,
+        missed + CUBIC_QUADRATURE * largest + STATED_ERRORS * run.error("loop_area"),
+        "J",
+    )
+    damping, modes = run.value("equivalent_damping"), run.modes
+    if (
+        damping is None
+        or modes is None
+        or run.model.rig is None
+        or run.result.outcome is not Outcome.STEADY
+    ):
+        return
+    k = int(np.argmax(modes.omega > 0))
+    amplitude = float(np.ptp(window.slide)) / 2
+    if modes.slide[k] and amplitude > 0:
+        stiffness = modes.mass * (modes.omega[k] / modes.slide[k]) ** 2
+        expected = area / (2 * np.pi * stiffness * amplitude**2)
+        slack = MAX_SLIP_CORRECTION + 2 * run.error("loop_area") / max(abs(area), 1e-300)
+        yield Finding(
+            "equivalent_damping",
+            damping,
+            expected,
+            slack * abs(expected) + STATED_ERRORS * run.error("equivalent_damping"),
+        )
+
+
+def check_motion_measures(run: Evidence) -> Iterator[Finding]:
+    """Compare the amplitude and the acceleration with those of the modal coordinates and the
+    participations.
+
+    Half the range of sum output_i z_i over the samples is at most the amplitude, and a few percent
+    less at most; so is the largest absolute acceleration over samples. The acceleration of a sample
+    is that of the equation of motion, output . z'' + a(t); friction that jumps at a sample is taken
+    on either side of it, so single samples are left out by the median.
+    """
+    modes, window, rig = run.modes, run.window, run.model.rig
+    if rig is None or modes is None or window is None or rig.modes.gauge is not None or rig.bends:
+        return
+    if run.result.outcome in (Outcome.EXCEEDS_TRAVEL, Outcome.GROWS, Outcome.NOT_CONVERGED):
+        return
+    amplitude, peak = (
+        run.value("relative_displacement_amplitude"),
+        run.value("absolute_acceleration_peak"),
+    )
+    expected = float(np.ptp(window.modal @ modes.output)) / 2
+    if amplitude is not None:
+        yield Finding(
+            "relative_displacement_amplitude",
+            amplitude,
+            expected,
+            SAMPLED_PEAK * expected + STATED_ERRORS * run.error("relative_displacement_amplitude"),
+            "m",
+        )
+    largest = float(np.abs(window.acceleration).max())
+    if peak is not None:
+        slack = SAMPLED_PEAK * largest + STATED_ERRORS * run.error("absolute_acceleration_peak")
+        yield Finding(
+            "absolute_acceleration_peak",
+            peak,
+            max(peak, largest),
+            slack,
+            "m/s2",
+            "from the samples of the last cycles",
+        )
+    if run.balance is None or run.scene["drive"]["kind"] != "base":
+        return
+    drive = run.number("drive", "acceleration") * np.sin(2 * np.pi * run.frequency * window.time)
+    friction = np.outer(window.force, modes.slide) / modes.mass
+    second = (
+        -np.outer(drive, modes.base)
+        - friction
+        - 2 * modes.zeta * modes.omega * window.modal_rate
+        - modes.omega**2 * window.modal
+    )
+    recomputed = second @ modes.output + drive
+    size = float(np.median(np.abs(recomputed)))
+    yield Finding(
+        "the median size of the acceleration",
+        float(np.median(np.abs(window.acceleration))),
+        size,
+        SAMPLED_PEAK * size + 1e-4,
+        "m/s2",
+        "from the equation of motion of the scene",
+        float(np.median(np.abs(window.acceleration - recomputed))),
+    )
+
+
+def check_energy_balance(run: Evidence) -> Iterator[Finding]:
+    """Compare the energy balance of a bench with zero.
+
+    Work = change of the stored energy + dissipated - created. A bench keeps each of them by the
+    same rule, so what is missing falls with the steps; a hundredth of the energy exchanged is more
+    than its first run leaves.
+    """
+    missing = run.value("energy_balance")
+    if missing is not None and run.model.rig is None:
+        yield Finding(
+            "energy_balance", missing, 0.0, READING + STATED_ERRORS * run.error("energy_balance")
+        )

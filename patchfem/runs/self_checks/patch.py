@@ -1,0 +1,162 @@
+"""Checks of a pressed patch: area, load, stiffness, pressure."""
+
+from collections.abc import Iterator
+
+from ...core import Outcome
+from ..patch import values
+from .evidence import Evidence
+from .finding import AT_LEAST, AT_MOST, CONTACT_RESIDUAL, READING, ROUND_OFF, STATED_ERRORS, Finding
+
+
+def check_interface_area(run: Evidence) -> Iterator[Finding]:
+    """Compare the sum of the nodal areas with length × width × pairs.
+
+    The nodal areas integrate a constant exactly, so the two differ by round-off; coordinates of a
+    mesh file have some seven printed digits.
+    """
+    if run.result.patch is None:
+        return
+    found = float(run.result.patch.pieces.interface.weight.sum())
+    tolerance = CONTACT_RESIDUAL if run.model.patch.mesh is not None else ROUND_OFF
+    yield Finding("the sum of the nodal areas", found, run.area, tolerance * run.area, "m2")
+
+
+def check_normal_load(run: Evidence) -> Iterator[Finding]:
+    """Compare the sum of pressure × nodal area, and the measure `normal_load`, with the load of the
+    scene.
+
+    Equilibrium of the upper piece. The contact solve meets it to its residual.
+    """
+    if (
+        run.result.patch is None
+        or run.scene.get("contact", {}).get("load") is None
+        or run.model.load_varies
+    ):
+        return
+    pressure = run.result.patch.pressure
+    if pressure.outcome is Outcome.NO_CONTACT or run.result.outcome is Outcome.NO_CONTACT:
+        return
+    total = float(pressure.sigma_n @ run.result.patch.pieces.interface.weight)
+    for quantity_name, found in (
+        ("the integral of the normal stress", total),
+        ("the measure normal_load", run.value("normal_load")),
+    ):
+        if found is not None:
+            yield Finding(quantity_name, found, run.load, CONTACT_RESIDUAL * run.load, "N")
+
+
+def check_stiffness_bounds(run: Evidence) -> Iterator[Finding]:
+    """Compare `normal_stiffness` and `tangential_stiffness` with the bounds of a layered column.
+
+    Two alike-long pieces that are held over their whole far faces. A uniform strain is admissible
+    (potential energy): the stiffness is at most that of columns M A/H in series, M = E (1 - nu)/((1
+    + nu)(1 - 2 nu)) in plane strain and E/(1 - nu^2) in plane stress; in shear G A/H. Where the
+    whole interface bears and nothing lies between the pieces, a uniform stress is admissible
+    (complementary energy): at least E' A/H, E' = E/(1 - nu^2) or E. Contact over a part of the
+    interface and asperities only soften. Elements on bilinear cells contain the uniform strain and
+    are stiffer than the continuum, so they lie between the same bounds. The stated errors of the
+    measures are added.
+    """
+    patch, found = run.result.patch, run.model.patch
+    if (
+        patch is None
+        or found.mesh is not None
+        or run.value("normal_stiffness") is None
+        or found.outlined
+    ):
+        return
+    if any(
+        piece.length > found.length * (1 + ROUND_OFF) or piece.corner(found.length / 2) != "sharp"
+        for piece in (found.lower, found.upper)
+    ):
+        return
+    flexibility = {"column": 0.0, "stress": 0.0, "shear": 0.0}
+    for piece in (found.lower, found.upper):
+        for material, thickness in (
+            (piece.substrate, piece.height - piece.thickness),
+            (piece.coating and piece.coating.material, piece.thickness),
+        ):
+            if not thickness:
+                continue
+            young, nu = material.young, material.poisson
+            if found.plane == "strain":
+                column, stress = young * (1 - nu) / ((1 + nu) * (1 - 2 * nu)), young / (1 - nu**2)
+            else:
+                column, stress = young / (1 - nu**2), young
+            for name, modulus in (
+                ("column", column),
+                ("stress", stress),
+                ("shear", young / (2 * (1 + nu))),
+            ):
+                flexibility[name] += thickness / (modulus * run.area)
+    normal, shear = run.value("normal_stiffness"), run.value("tangential_stiffness")
+    slack = {
+        name: READING * run.value(name) + STATED_ERRORS * run.error(name)
+        for name in ("normal_stiffness", "tangential_stiffness")
+    }
+    upper = 1 / flexibility["column"]
+    yield Finding(
+        "normal_stiffness", normal, min(normal, upper), slack["normal_stiffness"], "N/m", AT_MOST
+    )
+    yield Finding(
+        "tangential_stiffness",
+        shear,
+        min(shear, 1 / flexibility["shear"]),
+        slack["tangential_stiffness"],
+        "N/m",
+        AT_MOST,
+    )
+    if patch.active.all() and not patch.skinned and patch.strips is None:
+        yield Finding(
+            "normal_stiffness",
+            normal,
+            max(normal, 1 / flexibility["stress"]),
+            slack["normal_stiffness"],
+            "N/m",
+            AT_LEAST,
+        )
+
+
+def check_pressure_measures(run: Evidence) -> Iterator[Finding]:
+    """Compare the measures of the pressure with the nodal pressures and with load/(length × width).
+
+    mean = loaded_fraction × pressure_peak is the definition of the first; the peak is at least the
+    mean; the moment is the sum of force × x; each edge of the contact lies within one cell beside
+    its last node. Measures may come from another mesh than the nodal pressures, hence their stated
+    errors.
+    """
+    patch = run.result.patch
+    names = ("loaded_fraction", "pressure_peak", "moment", "contact_fraction", "normal_load")
+    if patch is None or patch.strips is not None or any(run.value(name) is None for name in names):
+        return
+    if patch.pressure.outcome is Outcome.NO_CONTACT or "wear" in run.scene:
+        return
+    fraction, peak, moment, share, load = (run.value(name) for name in names)
+    mean, weight = load / run.area, patch.pieces.interface.weight
+    relative_errors = run.error("loaded_fraction") / fraction + run.error("pressure_peak") / peak
+    relative = STATED_ERRORS * relative_errors
+    yield Finding(
+        "the mean pressure, loaded_fraction × pressure_peak,",
+        fraction * peak,
+        mean,
+        (READING + relative) * mean,
+        "Pa",
+    )
+    force = patch.pressure.sigma_n * weight
+    yield Finding(
+        "the moment of the pressure",
+        moment,
+        float(force @ patch.x),
+        READING * load * run.model.patch.length / 2 + STATED_ERRORS * run.error("moment"),
+        "N m",
+    )
+    cells = float(values.edge_cells(patch.x, patch.active).sum())
+    bearing = float(weight[patch.active].sum()) / run.area
+    yield Finding(
+        "contact_fraction",
+        share,
+        bearing,
+        READING
+        + 2 * cells / run.model.patch.length
+        + STATED_ERRORS * run.error("contact_fraction"),
+    )

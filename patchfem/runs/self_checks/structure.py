@@ -1,0 +1,58 @@
+"""Check of the modes that an engine moves."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from .evidence import Evidence, quantity
+from .finding import ROUND_OFF, Finding
+
+
+def check_modes(run: Evidence) -> Iterator[Finding]:
+    """Compare the modes that the engine moves with those of the scene.
+
+    [[structure.mode]]: frequency, damping ratio and participations of each. Masses and springs: the
+    sum of omega^2 is the trace of M^-1 K, the sum of spring stiffness/mass over the masses that a
+    spring joins. Both hold to round-off.
+    """
+    rig = run.model.rig
+    if rig is None:
+        return
+    modes, structure = run.modes, run.scene["structure"]
+    if modes is not None and modes.omega.size == rig.modes.omega.size:
+        pairs = (
+            ("natural frequency", rig.modes.omega / (2 * np.pi), modes.omega / (2 * np.pi), "Hz"),
+            ("damping ratio", rig.modes.zeta, modes.zeta, ""),
+            ("slide", rig.modes.slide, modes.slide, ""),
+            ("base", rig.modes.base, modes.base, ""),
+            ("output", rig.modes.output, modes.output, ""),
+        )
+        for name, found, expected, unit in pairs:
+            for k, (one, other) in enumerate(zip(np.asarray(found, float), expected)):
+                yield Finding(
+                    f"the {name} of mode {k + 1}",
+                    float(one),
+                    float(other),
+                    ROUND_OFF * np.abs(expected).max(initial=0.0),
+                    unit,
+                )
+    elif (
+        "masses" in structure
+        and "bonded" not in structure
+        and structure.get("measured", "free") == "free"
+    ):
+        masses = [quantity(mass) for mass in structure["masses"]]
+        trace = sum(
+            quantity(spring["stiffness"]) / masses[place - 1]
+            for spring in structure.get("spring", ())
+            for place in spring["between"]
+            if place
+        )
+        found = float(np.sum(rig.modes.omega**2))
+        yield Finding(
+            "the sum of the squares of the natural frequencies",
+            found,
+            trace,
+            1e-6 * trace,
+            "rad2/s2",
+        )
