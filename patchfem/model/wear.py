@@ -37,7 +37,7 @@ class WearModel:
     """Wear over many cycles.
 
     coefficient [m2/N]: volume worn off both pieces per load and slip path, or per friction work where `energy`; cycles;
-    jumps: how many equal ones, None for automatic ones; upper_share: of the depth; explicit: forward Euler; friction:
+    jumps: how many equal ones, None for automatic ones; upper_share: of the depth; friction:
     how it changes with wear, or None; start: what was worn before, None of new pieces.
     """
 
@@ -46,7 +46,6 @@ class WearModel:
     jumps: int | None
     upper_share: float
     energy: bool
-    explicit: bool
     friction: WornFriction | None = None
     start: worn.WornBefore | None = None
 
@@ -62,6 +61,6 @@ def wear_asked(scene: Scene) -> WearModel | None:
         return None
     change = wear.friction
     return WearModel(wear.coefficient, wear.cycles, None if wear.jumps == "auto" else wear.jumps, wear.upper_share,
-                     wear.form == "energy", wear.scheme == "explicit", None if change is None else
+                     wear.form == "energy", None if change is None else
                      WornFriction(change.depth, change.coefficient_factor, change.bond_length_factor),
                      None if wear.start is None else worn.of_pieces(scene.beside(wear.start), scene.tables()))

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from .depth import explicit_jump, jump, rates
+from .depth import jump, rates
 
 GROW, SHRINK, SAFETY = 4.0, 0.2, 0.9  # of a jump against the one before it
 FIRST = 1e-3  # share of all cycles in the first automatic jump
@@ -19,7 +19,7 @@ class Wearing:
 
     press(worn, softening) -> contact forces (m,) [N], as `depth.jump` wants it; path(worn) -> slip path (m,) [m] of
     one cycle, the same array object as long as wear does not change it; area (m,) [m2]; coefficient [m2/N]; cycles:
-    all of them; explicit: forward Euler in place of the implicit jump. Of a patch in strips all (m,) are (s, m).
+    all of them. Of a patch in strips all (m,) are (s, m).
     """
 
     press: Callable
@@ -27,7 +27,6 @@ class Wearing:
     area: np.ndarray
     coefficient: float
     cycles: float
-    explicit: bool = False
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -105,11 +104,6 @@ def _corrected(asked: Wearing, state: Worn, found: Worn, miss: float, length: fl
 def _halved(asked: Wearing, state: Worn, path, length: float, tolerance: float) -> tuple:
     """(state after a jump in two halves along a given slip path, its error over what the tolerance allows)."""
     rate = rates(asked.coefficient, path, asked.area)
-    if asked.explicit:
-        depth, _ = explicit_jump(asked.press, state.depth, rate, length / 2)
-        depth, force = explicit_jump(asked.press, depth, rate, length / 2)
-        rough, _ = explicit_jump(asked.press, state.rough, rate, length)
-        return replace(state, cycle=state.cycle + length, depth=depth, force=force, rough=rough, used=path), 0.0
     once, least = jump(asked.press, state.depth, rate, length)
     half, _ = jump(asked.press, state.depth, rate, length / 2)
     depth, force = jump(asked.press, half, rate, length / 2)

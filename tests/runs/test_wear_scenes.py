@@ -289,20 +289,12 @@ def test_exact_the_tolerance_of_a_warning_leads_to_a_finer_mesh_under_wear():
 
 def test_refuses_what_wear_does_not_go_with():
     text = TILTED + COULOMB + SINE + WEAR
-    for automatic in ("", 'jumps = "auto"\n'):  # this value ended in a TypeError, and the message proposed it
-        assert "scheme 'explicit' needs a number of jumps" in only(text + 'scheme = "explicit"\n' + automatic)
+    for scheme in ("explicit", "implicit"):
+        told = only(text + f'scheme = "{scheme}"\n')
+        assert "wear.scheme: this key was removed in patchfem 1.0; leave it out" in told
     assert any("wear" in line for line in mistakes(TILTED + WEAR))
     free = POINT + COULOMB + MODE + '[drive]\nkind = "free"\ndisplacement = "1 mm"\ncycles = 5\n' + WEAR
     assert "steady motion" in only(free)
-    with pytest.raises(pf.PatchfemError, match=r"wear\.scheme: .*longer than the stability limit"):
-        ran(text + 'scheme = "explicit"\njumps = 2\n')
-
-
-def test_exact_explicit_jumps_below_the_critical_one_agree_with_implicit_ones():
-    text = TILTED + COULOMB + SINE + WEAR.replace("135723", "2000")
-    one, two = ran(text), ran(text + 'scheme = "explicit"\njumps = 40\n')
-    one, two = one.measures["worn_depth_max"], two.measures["worn_depth_max"]
-    assert abs(one.value - two.value) <= min(one.error + two.error, 2e-2 * one.value)
 
 
 def test_always_a_motion_without_bounds_wears_nothing():

@@ -158,8 +158,6 @@ def test_exact_an_interrupted_run_of_strips_goes_on_to_the_same_bits(tmp_path):
 
 
 def test_refuses_what_strips_do_not_wear_beside():
-    text = TILTED + STRIPS + COULOMB + SINE + WEAR
-    assert any("explicit" in line for line in mistakes(text + 'scheme = "explicit"\njumps = 40\n'))
     soft = TILTED + STRIPS + "[contact.shear]\n" + COULOMB + MODE + DRIVEN + WEAR
     assert any("contact.strips with [contact.shear]" in line for line in mistakes(soft))
 

@@ -15,7 +15,7 @@ from ...contact import strips
 from ...core import PatchfemError, frozen_array
 from ...disk.whole import whole
 from ...effects import unbuilt
-from ...wear.depth import critical_jump, rates, refuse_explicit
+from ...wear.depth import rates
 from ...wear.jumps import Wearing, Worn, after, replayed, start
 from ..patch.measures import other_strips
 from ..patch.press import areas, pressed, presser
@@ -119,7 +119,7 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
 
     patch, coarse: the pressed patch and those on coarser meshes, new. progress: called with the share of the cycles
     that is done. begin: (state, moments) of an interrupted run; keep(state, moments): called after every jump.
-    PatchfemError for an explicit jump beyond the critical one and for a slide in two directions.
+    PatchfemError for a slide in two directions.
     """
     if model.slide is not None and model.slide.across is not None:
         text = unbuilt("with a slide in two directions", "leave out [wear], or leave the column `lateral` out of "
@@ -127,7 +127,7 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
         raise PatchfemError(text, "wear")
     clock, wear, motion, stopped = perf_counter(), model.wear, _Motion(model, patch), ""
     asked = Wearing(presser(model.patch, patch.pair), motion, areas(model.patch, patch.pieces.interface),
-                    wear.coefficient, wear.cycles, wear.explicit)
+                    wear.coefficient, wear.cycles)
     patch = _before(model, patch, asked.area) if begin is None else pressed(
         model.patch, patch.pair, frozen_array(begin[0].depth))
     try:
@@ -226,10 +226,8 @@ def _before(model, patch, area):
 
 
 def _first(model, patch, asked: Wearing, motion: _Motion) -> tuple:
-    """(state, moments) before any wear but that of `_before`; an explicit jump that is too long is refused here."""
+    """(state, moments) before any wear but that of `_before`."""
     state = start(asked, model.wear.depth_before(patch.x, asked.area))
-    if asked.explicit:
-        refuse_explicit(asked.cycles / model.wear.jumps, _critical(model, patch, state))
     return state, (_moment(patch, state, motion),)
 
 
@@ -263,13 +261,6 @@ def _on(asked, model, patch, other, moments) -> tuple:
     depth = replayed(presser(asked, other.pair), area, model.wear.coefficient, legs,
                      model.wear.depth_before(other.x, area))
     return pressed(asked, other.pair, frozen_array(depth)), depth
-
-
-def _critical(model, patch, state: Worn) -> float:
-    """Longest stable explicit jump [cycles] on the new patch."""
-    asked, rate = model.patch, rates(model.wear.coefficient, state.path, patch.pieces.interface.weight)
-    held = "approach" if asked.approach is not None else "moment" if asked.rotates else "load"
-    return critical_jump(patch.pieces.normal, rate, patch.active, held, patch.x)
 
 
 def evolved_with(kept, key: str, model, patch, coarse, progress=None) -> Evolved:

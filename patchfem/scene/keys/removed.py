@@ -15,6 +15,9 @@ KEYS = {
         ("stick_speed", "newmark"),
     )
 }
+KEYS["wear.scheme"] = (
+    f"this key was removed in {VERSION}; leave it out: contact and wear are always solved together in each jump"
+)
 OPTIONS = {  # (verb, option): what to do instead
     ("profile", "--level"): "read the material ratio of a level from the Abbott curve of the page (-o)",
     ("profile", "--ratios"): "read the heights of two material ratios from the Abbott curve of the page (-o)",

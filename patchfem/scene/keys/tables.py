@@ -372,9 +372,6 @@ class Wear(Table):
                "divided; default: set by the tolerance") = "auto"
     form: key(Literal["archard", "energy"], "'archard': the worn depth is proportional to pressure times slip path; "
               "'energy': the worn depth is proportional to the friction work per area") = "archard"
-    scheme: key(Literal["implicit", "explicit"], "'implicit': contact and wear are solved together in each jump; "
-                "'explicit': each jump uses the pressure at its start, and a jump that is too long for stability is "
-                "refused") = "implicit"
     start: key(Text | None, "file result.nc of an earlier run with [wear], such as out/before/result.nc; the new run "
                "starts from the worn depth of the earlier run; default: the pieces are new") = None
     friction: WornFriction | None = None

@@ -20,17 +20,13 @@ def check_wear(draft: Draft, kind: str) -> None:
         draft.say("wear", "wear needs a slide: add [friction] with [slide], or with [structure] and [drive]")
     for key, words in _beside(draft, tables, kind):
         draft.say("wear", unbuilt(f"with {key}", words))
-    if tables.wear.scheme == "explicit" and tables.wear.jumps == "auto":
-        draft.say("wear.jumps" if draft.given("wear.jumps") else "wear.scheme",
-                  "scheme 'explicit' needs a number of jumps, such as jumps = 1000; 'auto' chooses jumps for scheme "
-                  "'implicit' only")
     if tables.wear.friction is not None:
         _friction(draft, tables.wear.friction)
     if tables.normal is not None:
         if draft.given("wear.start"):
             draft.say("wear.start", "[normal] is a point and has no worn depth to start from: use [contact], or "
                                     "leave wear.start out and add the worn volumes of both runs")
-        for key in ("jumps", "upper_share", "scheme"):
+        for key in ("jumps", "upper_share"):
             if draft.given(f"wear.{key}"):
                 draft.remark(f"wear.{key} has no meaning without [contact] and is not used")
     elif draft.given("wear.upper_share") and grooves_of(tables) is None and not _coated(tables.contact):
@@ -96,8 +92,6 @@ def _beside_strips(draft: Draft, contact):
         yield "contact.strips with a shape on the lower piece", LATER.format("put all shapes on the upper piece")
     if draft.given("wear.start"):
         yield "contact.strips with wear.start", LATER.format("leave out wear.start")
-    if draft.given("wear.scheme") and draft.tables.wear.scheme == "explicit":
-        yield "contact.strips with scheme 'explicit'", LATER.format("leave out wear.scheme")
 
 
 def _beside(draft: Draft, tables, kind: str):
