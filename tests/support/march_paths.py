@@ -5,7 +5,8 @@ import numpy as np
 from patchfem.core import ModalBasis
 from patchfem.dynamics.march.joints import JointsModel
 from patchfem.dynamics.march.march import GOAL
-from patchfem.dynamics.march.models import load_kernels
+from patchfem.dynamics.march.models import element_model, load_kernels
+from patchfem.friction.laws.tanh import Rate
 
 OMEGA = 2 * np.pi * 143
 # laws of the one compiled loop of joints that most tests share
@@ -17,6 +18,11 @@ def share_one_loop(monkeypatch) -> None:
     """Joints of whatever laws march in the loop of ALL."""
     own = JointsModel.laws.fget
     monkeypatch.setattr(JointsModel, "laws", property(lambda model: tuple(sorted({*ALL, *own(model)}))))
+
+
+def rate_model(limit: float, speed: float):
+    """Return the ContactModel of friction limit tanh(v/speed), limit [N], speed [m/s]."""
+    return element_model(Rate(limit, speed).element(1.0))
 
 
 def one_mode(omega, zeta, mass):

@@ -11,7 +11,6 @@ from ...friction.bonds import list_numbers as numbers
 from ...friction.laws.coulomb import Coulomb
 from ...friction.laws.elastic_plastic import parallel
 from ...friction.laws.stretch import bonds_of, growth_numbers, points_element
-from ...friction.laws.tanh import Rate
 from ...friction.protocol import Element
 from ..contacts import arrays
 from ..contacts.dispatch import COULOMB
@@ -126,11 +125,6 @@ def free_model() -> ContactModel:
 def coulomb_model(static: float, kinetic: float) -> ContactModel:
     """Rigid Coulomb contact with static and kinetic friction force [N]."""
     return element_model(Coulomb(kinetic, static).element(1.0))
-
-
-def rate_model(limit: float, speed: float) -> ContactModel:
-    """Friction limit*tanh(v/speed) of eq. 2.4, limit [N], speed v_0 [m/s]."""
-    return element_model(Rate(limit, speed).element(1.0))
 
 
 def jenkins_model(stiffness, yield_slide, reduction=None) -> ContactModel:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import vibration_forms
 from event_reference import run_reference
-from event_run import groups_of, run, simulate
+from event_run import groups_of, motion_at, run, simulate
 from scipy.integrate import solve_ivp
 from vibration_forms import sliding_amplitude, two_stop_amplitude
 
@@ -160,7 +160,7 @@ def test_exact_motion_in_40_digits(omega, decay, om):
     phase, push, v0 = 0.9, 0.7, 0.3
     drive = Piecewise((Segment(0.0, 0.2, push, om, phase),), 2 * pi / om)
     times = np.array([1e-3, 0.02, 0.2, 0.29, 0.31, 0.8, 2.0, 5.0]) / max(om, omega, 0.1)
-    found = histories.at_times(modes, drive, groups_of(modes, 0.0, 0.0), 2, times, Start(np.zeros(1), np.array([v0])))
+    found = motion_at(modes, drive, groups_of(modes, 0.0, 0.0), 2, times, Start(np.zeros(1), np.array([v0])))
     with mpmath.workdps(120):  # the reference divides by the gaps of rates that it parts by 1e-27
         w = [mpmath.mpf(decay), mpmath.mpf(omega)]
         root = mpmath.sqrt(w[0]**2 - w[1]**2)

@@ -8,6 +8,7 @@ from friction_forms import jenkins_loop, stretch_loop
 from harmonic_cases import bonds, five, many, march, of_speed, plain_jenkins, sdof
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from march_paths import rate_model
 
 from patchfem.core import BaseSine, ModalBasis, NotConverged, PatchfemError
 from patchfem.dynamics.harmonic.balance import cycle_energy, periodic_response
@@ -15,7 +16,7 @@ from patchfem.dynamics.harmonic.forces import Group
 from patchfem.dynamics.harmonic.harmonic import Balance, newton, pack, unpack
 from patchfem.dynamics.harmonic.laws import Interlock, Jenkins, Spring, Track, analysis, synthesis
 from patchfem.dynamics.harmonic.point import balance_of, group_of, point
-from patchfem.dynamics.march.models import coulomb_model, jenkins_model, points_model, rate_model
+from patchfem.dynamics.march.models import coulomb_model, jenkins_model, points_model
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.recursion import advance
 

@@ -5,14 +5,14 @@ import pytest
 from event_run import simulate
 from hypothesis import given
 from hypothesis import strategies as st
-from march_paths import ALL
+from march_paths import ALL, rate_model
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk
 
 from patchfem.core import BaseSine, ModalBasis, Start
 from patchfem.dynamics.march.joints import Joint, JointsModel, cubic, interlock
 from patchfem.dynamics.march.march import march
-from patchfem.dynamics.march.models import coulomb_model, jenkins_model, list_model, points_model, rate_model
+from patchfem.dynamics.march.models import coulomb_model, jenkins_model, list_model, points_model
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.laws import elastic_plastic_kernels as kernels
 from patchfem.friction.laws.coulomb import Coulomb

@@ -4,7 +4,7 @@ from time import process_time
 
 import numpy as np
 import pytest
-from march_paths import ALL, OMEGA, one_mode
+from march_paths import ALL, OMEGA, one_mode, rate_model
 from test_joints import chain, coulomb, elastic_plastic
 from test_march_loop import half_plane
 from test_varying_shear import reduced
@@ -15,7 +15,7 @@ from patchfem.dynamics.march import march as marching
 from patchfem.dynamics.march import varying_load
 from patchfem.dynamics.march.joints import JointsModel
 from patchfem.dynamics.march.march import march
-from patchfem.dynamics.march.models import coulomb_model, jenkins_model, points_model, rate_model
+from patchfem.dynamics.march.models import coulomb_model, jenkins_model, points_model
 from patchfem.dynamics.repeats import ahead, looked_at, until_look
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.slip.shear_modes import shear_modes

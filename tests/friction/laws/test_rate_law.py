@@ -105,7 +105,9 @@ def test_refuses_the_rate_law_behind_shear_and_without_its_speed():
 
 
 def test_exact_the_compiled_step_is_the_plain_one():
-    from patchfem.dynamics.march.models import load_kernels, rate_model
+    from march_paths import rate_model
+
+    from patchfem.dynamics.march.models import load_kernels
 
     loops, model = load_kernels(None), rate_model(2.5, 1e-3)
     contact = model.build()
