@@ -19,7 +19,7 @@ from scene_texts import PLASTIC, POINT, TRIANGLE
 
 import patchfem
 from patchfem import compiled
-from patchfem.compiled import generic, hook, kept
+from patchfem.compiled import hook, kept, prebuilt
 from patchfem.disk import own
 
 SCENE = POINT + PLASTIC + TRIANGLE  # a slide that is given: the smallest loop with a law in it to compile
@@ -145,23 +145,23 @@ def test_exact_code_that_came_with_the_package_serves_the_first_run(tmp_path, an
     assert (first["work"], first["peak"]) == pytest.approx((native["work"], native["peak"]), rel=1e-9)
     for law in (home / "patchfem" / "friction" / "laws").glob("*kernels.py"):
         law.write_text(law.read_text("utf-8") + "# edited\n", "utf-8")
-    asked = "from patchfem import compiled; print(compiled.generic.folder(compiled.sources), compiled.__file__)"
+    asked = "from patchfem import compiled; print(compiled.prebuilt.folder(compiled.sources), compiled.__file__)"
     said = subprocess.run([sys.executable, "-c", asked], cwd=home, env=os.environ | {"PYTHONPATH": str(home)},
                           text=True, capture_output=True, check=True).stdout
     assert said.startswith(f"None {home}")
 
 
 def test_exact_code_that_came_with_the_package_is_of_this_machine(tmp_path, monkeypatch):
-    monkeypatch.setattr(generic, "HERE", tmp_path)
+    monkeypatch.setattr(prebuilt, "HERE", tmp_path)
     (tmp_path / "machine.py").touch()
 
     def found():
-        return generic.folder.__wrapped__(compiled.sources)
+        return prebuilt.folder.__wrapped__(compiled.sources)
 
     assert found() is None
-    own = tmp_path / "generic" / generic.key(compiled.sources)
+    own = tmp_path / "generic" / prebuilt.key(compiled.sources)
     own.mkdir(parents=True)
-    can = dict.fromkeys(generic.V3, True)
+    can = dict.fromkeys(prebuilt.CPUS["x86_64"].needs, True)
     monkeypatch.setattr("llvmlite.binding.get_host_cpu_features", lambda: can)
     assert found() == own
     with monkeypatch.context() as more:
@@ -171,10 +171,10 @@ def test_exact_code_that_came_with_the_package_is_of_this_machine(tmp_path, monk
         with monkeypatch.context() as more:
             more.setattr("llvmlite.binding.get_host_cpu_features", lambda lacking=lacking: can | lacking)
             more.setattr("platform.machine", lambda name=name: name)
-            (tmp_path / "generic" / generic.key(compiled.sources)).mkdir(exist_ok=True)
+            (tmp_path / "generic" / prebuilt.key(compiled.sources)).mkdir(exist_ok=True)
             assert found() is None
     with monkeypatch.context() as more:
-        more.setattr(generic, "version", lambda name: "0.0")
+        more.setattr(prebuilt, "version", lambda name: "0.0")
         assert found() is None
     (tmp_path / "machine.py").write_text("# edited")
     assert found() is None

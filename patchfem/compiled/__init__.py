@@ -41,7 +41,7 @@ import numpy as np
 from ..disk import own
 from ..disk.installed import version
 from ..disk.whole import short
-from . import bounded, generic, machine
+from . import cache_limit, machine, prebuilt
 from .plain import plain
 
 HERE = Path(__file__).parents[1]  # the package
@@ -406,12 +406,12 @@ def has_run(kind: str) -> bool:
 
 def _kept(own_code: Path | None = None) -> list:
     """Folders in which compiled code may be: that of this machine, and what came with the package."""
-    return [own_code or _placed()[0], *filter(None, [generic.folder(sources)])]
+    return [own_code or _placed()[0], *filter(None, [prebuilt.folder(sources)])]
 
 
 def _generic(path: Path) -> machine.Code | None:
     """The code that came with the package for a file of this name."""
-    found = generic.folder(sources)
+    found = prebuilt.folder(sources)
     return found and machine.found(found / "code" / path.name)
 
 
@@ -436,7 +436,7 @@ def _folder() -> Path:
     if elsewhere:
         os.environ["PATCHFEM_CACHE"] = str(folder.parents[1])  # for processes that this one starts
     else:
-        bounded.used(folder)
+        cache_limit.mark_used(folder)
     os.environ["NUMBA_CACHE_DIR"] = str(folder)
     if "numba" in sys.modules:
         sys.modules["numba"].config.CACHE_DIR = str(folder)

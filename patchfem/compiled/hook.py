@@ -1,4 +1,4 @@
-"""Hatchling's hook of the wheel: with PATCHFEM_MACHINE_CODE=1 in the environment it holds machine code (`generic`).
+"""Hatchling's hook of the wheel: with PATCHFEM_MACHINE_CODE=1 in the environment it holds machine code (`prebuilt`).
 
     PATCHFEM_MACHINE_CODE=1 pip wheel --no-deps --no-build-isolation .
 
@@ -17,10 +17,10 @@ from tempfile import TemporaryDirectory
 
 ROOT = Path(__file__).parents[2]
 ABOUT = """import platform, numba
-from patchfem.compiled import generic, sources
-if not generic.runs_here():
+from patchfem.compiled import prebuilt, sources
+if not prebuilt.runs_here():
     raise SystemExit('this CPU lacks what the machine code asks for')
-print(generic.CPUS[platform.machine()][0], generic.key(sources))"""
+print(prebuilt.CPUS[platform.machine()].name, prebuilt.key(sources))"""
 # a command that compiles what it calls, however little there is to do
 RUN = """import sys
 from patchfem import compiled
