@@ -278,7 +278,7 @@ class SweepPlots:
         """
         if not hasattr(dataset, "coords") or not any(str(name).endswith("_error") for name in dataset):
             raise PatchfemError("plot.sweep: a Dataset returned by pf.sweep is needed, with measures and their errors")
-        figure = swept.draw.figure(dataset, measure, onto=ax)
+        figure = pictures.draw.figure([swept.sweep_chart(dataset, measure)], onto=ax)
         return figure.axes[0] if ax is None else ax
 
     @staticmethod

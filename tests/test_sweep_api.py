@@ -118,9 +118,11 @@ def test_exact_a_picture_of_a_sweep_is_hollow_where_the_tolerance_is_missed():
                         "slide_amplitude": ("slide_amplitude", [1e-7, 1e-6, 1e-5, 1e-4], {"units": "m"})},
                        {"tolerance": 0.01})
     axis = pf.plot.sweep(found, "loop_area")
-    filled = [line for line in axis.lines if line.get_linestyle() == "None" and line.get_marker() == "o"]
+    filled = [line for line in axis.lines if line.get_marker() == "o" and line.get_markerfacecolor() != "white"]
     assert [line.get_ydata().tolist() for line in filled] == [pytest.approx(row[2:] * 1e3) for row in values]
-    assert min(one.zorder for one in filled) > max(one.zorder for one in axis.lines if one not in filled)
+    others = [line for line in axis.lines if line not in filled]
+    assert list(axis.lines)[len(others):] == filled
+    assert min(one.zorder for one in filled) >= max(one.zorder for one in others)
     assert (axis.get_xscale(), axis.get_yscale(), axis.get_ylabel()) == ("log", "log", "loop area [mJ]")
     assert [text.get_text() for text in axis.get_legend().get_texts()] == ["normal load 10 N", "normal load 20 N"]
     one = found.isel(normal_load=[0]) * 1.0

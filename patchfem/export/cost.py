@@ -1,6 +1,7 @@
 """Error of a scene against computing time: lines for the screen, cost.csv and one picture."""
 
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,7 +17,7 @@ from ..campaigns.cost import (
 )
 from ..disk.whole import write_rows, write_text
 from ..scales import plain
-from .drawing.pictures import BLUE, drawing, styled
+from .drawing import charts, pictures
 
 AXES = {TOLERANCE: "tolerance", "element_size": "element size", "steps_per_cycle": "steps per cycle",
         "shear_modes": "shear modes", "jumps": "jumps over the cycles of wear"}
@@ -26,6 +27,11 @@ MAIN = ("worn_depth_max", "relative_displacement_amplitude", "absolute_accelerat
 EXACT = 1e-12  # of a value, below which an error is round-off
 LABEL_HEIGHT = 0.06  # of the height of the axes, by which labels are apart
 HEIGHT = 210.0  # points: about the height of the axes
+TALL = 4.2  # height of the picture [inch]
+RIGHT_PART = 0.6  # of the width, from which a label has no room on the right of its point
+MARGIN = 0.15  # of the logarithm of an axis, the room on both sides of its values
+MIN_SECONDS_RATIO = 2.0  # of the ends of the axis, for runs that take equally long
+MIN_ERROR_RATIO = 10.0  # the same for equal errors
 
 
 def lines_of(knob: str, runs: list, tolerance: float) -> list[str]:
@@ -144,7 +150,7 @@ def write(folder: Path, curves: dict) -> Path:
 def write_picture(folder: Path, knob: str, runs: list, tolerance: float) -> Path:
     """Write the picture of a curve, cost.svg or cost_KNOB.svg, into a folder that exists, and return its path."""
     picture = Path(folder) / ("cost.svg" if knob == TOLERANCE else f"cost_{knob}.svg")
-    write_text(picture, draw(knob, runs, tolerance))
+    write_text(picture, pictures.draw([cost_chart(knob, runs, tolerance)], height=TALL))
     return picture
 
 
@@ -168,9 +174,8 @@ def answer_of(knob: str, runs: list, tolerance: float) -> dict:
             "sentence": sentence(runs, tolerance) if alone else None}
 
 
-@styled
-def draw(knob: str, runs: list, tolerance: float):
-    """Draw the worst error of each run against its CPU seconds, as SVG text.
+def cost_chart(knob: str, runs: list, tolerance: float) -> dict:
+    """Return the chart of the worst error of each run against its CPU seconds.
 
     The error is that of the measure that is farthest from the tolerance. A hollow point misses its tolerance.
 
@@ -182,56 +187,51 @@ def draw(knob: str, runs: list, tolerance: float):
     tolerance : float
         That of the scene, drawn as a broken line.
     """
-    figure, (axis,) = drawing(1, 4.2)
     names = stated_names(runs)
     worst = [worst_of_run(one) if knob == TOLERANCE else worst_error(one, names, tolerance) for one in runs]
-    points = [(one, found.share) for one, found in zip(runs, worst, strict=True) if found.share > EXACT]
-    axis.set(xscale="log", yscale="log", xlabel="CPU seconds of a run", ylabel="error of the worst measure")
-    axis.set_title(f"What accuracy costs, by {AXES[knob]}")
-    axis.plot([one.seconds for one, _ in points], [share for _, share in points], "-", color=BLUE, linewidth=1)
-    for label, face in (("meets its tolerance", BLUE), ("misses its tolerance", "white")):
-        alike = [(one.seconds, share) for one, share in points
-                 if (share <= (one.tolerance or tolerance)) == (face == BLUE)]
+    points = [Point(one, found.share) for one, found in zip(runs, worst, strict=True) if found.share > EXACT]
+    marks = [charts.line([one.seconds for one, _ in points], [share for _, share in points], "accent", width=1.0)]
+    for text, is_met in (("meets its tolerance", True), ("misses its tolerance", False)):
+        alike = [one for one in points if (one.share <= (one.run.tolerance or tolerance)) == is_met]
         if alike:
-            axis.plot(*zip(*alike, strict=True), "o", color=BLUE, markersize=6, markerfacecolor=face, label=label)
-    axis.axhline(tolerance, color="0.4", linestyle="--", linewidth=1, label=f"tolerance of the scene, {tolerance:g}")
-    if points:
-        _set_limits(axis, [one.seconds for one, _ in points], [tolerance, *(share for _, share in points)])
-        _label_points(axis, points)
-    figure.legend(loc="outside lower center", ncols=3, fontsize=9)
-    return figure
+            x, y = [one.run.seconds for one in alike], [one.share for one in alike]
+            marks.append(charts.dots(x, y, "accent", text, size=6, hollow=not is_met))
+    ends = _padded([one.seconds for one in runs], MIN_SECONDS_RATIO)
+    limit = f"tolerance of the scene, {tolerance:g}"
+    marks.append(charts.line(ends, [tolerance, tolerance], "soft", limit, dash="dashed", width=1.0))
+    x_axis = charts.axis("CPU seconds of a run", "", True) | {"range": ends}
+    y_axis = charts.axis("error of the worst measure", "", True)
+    y_axis["range"] = _padded([tolerance, *(one.share for one in points)], MIN_ERROR_RATIO)
+    title = f"What accuracy costs, by {AXES[knob]}"
+    labels = _labels(points, x_axis["range"], y_axis["range"])
+    return charts.chart(title, x_axis, y_axis, marks) | {"labels": labels}
 
 
-def _set_limits(axis, seconds: list, shares: list) -> None:
-    """Leave room for labels around the points, and write the seconds as plain numbers."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+class Point(NamedTuple):
+    """A run and the error of its worst measure over the value."""
 
-    low, high = min(seconds), max(seconds)
-    room = max(high / low, 2.0)**0.15
-    axis.set_xlim(low / room, high * room)
-    low, high = min(shares), max(shares)
-    room = max(high / low, 10.0)**0.15
-    axis.set_ylim(low / room, high * room)
-    axis.xaxis.set_major_locator(LogLocator(subs=(1.0, 1.5, 2.0, 3.0, 5.0, 7.0)))
-    axis.xaxis.set_major_formatter(FuncFormatter(lambda seconds, _: f"{seconds:g}"))
-    axis.xaxis.set_minor_formatter(NullFormatter())
+    run: Cost
+    share: float
 
 
-def _label_points(axis, points: list) -> None:
-    """Write the settings of each point above it, those of equal runs together; labels that would overlap move up.
+def _padded(values: list, min_ratio: float) -> list:
+    """Return the ends of a logarithmic axis with room for labels around its values."""
+    room = max(max(values) / min(values), min_ratio)**MARGIN
+    return [min(values) / room, max(values) * room]
 
-    points: (Cost, error) of each.
-    """
+
+def _labels(points: list, x_range: list, y_range: list) -> list:
+    """Return the settings of each point above it, those of equal runs together; labels that would overlap move up."""
     groups: dict[tuple, list] = {}
     for one, share in points:
         groups.setdefault((one.seconds, share), []).append(one.label)
-    decades = float(np.ptp(np.log(axis.get_ylim())))
-    start, width = np.log(axis.get_xlim()[0]), float(np.ptp(np.log(axis.get_xlim())))
+    decades, width = (float(np.log(high / low)) for low, high in (y_range, x_range))
+    out = []
     height = -1.0
-    for (seconds, share), labels in sorted(groups.items(), key=lambda found: found[0][1]):
-        place = np.log(share / axis.get_ylim()[0]) / decades
+    for (seconds, share), texts in sorted(groups.items(), key=lambda group: group[0][1]):
+        place = np.log(share / y_range[0]) / decades
         height = max(place, height + LABEL_HEIGHT)
-        right = np.log(seconds) - start < 0.6 * width
-        axis.annotate("; ".join(labels), (seconds, share), xytext=(8 if right else -2, 7 + (height - place) * HEIGHT),
-                      textcoords="offset points", ha="left" if right else "center", fontsize=9, color="0.2",
-                      bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5})
+        is_right = np.log(seconds / x_range[0]) >= RIGHT_PART * width
+        out.append({"text": "; ".join(texts), "x": seconds, "y": share, "raised": (height - place) * HEIGHT,
+                    "side": "left" if is_right else "right"})
+    return out

@@ -17,7 +17,8 @@ from scene_texts import BENCH, PIECE
 import patchfem as pf
 from patchfem.campaigns import cost, knobs
 from patchfem.campaigns.cost import TOLERANCE, Cost, cheapest, curve, quickest, sentence
-from patchfem.export.cost import draw, lines_of, shown, write
+from patchfem.export.cost import cost_chart, lines_of, shown, write
+from patchfem.export.drawing import pictures
 from patchfem.model.model import build
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
@@ -130,7 +131,7 @@ def test_exact_the_table_holds_plain_numbers(tmp_path):
 
 def test_exact_the_picture_has_one_curve_and_hollow_points_where_the_tolerance_is_missed():
     runs = [made("2", 0.43, 4e-2, 3e-2), made("4", 0.36, 8e-3, 7e-3), made("8", 5, 2e-3, 1e-3), made("16", 9, 1e-3)]
-    (axis,) = draw.figure("jumps", runs, 1e-2).axes
+    (axis,) = pictures.draw.figure([cost_chart("jumps", runs, 1e-2)]).axes
     line, *marks, limit = axis.lines
     assert line.get_xdata().tolist() == [0.43, 0.36, 5, 9] and line.get_ydata().tolist() == [4e-2, 8e-3, 2e-3, 1e-3]
     filled, hollow = (sorted(one.get_xdata()) for one in marks)
@@ -144,7 +145,7 @@ def test_exact_the_picture_has_one_curve_and_hollow_points_where_the_tolerance_i
 def test_exact_labels_of_the_picture_do_not_overlap(places):
     runs = [replace(made(f"{10.0**-k:g}, {100 * 2**k} steps per cycle", seconds, error), tolerance=1e-2)
             for k, (seconds, error) in enumerate(places)]
-    figure = draw.figure(TOLERANCE, runs, 1e-2)
+    figure = pictures.draw.figure([cost_chart(TOLERANCE, runs, 1e-2)], height=4.2)
     figure.draw_without_rendering()
     boxes = [one.get_window_extent() for one in figure.axes[0].texts]
     assert len(boxes) >= 4

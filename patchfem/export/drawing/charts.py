@@ -1,9 +1,9 @@
 """The figures of a run as data: `pictures` draws them on matplotlib Axes, `curves.js` on a page.
 
 A chart is a dict: `title`; `x`, `y`: {label, unit, log}, and `range` [low, high] where not all is shown; `marks`: what
-is drawn, from back to front; `frame`: its size [pixel] where both axes have one scale. A mark has a `kind` (line, dots,
-band, span, rule, arrow, cells), a `name` for the legend ("" for none), a `colour` (accent, warm, soft, or #rrggbb) and
-its numbers, in the units of the axes.
+is drawn, from back to front; `labels`: texts beside places, on paper; `frame`: its size [pixel] where both axes have
+one scale. A mark has a `kind` (line, dots, band, span, rule, arrow, cells), a `name` for the legend ("" for none), a
+`colour` (accent, warm, soft, or #rrggbb) and its numbers, in the units of the axes.
 """
 
 from itertools import pairwise

@@ -4,6 +4,8 @@ import io
 import re
 from functools import partial, wraps
 
+from ...scales import plain
+
 BLUE, ORANGE, GREY = "#1f5f99", "#c8551b", "#8a8a8a"
 WIDTH = 9.6  # inches; the page stretches a picture to its text column
 STYLE = {"svg.hashsalt": "patchfem", "svg.fonttype": "none", "font.family": "sans-serif", "font.size": 10,
@@ -13,6 +15,7 @@ STYLE = {"svg.hashsalt": "patchfem", "svg.fonttype": "none", "font.family": "san
 COLOURS = {"accent": BLUE, "warm": ORANGE, "soft": GREY}  # those of a chart by name
 SHAPES = {"circle": "o", "square": "s", "diamond": "D", "triangle": "^"}
 TALL = 3.6  # inches
+MAX_PLAIN_RATIO = 1e3  # of the ends of a logarithmic axis; up to it three numbers a decade have room
 
 
 def drawing(columns: int = 1, height: float = 3.2, onto=None, **layout):
@@ -84,11 +87,33 @@ def draw(made: list, onto=None, height: float = TALL):
                 axis.set(**dict(zip((f"{name}ticks", f"{name}ticklabels"), zip(*how["ticks"]))))
             if "range" in how:
                 axis.set(**{f"{name}lim": how["range"]})
+            if how.get("log"):
+                _write_plain_numbers(getattr(axis, f"{name}axis"))
+        for label in one.get("labels", ()):
+            _write_label(axis, label)
         axis.set_title(one["title"])
         handles = dict(zip(*axis.get_legend_handles_labels()[::-1]))
         if handles:
             axis.legend(handles.values(), handles.keys(), frameon=True, framealpha=0.7, edgecolor="none")
     return figure
+
+
+def _write_plain_numbers(axis) -> None:
+    """Label a logarithmic axis by numbers such as 0.1, 0.2 and 0.5; over many decades by powers of ten alone."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    low, high = sorted(axis.get_view_interval())
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < MAX_PLAIN_RATIO * low else (1.0,)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: plain(value, 3)))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _write_label(axis, label: dict) -> None:
+    """Write a text beside a place (x, y), `raised` [points] above it, to its left or right."""
+    on_left = label.get("side") == "left"
+    axis.annotate(label["text"], (label["x"], label["y"]), xytext=(-2 if on_left else 8, 7 + label["raised"]),
+                  textcoords="offset points", ha="center" if on_left else "left", fontsize=9, color="0.2",
+                  bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 0.5})
 
 
 def _colour(mark: dict) -> str:
@@ -102,7 +127,8 @@ def _line(axis, mark: dict) -> None:
 
 def _dots(axis, mark: dict) -> None:
     axis.errorbar(mark["x"], mark["y"], mark.get("errors"), fmt=SHAPES[mark.get("shape", "circle")],
-                  ms=mark.get("size", 5), capsize=2, color=_colour(mark), label=mark["name"] or None)
+                  ms=mark.get("size", 5), capsize=2, color=_colour(mark), label=mark["name"] or None,
+                  markerfacecolor="white" if mark.get("hollow") else None)
 
 
 def _band(axis, mark: dict) -> None:
