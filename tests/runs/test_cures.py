@@ -65,7 +65,7 @@ def test_exact_a_tolerance_that_is_advised_climbs_and_none_is_where_the_ladder_e
 @pytest.mark.slow
 def test_always_a_mesh_at_its_cap_is_not_refined_by_a_tolerance(monkeypatch):
     """A measure for which no mesh is chosen misses the tolerance beside the peak: no tolerance refines it."""
-    monkeypatch.setattr(ladder, "SPENT", {True: 0.0, False: 0.0})
+    monkeypatch.setattr(ladder, "MAX_SECONDS", {True: 0.0, False: 0.0})
     found = run(plan(loads(PATCH + '[contact.upper]\nchamfer = "0.2 mm"\n[accuracy]\ntolerance = 1e-6\n')))
     said = [text for text in found.warnings if "the tolerance is 1e-6" in text]
     wide = {name: one.error / abs(one.value) for name, one in found.measures.items() if one.value and one.error}
@@ -77,7 +77,7 @@ def test_always_a_mesh_at_its_cap_is_not_refined_by_a_tolerance(monkeypatch):
 
 def test_exact_a_mesh_that_no_tolerance_refines_is_told_with_the_seconds_of_the_next(monkeypatch):
     """"Too long" stood there for a loop of 4 nJ whose next mesh takes a second or two."""
-    monkeypatch.setattr(ladder, "SPENT", {True: 1e-3, False: 1e-3})
+    monkeypatch.setattr(ladder, "MAX_SECONDS", {True: 1e-3, False: 1e-3})
     flat = PATCH + '[contact.shear]\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\nkind = "sine"\n' \
         'amplitude = "65 nm"\nfrequency = "1 Hz"\n[accuracy]\ntolerance = 1e-4\n'
     found = run(plan(loads(flat)))

@@ -100,7 +100,7 @@ def widths(rows) -> list:
 
 @pytest.fixture
 def small(monkeypatch):
-    monkeypatch.setattr(ladder, "SPENT", LEAST)
+    monkeypatch.setattr(ladder, "MAX_SECONDS", LEAST)
 
 
 @pytest.mark.share(0, 3, 6)
@@ -153,7 +153,7 @@ def test_always_changes_that_grow_leave_more_than_the_last():
 
 
 if __name__ == "__main__":
-    ladder.SPENT = LEAST
+    ladder.MAX_SECONDS = LEAST
     for name, found in campaign(sys.argv[1], int(sys.argv[2]), int(sys.argv[3])).items():
         cover, ratio = 1 - np.mean([missed(*row) for row in found]), widths(found) or [0.0]
         print(f"{name:24s} coverage {cover:.3f}  width over true error: median {np.median(ratio):.3g}, "

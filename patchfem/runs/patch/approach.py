@@ -7,7 +7,8 @@ import numpy as np
 from ...contact.unilateral import press
 from ...core import Compliance, NotConverged, PatchfemError, frozen_array, say
 
-MISSED, ROUND = 1e-6, 1e-9  # of the distance and of the gap: what the search may leave of the distance
+MISSED = 1e-6  # what the search may leave of the distance, over the distance
+GAP_ROUND = 1e-9  # what it may leave over the range of the gap, whose round-off it cannot go below
 
 
 def closed_by(asked, pieces: Compliance, gap, under, stiff: Compliance) -> tuple:
@@ -46,7 +47,7 @@ def closed_by(asked, pieces: Compliance, gap, under, stiff: Compliance) -> tuple
         low, top = max(low - 2, bottom), low
     brentq(short, low, top, xtol=1e-13, rtol=1e-14)
     best = min(tried, key=lambda one: abs(one[1].approach - distance))
-    if abs(best[1].approach - distance) > MISSED * distance + ROUND * np.ptp(gap):
+    if abs(best[1].approach - distance) > MISSED * distance + GAP_ROUND * np.ptp(gap):
         reached = [one[1].approach for one in tried]
         below, above = max(a for a in reached if a < distance), min(a for a in reached if a > distance)
         raise NotConverged(f"an approach of {distance:.6g} m cannot be reached: the approach jumps from {below:.6g} m "

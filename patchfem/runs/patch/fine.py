@@ -23,12 +23,18 @@ from .measures import OFFSET, Hidden, combined, least_of
 from .press import Surface
 from .values import vertex
 
-LEAST_LEVELS, MOST_POINTS, MOST_WORK = 3, 60_000, 2.5e7  # of a level; its iterations times its points
-POINTS = 500  # of the first level at least
-END, CELL, SLOPE = 1e-4, 1 / 30, 0.8  # of the length: cell of level 0 at the ends, in the middle; its growth
-CLOSED, LIMIT = 3e-8, 4000  # of the contact: relative residual, most iterations
-NEAR, CORNERED = 1e-3, 0.2  # of the length: what counts as a corner; its share of the largest pressure
-OVERLAP = 1e-6  # of what the pressure moves: the largest overlap of a solved contact
+MIN_LEVELS = 3  # fewer levels do not show an order of convergence
+MAX_POINTS = 60_000  # points of a level; more would not fit the time of a patch
+MAX_WORK = 2.5e7  # iterations times points of a level, for the same reason
+MIN_POINTS = 500  # points of the first level
+END_CELL = 1e-4  # cell at the ends over the length, on level 0
+MIDDLE_CELL = 1 / 30  # cell in the middle over the length, on level 0
+GROWTH = 0.8  # growth of these cells per distance
+CONTACT_TOL = 3e-8  # relative residual of a solved contact
+MAX_ITERATIONS = 4000  # iterations of one contact
+CORNER_SPAN = 1e-3  # length of a corner over that of the interface
+CORNER_PRESSURE = 0.2  # pressure at a corner over the largest; above it the corner may hold the largest
+MAX_OVERLAP = 1e-6  # overlap of a solved contact over what the pressure moves
 
 
 class PointSolution(NamedTuple):
@@ -74,29 +80,29 @@ def takes_points(asked) -> bool:
 def solve_on_points(asked, enough) -> PointSolution:
     """Solve a `PatchModel` on ever more points.
 
-    enough(measures) -> bool ends the climb, as do MOST_POINTS and MOST_WORK.
+    enough(measures) -> bool ends the climb, as do MAX_POINTS and MAX_WORK.
     """
     count, series, found = _first(asked), [], {}
     with one_thread():
         try:
-            cells = [_ends(asked, level) for level in range(LEAST_LEVELS)]
+            cells = [_ends(asked, level) for level in range(MIN_LEVELS)]
             coarse = [_level(asked, ends, count, None) for ends in cells]
             series = coarse[-1:]
-            while len(series) < LEAST_LEVELS or not (enough(found) or _dear(series[-1])):
+            while len(series) < MIN_LEVELS or not (enough(found) or _dear(series[-1])):
                 series.append(_level(asked, cells[-1], 2 * series[-1].force.size, series[-1].force))
-                found = _summed(coarse, series) if len(series) >= LEAST_LEVELS else {}
+                found = _summed(coarse, series) if len(series) >= MIN_LEVELS else {}
         except (NotConverged, np.linalg.LinAlgError):
             pass
     return PointSolution(found, series[-1].surface, series[-1].stretches) if found else PointSolution({})
 
 
 def _first(asked) -> int:
-    return max(POINTS, min(round(asked.length / profile.spacing_of(asked.gap.profile) / 4), MOST_POINTS // 4))
+    return max(MIN_POINTS, min(round(asked.length / profile.spacing_of(asked.gap.profile) / 4), MAX_POINTS // 4))
 
 
 def _dear(last: PointLevel) -> bool:
     """Whether twice the points of a level are too many, or take too many iterations."""
-    return 2 * last.force.size > MOST_POINTS or 3 * last.work * last.force.size > MOST_WORK
+    return 2 * last.force.size > MAX_POINTS or 3 * last.work * last.force.size > MAX_WORK
 
 
 def _summed(coarse: list, series: list) -> dict:
@@ -114,8 +120,8 @@ def _ends(asked, level: int) -> list:
     """What the free ends of the pieces change: (places (k,) [m], changes (2, k, k) [m2/N] for pressure and for shear),
     by the cells of a level."""
     length, sides = asked.length, (-0.5, 0.5)
-    layout = Layout(-length / 2, length / 2, tuple((side * length, side * length, END * length) for side in sides),
-                    (-length / 2, length / 2), CELL * length, CELL * length, SLOPE).times(0.5**level)
+    layout = Layout(-length / 2, length / 2, tuple((side * length, side * length, END_CELL * length) for side in sides),
+                    (-length / 2, length / 2), MIDDLE_CELL * length, MIDDLE_CELL * length, GROWTH).times(0.5**level)
     places, changes = columns(layout), 0.0
     for piece, share in _bodies(asked):
         depth, coated = _rows(piece, layout)
@@ -158,7 +164,7 @@ def _level(asked, ends: tuple, count: int, start) -> PointLevel:
     force, closing, theta, work = _pressed(asked, normal, gap, start)
     moved = normal.product(force)
     opening, touches = gap + theta * x - closing + moved, force > 0
-    if not opening.min() >= -OVERLAP * np.abs(moved).max():
+    if not opening.min() >= -MAX_OVERLAP * np.abs(moved).max():
         raise NotConverged(f"contact: at {count} points the pieces still overlap by up to {-opening.min():.1e} m")
     opening = np.where(touches, 0.0, np.maximum(opening, 0.0))
     surface = Surface(x, np.full(count, normal.area), force / normal.area, opening, gap)
@@ -167,8 +173,8 @@ def _level(asked, ends: tuple, count: int, start) -> PointLevel:
     cell = asked.length / count
     hidden = Hidden(asked.length, int(touches.sum()), cell * bool(found), cell * len(found), OFFSET,
                     asked.moment is not None, float(np.ptp(gap) + np.abs(moved).max()), 0.0, 0.0)
-    near = max(1, round(NEAR * count))
-    cornered = max(force[:near].max(), force[-near:].max()) > CORNERED * force.max()
+    near = max(1, round(CORNER_SPAN * count))
+    cornered = max(force[:near].max(), force[-near:].max()) > CORNER_PRESSURE * force.max()
     return PointLevel(force, surface, stretches, values, hidden, work, bool(cornered))
 
 
@@ -178,7 +184,7 @@ def _pressed(asked, normal: Products, gap, start) -> tuple:
     low = gap.min() if asked.approach is None else asked.approach
     moment = None if asked.approach is not None else asked.moment
     load = asked.load if asked.approach is None else None
-    force, count = gradients(normal, Ask(x, gap - low, load, moment, asked.spring), CLOSED, LIMIT, begin)
+    force, count = gradients(normal, Ask(x, gap - low, load, moment, asked.spring), CONTACT_TOL, MAX_ITERATIONS, begin)
     touches = force > 0
     if asked.approach is not None or not touches.any():
         return force, float(low), 0.0, count

@@ -23,24 +23,25 @@ from .press import Patch, pressed
 from .values import contact_ends
 
 SEARCH_CELLS = 96  # columns of the first search for the contact
-MOST_COLUMNS = 120  # of the coarsest grid
-# of a static patch, and of one whose motion takes longer the more nodes there are
+MAX_COLUMNS = 120  # columns of the coarsest grid; a layout that wants more is made coarser everywhere
+# The tables with two entries are for a patch that stays (True) and for one whose motion takes longer with more nodes.
 SLOPE = {True: 0.5, False: 0.9}  # growth of the cells of the coarsest grid per distance
-EDGE = {True: 20, False: 10}  # its cells along the contact, at the edges of the contact
-LEAST = 4e-9  # of the length: the shortest cell of the coarsest grid, some tens of picometres
-JUMP = 8  # cells at a step of the gap in one cell at an edge
-MOST_PLACES = 12  # beyond it the contact is many islands and the columns stay even
-SWING = (0.5, 1.5)  # of the mean load, between which edges are resolved where the load varies
-WORN = 1 / 48  # of the interface, a column of the coarsest grid where wear may move the edges anywhere
-CLOSER = 64  # cells along a contact of a node or two, in the next search
-WAVE = 16  # cells of the search, and of the third grid, in a wave of the gap
-CREST, CRESTS = 0.3, 4  # of the largest pressure: a crest that cells are graded to; its cells of the coarsest grid
-SLIP_CELLS = 4  # of the coarsest grid in a slip zone; the third grid has 16, which show the work to about 1 %
+EDGE_CELLS = {True: 20, False: 10}  # length of a contact over the coarsest cells at its edges
+MIN_CELL = 4e-9  # shortest cell of the coarsest grid over the length: some tens of picometres, near round-off
+STEP_CELLS = 8  # cells at a step of the gap are so many times shorter than those at an edge
+MAX_PLACES = 12  # ends of a contact; one with more is many islands, for which the columns stay even
+SWING = (0.5, 1.5)  # multiples of the mean load between which a load that varies is expected
+WEAR_CELL = 1 / 48  # coarsest cell over the length of the interface where wear may move the edges anywhere
+NODE_CELLS = 64  # cells along a contact of a node or two in the search that follows
+WAVE_CELLS = 16  # cells in a wave of the gap, in the search and in the third grid
+CREST = 0.3  # cells are graded to the crests of the pressure above this fraction of the largest pressure
+CREST_CELLS = 4  # the half-width of a crest has so many cells of the coarsest grid
+SLIP_CELLS = 4  # cells of the coarsest grid in a slip zone; 16 of the third grid show the work to about 1 %
 MAX_SEARCH_CELL = 4.0  # cell of the search over the wanted one in a slip zone; above it the zone is searched again
-SEARCHES = 8  # of the contact, each on columns graded to what the one before found
-LEAST_LEVELS = 3  # nested meshes that show an order
-SPENT = {True: 3.0, False: 0.4}  # predicted seconds of the finest mesh: of a static patch, of one that moves
-OTHER = 4.0  # time of condensing a grid that is not a tensor grid over that of one that is
+MAX_SEARCHES = 8  # each search has columns that are graded to what the one before found
+MIN_LEVELS = 3  # fewer nested meshes do not show an order of convergence
+MAX_SECONDS = {True: 3.0, False: 0.4}  # predicted seconds of condensing, above which a finer mesh is not tried
+OTHER_FACTOR = 4.0  # condensing a mesh that is not a tensor grid takes so many times as long
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -88,19 +89,19 @@ def base_grids(asked) -> BaseGrids:
     """Return the coarsest grids of a `PatchModel`, graded to the contact that is found on them.
 
     Where a load that varies moves the edges of the contact, the columns are fine over the bands that they sweep between
-    SWING of the load; where wear does, no column is longer than WORN of the interface.
+    SWING of the load; where wear does, no column is longer than WEAR_CELL of the interface.
     """
     sweep = [replace(asked, load=share * asked.load) for share in SWING
              if asked.sweeps == "load" and asked.load is not None]
     layout, contact = search_layout(asked), None
-    for search in range(SEARCHES if asked.nominal_load > 0 else 0):  # without a load nothing bears
+    for search in range(MAX_SEARCHES if asked.nominal_load > 0 else 0):  # without a load nothing bears
         pair = condensed(asked, *grids_of(asked, layout)) if search else search_pair(asked)
         x = pair.grid.x
         seen = [contact_extent(pressed(each, pair), asked.slip) for each in (asked, *sweep)]
         layout, contact = layout_of(asked, seen), seen[0]
         cells = max(one.cell / one.wide for one in seen)
         shows = _shows_crests(asked, x, layout) and _shows_slip(contact.slip_zones, x, layout)
-        if cells <= 1 / (EDGE[asked.still] - 1) and shows:
+        if cells <= 1 / (EDGE_CELLS[asked.still] - 1) and shows:
             break
     return BaseGrids(grids_of(asked, layout), contact)
 
@@ -117,14 +118,14 @@ def _shows_slip(zones: tuple, x, layout: Layout) -> bool:
 
 def _shows_crests(asked, x, layout: Layout) -> bool:
     """Whether columns x (k,) [m] are no longer than a layout wants them at the crests of a pressure on waves."""
-    if _longest(asked) == np.inf or x.size > MOST_COLUMNS:
+    if _longest(asked) == np.inf or x.size > MAX_COLUMNS:
         return True
     return bool((np.diff(x) <= 2 * layout.size((x[1:] + x[:-1]) / 2)).all())
 
 
 def _longest(asked) -> float:
     """Longest cell [m] that shows the waves of the gap, those of a profile and of its shapes; infinite without any."""
-    return min(asked.gap.wave / WAVE, np.inf if asked.gap.profile is None else asked.size)
+    return min(asked.gap.wave / WAVE_CELLS, np.inf if asked.gap.profile is None else asked.size)
 
 
 def search_layout(asked) -> Layout:
@@ -138,28 +139,29 @@ def layout_of(asked, seen: list) -> Layout:
     half, span = asked.length / 2, (min(one.span[0] for one in seen), max(one.span[1] for one in seen))
     wide, thick = min(one.wide for one in seen), _coating(asked)
     most = min(asked.length / 12, 4 * _longest(asked))  # the third mesh has cells a quarter as long
-    if max(len(one.places) for one in seen) > MOST_PLACES:
+    if max(len(one.places) for one in seen) > MAX_PLACES:
         return Layout(-half, half, (), span, *(2 * [min(asked.length / 64, most)]), 0.0)
     if asked.sweeps == "wear":
-        most = min(most, asked.length * WORN)
+        most = min(most, asked.length * WEAR_CELL)
     inside = min(wide / 6, asked.length / 24, most)
     # a point of contact is looked at closer and closer
-    along = EDGE[asked.still] if np.isfinite(max(one.cell for one in seen)) else CLOSER
+    along = EDGE_CELLS[asked.still] if np.isfinite(max(one.cell for one in seen)) else NODE_CELLS
     # cells of a band that an edge sweeps are many, and every one is a contact set of its own
     fine = thick / 4 if thick and asked.sweeps != "load" else np.inf
-    least = max(min(wide / along, fine), LEAST * asked.length)
+    least = max(min(wide / along, fine), MIN_CELL * asked.length)
     bands = _bands([one.places for one in seen], least)
     # a jump of the gap is a node of its own: what depends on it falls with the first power of its cell
-    bands += tuple((place, place, least / JUMP) for place in asked.gap.jumps)
+    bands += tuple((place, place, least / STEP_CELLS) for place in asked.gap.jumps)
     known, fall = rounded_edges(asked)
     near = [place for place in known if span[0] - least <= place <= span[1] + least]
     bands += tuple((place, place, min(least, fall / 4)) for place in near)
-    sharp = JUMP if asked.singular_ends else 1
+    sharp = STEP_CELLS if asked.singular_ends else 1
     if _longest(asked) < np.inf:
-        bands += tuple((place, place, max(wide / CRESTS, least / JUMP)) for one in seen for place, wide in one.crests)
-    bands += tuple((low, high, max((high - low) / SLIP_CELLS, LEAST * asked.length))
+        crests = [crest for contact in seen for crest in contact.crests]
+        bands += tuple((place, place, max(half / CREST_CELLS, least / STEP_CELLS)) for place, half in crests)
+    bands += tuple((low, high, max((high - low) / SLIP_CELLS, MIN_CELL * asked.length))
                    for one in seen for low, high in one.slip_zones)
-    corner = max(min(thick / 16 if thick else np.inf, wide / EDGE[asked.still] / sharp), LEAST * asked.length)
+    corner = max(min(thick / 16 if thick else np.inf, wide / EDGE_CELLS[asked.still] / sharp), MIN_CELL * asked.length)
     ends = {place for one in seen for place in one.corners}
     bands += tuple((place, place, corner) for place in sorted(ends))
     # the far corners, where a free side meets the holder
@@ -216,20 +218,20 @@ def _crests(x, sigma) -> tuple:
     rise = np.diff(sigma) / np.diff(x)
     bend = -2 * np.diff(rise)[top] / (x[top + 2] - x[top])
     wide = np.sqrt(2 * sigma[top + 1] / bend)
-    return tuple(zip(x[top + 1].tolist(), wide.tolist())) if top.size <= MOST_PLACES else ()
+    return tuple(zip(x[top + 1].tolist(), wide.tolist())) if top.size <= MAX_PLACES else ()
 
 
 def grids_of(asked, layout: Layout) -> list:
-    """Grids of the pieces, one where they are alike, with the columns of a layout, MOST_COLUMNS at most."""
+    """Grids of the pieces, one where they are alike, with the columns of a layout, MAX_COLUMNS at most."""
     pieces, x = (asked.lower,) if asked.alike else (asked.lower, asked.upper), columns_of(asked, layout)
     return [outlined(asked, piece, grid_on(asked, x, piece), 1 + SLOPE[asked.still]) for piece in pieces]
 
 
 def columns_of(asked, layout: Layout) -> np.ndarray:
-    """Columns (k,) [m] of a layout, MOST_COLUMNS at most."""
+    """Columns (k,) [m] of a layout, MAX_COLUMNS at most."""
     x = columns(layout, asked.gap.jumps)
-    while x.size > MOST_COLUMNS + 1 and layout.bands:
-        layout = layout.times(x.size / MOST_COLUMNS)
+    while x.size > MAX_COLUMNS + 1 and layout.bands:
+        layout = layout.times(x.size / MAX_COLUMNS)
         x = columns(layout, asked.gap.jumps)
     return x
 
@@ -264,5 +266,9 @@ def is_mirrored(body) -> bool:
 
 def seconds_of(bodies) -> float:
     """Return the predicted seconds of condensing the bodies of a patch, (lower, upper or None) or one alike piece."""
-    return sum((1.0 if plan_of(body) is body else OTHER) * predicted_seconds(*node_counts(body), is_mirrored(body))
-               for body in bodies if body is not None)
+    total = 0.0
+    for body in bodies:
+        if body is not None:
+            factor = 1.0 if plan_of(body) is body else OTHER_FACTOR
+            total += factor * predicted_seconds(*node_counts(body), is_mirrored(body))
+    return total

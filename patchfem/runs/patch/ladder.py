@@ -9,12 +9,12 @@ from ...mesh.nested import coarser, finer, plan_of
 from ...model.pieces import bodies_of
 from . import fine, slip_zones, store
 from .condensed import condensed, shared_pairs
-from .grids import LEAST_LEVELS, SPENT, base_grids, seconds_of
+from .grids import MAX_SECONDS, MIN_LEVELS, base_grids, seconds_of
 from .measures import measures, met
 from .press import pressed, solve
 
-TOL_OF_SPENT = 1e-3  # tolerance up to which a slip has the seconds of a mesh that moves; ten times tighter, 3.2 times
-MOST_DECADES = 6  # below a tolerance, in which another is looked for
+TOL_OF_SECONDS = 1e-3  # up to this tolerance a slip has the seconds of a mesh that moves; ten times tighter, 3.2 times
+MAX_DECADES = 6  # decades below a tolerance in which one that asks for a finer mesh is looked for
 
 
 def solve_split(asked, level: int, estimate: bool) -> tuple:
@@ -111,14 +111,14 @@ def climb(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -
     grids, out, on_points = base_grids(asked).bodies, [], None
     while True:
         try:
-            wanted = estimate or len(out) == LEAST_LEVELS - 1
+            wanted = estimate or len(out) == MIN_LEVELS - 1
             out.insert(0, pressed(asked, condensed(asked, *grids, fresh=fresh)) if wanted else None)
         except NotConverged:  # cells too short for the digits there are: the meshes before stay
             if not out or out[0] is None:
                 raise
             return tuple(out) if len(out) > 1 else (*out, None)
         grids = [finer(grid) for grid in grids]
-        if len(out) < LEAST_LEVELS:
+        if len(out) < MIN_LEVELS:
             continue
         nothing = out[0].pressure.outcome is Outcome.NO_CONTACT
         if not estimate or nothing:
@@ -128,7 +128,7 @@ def climb(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -
             out[0] = replace(out[0], sharper=on_points.sharper, averaging=on_points.averaging, fine=on_points.fine,
                              stretches=on_points.stretches)
         found, shows_slip = measures(*out, tolerance=tolerance), _shows_slip(asked, out, tolerance)
-        if dear > SPENT[False] and not met(found, tolerance) and _finer(asked):
+        if dear > MAX_SECONDS[False] and not met(found, tolerance) and _finer(asked):
             on_points = out[0] = _on_points(asked, out, tolerance)
             found = measures(*out, tolerance=tolerance)
         enough = bool(out[0].sharper) or met(found, tolerance)
@@ -143,10 +143,10 @@ def most_seconds(asked, tolerance: float | None = None) -> float:
     may cost.
     """
     if asked.slip is None:
-        return SPENT[asked.still]
+        return MAX_SECONDS[asked.still]
     if tolerance is None:
-        return SPENT[True]
-    return min(SPENT[True], SPENT[False] * max(1.0, (TOL_OF_SPENT / tolerance) ** 0.5))
+        return MAX_SECONDS[True]
+    return min(MAX_SECONDS[True], MAX_SECONDS[False] * max(1.0, (TOL_OF_SECONDS / tolerance) ** 0.5))
 
 
 def static_ladder(asked, tolerance: float, estimate: bool = True, fresh: bool = False) -> tuple:
@@ -194,7 +194,7 @@ def climbs_at(asked, patches, tolerance: float) -> float | None:
         ended = not met(measures(*(one for one in patches if one is not None), tolerance=tolerance), tolerance)
         return None if ended else tolerance / 10
     known = [one for one in patches if one is not None]
-    for tighter in (tolerance * 10.0**-k for k in range(1, MOST_DECADES + 1)):
+    for tighter in (tolerance * 10.0**-k for k in range(1, MAX_DECADES + 1)):
         enough = met(measures(*known, tolerance=tighter), tighter) and _shows_slip(asked, known, tighter)
         if not enough and seconds <= most_seconds(asked, tighter):
             return tighter

@@ -7,10 +7,10 @@ import numpy as np
 SECOND = 4.0  # ratio of successive changes of second order, the best that is believed
 DOUBTFUL = 2.5  # the best ratio of meshes that are not nested
 REGULAR = (2.6, 6.0)  # ratios of a series that falls by its order
-SLOWEST = 1.6  # ratio that the rest of a slowly falling series is taken with
+SLOWEST = 1.6  # ratio with which the remainder of a slowly falling series is taken
 GROWING = 1.3  # ratio below which a series has not begun to fall
-SAFE = 1.8  # of the rest of a series that falls by a steady ratio; of random scenes it covers all but 2 in 100
-WILD = 2.0  # of the largest change of one that does not
+SAFE = 1.8  # error over the remainder of a series with a steady ratio; it covers all but 2 in 100 random scenes
+WILD = 2.0  # error over the largest change of a series without one
 
 
 class Limit(NamedTuple):

@@ -19,14 +19,14 @@ from .press import Patch, pressed
 from .values import edge_cells, open_ends, unresolved_rounding, values
 
 CLEAR = 8.0  # width over height from which a piece is clearly in plane strain (its inverse: in plane stress)
-FEW = 12  # nodes of a contact below which their number is felt
-POINT = 3  # nodes of a contact that no mesh of these cells resolves
-ROUND = 5e-12  # round-off, relative
-ALIKE = 1e-9  # relative error that nobody asks to be below
+FEW_NODES = 12  # the measures of a contact of fewer nodes depend on their number
+UNRESOLVED_NODES = 3  # nodes of a contact that meshes of these cells do not resolve
+ROUND = 5e-12  # relative round-off of the equations of contact
+MIN_ERROR = 1e-9  # relative error below which no error is estimated, because nobody asks for less
 OFFSET = 0.012  # cells by which an edge found between nodes may lie off
-RISING = 4.0  # times the last change of the pressure at a corner: what it may still rise by
-CORNER = 0.15  # largest share of the pressure at the corner of a coating that cells coarser than it leave out
-EXTRAPOLATED = 2.0  # of what meshes hide, in 4/3 of a value less 1/3 of one on cells twice as long
+RISING = 4.0  # the pressure at a corner may still rise by so many times its last change
+CORNER = 0.15  # fraction of the pressure at the corner of a coating that cells coarser than it may leave out
+EXTRAPOLATED = 2.0  # errors that an extrapolated value may hide, over those of the finest mesh: 4/3 + 1/3, rounded up
 BANDED = ("pressure_peak", "normal_stiffness", "tangential_stiffness")
 
 
@@ -116,7 +116,7 @@ def measures(fine: Patch, *coarse: Patch | None, tolerance: float | None = None)
     nested = all(cells_halved(a.pair, b.pair) for a, b in pairwise((fine, *series)))
     rough = 2.0 if missed_peak else 1.0  # of meshes that pass over a rounding none shows what it does
     least = least_of(_hidden(fine, missed_peak), mine) if mine["normal_load"] > 0 else {}
-    out = combined([*found, mine], least, nested, tolerance, max(ALIKE, fine.pair.rounding), rough)
+    out = combined([*found, mine], least, nested, tolerance, max(MIN_ERROR, fine.pair.rounding), rough)
     if fine.averaging is not None:
         out = _cornered(out, fine, series[0])
     for name, (value, error) in fine.sharper.items():
@@ -185,7 +185,7 @@ def converge(series: list, least: dict, wanted, nested: bool, alike: float, roug
     return found
 
 
-def combined(series: list, least: dict, nested: bool = True, tolerance: float | None = None, alike: float = ALIKE,
+def combined(series: list, least: dict, nested: bool = True, tolerance: float | None = None, alike: float = MIN_ERROR,
              rough: float = 1.0) -> dict:
     """Return measures by name from their values on meshes of one patch, coarse to fine; parameters as of `converge`.
 
@@ -325,7 +325,8 @@ def _hidden(patch: Patch, missed_peak: float) -> Hidden:
     out = Hidden(*(np.ravel(value)[0] for value in out))
     cells = edge_cells(patch.x, patch.active)
     first, last = ~patch.active[[0, -1]]
-    return out._replace(wedge=_wedge(patch) if out.count <= POINT and cells.any() else 0.0, missed=missed_peak,
+    wedge = _wedge(patch) if out.count <= UNRESOLVED_NODES and cells.any() else 0.0
+    return out._replace(wedge=wedge, missed=missed_peak,
                         open_ends=float(open_ends(patch)), skin=patch.skin is not None,
                         between=float(cells[int(first):cells.size - int(last)].sum()))
 
@@ -337,9 +338,10 @@ def least_of(hidden: Hidden, mine: dict) -> dict:
     smaller than the cells, and round-off.
     """
     length, load, count, total = hidden.length, mine["normal_load"], hidden.count, mine["pressure_peak"]
-    cell, few = np.maximum(hidden.cell, hidden.cells / 2), count <= POINT  # the average where the ends are many
+    cell = np.maximum(hidden.cell, hidden.cells / 2)  # the average where the ends are many
+    few = count <= UNRESOLVED_NODES
     aside = np.where(few, cell / (2 * count**2), 1e-3 * cell)
-    peak = hidden.corner + np.where((cell > 0) & (count <= FEW), total / (4 * count**2), 0.0)
+    peak = hidden.corner + np.where((cell > 0) & (count <= FEW_NODES), total / (4 * count**2), 0.0)
     peak = np.maximum(np.maximum(peak, hidden.wedge), hidden.missed - total)
     turned = ROUND * (np.abs(mine["approach"]) + hidden.spread) + np.abs(mine["rotation"]) * aside * hidden.turns
     fullness = np.divide(mine["loaded_fraction"], total, out=np.zeros(np.shape(total)), where=total != 0)

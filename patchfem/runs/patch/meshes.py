@@ -22,15 +22,15 @@ from .measures import measures, missed
 from .press import pressed
 from .static import missed_on, patches_on
 
-CASES = 48  # cases that a mesh is chosen by; of more, those that lie farthest apart
-CORNERS = 5  # of them, whose own ladders are climbed where a patch slips part by part
-ROUNDS = 4  # of the search for the contacts
-MOST_NODES = 400  # of the finest interface
-FASTEST = 3.0  # order by which errors of static measures fall at most: meshes too coarse by it are not tried
-# times the cells that a case asks of its coarsest mesh: tried from the longest on, whose meshes take least time, but
-# for those that are still too long by what the last try says
-START = (4.0, 2.8, 2.0, 1.5, 1.0)
-CLOSE = 2.0  # ratio of the cells of neighbouring cases up to which one band holds what lies between them
+MAX_CASES = 48  # cases that a mesh is chosen by; of more, those that lie farthest apart are taken
+CLIMBED_CASES = 5  # so many of them climb their own ladders where a patch slips part by part
+MAX_SEARCHES = 4  # each search for the contacts has columns that are graded to what the one before found
+MAX_NODES = 400  # nodes of the finest interface; a finer mesh would slow every case down
+MAX_ORDER = 3.0  # order by which errors of static measures fall at most: meshes too coarse by it are not tried
+# The cells of the coarsest mesh are so many times those that a case asks for. The longest are tried first, because
+# their meshes take least time; those that are too long by what the last try says are passed over.
+CELL_FACTORS = (4.0, 2.8, 2.0, 1.5, 1.0)
+MAX_CELL_RATIO = 2.0  # ratio of the cells of neighbouring cases up to which one band holds what lies between them
 
 
 def geometry_of(asked) -> tuple:
@@ -59,7 +59,7 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None
     common = min(halvings.values(), default=0)  # what all of them halve are levels of the ladder
     layout = _layout([*cases, *swept], not (every and all_), {key: one - common for key, one in halvings.items()})
     # a contact that moves on the way, or slips part by part, has measures that its first state tells nothing of
-    shares, own = START[-1:] if asked.sweeps or slips else START, None
+    shares, own = CELL_FACTORS[-1:] if asked.sweeps or slips else CELL_FACTORS, None
     if layout is None:
         return None
     while True:
@@ -69,13 +69,13 @@ def shared_meshes(patches, tolerance: float, all_: bool = True) -> Meshes | None
             own = own or grids.grids_of(asked, layout)
             if bodies[0].x.size >= own[0].x.size:  # both have the most columns
                 continue
-        pairs, missed_by = _climbed(cases, bodies, tolerance, bool(shares), grids.LEAST_LEVELS + common)
+        pairs, missed_by = _climbed(cases, bodies, tolerance, bool(shares), grids.MIN_LEVELS + common)
         if missed_by <= 1 or not shares:
             found = with_digest([(one.grid, None if one.upper is one.piece else one.upper_grid) for one in pairs])
             keep_pairs(cases[0], found, pairs)
             return found
-        enough = share * missed_by**(-1 / FASTEST)  # times the cells, above which no mesh meets it
-        shares = tuple(one for one in shares if one <= max(enough, START[-1]))
+        enough = share * missed_by**(-1 / MAX_ORDER)  # times the cells, above which no mesh meets it
+        shares = tuple(one for one in shares if one <= max(enough, CELL_FACTORS[-1]))
 
 
 def with_digest(levels) -> Meshes:
@@ -90,7 +90,7 @@ def with_digest(levels) -> Meshes:
     return Meshes(tuple(levels), digest.hexdigest()[:32])
 
 
-def farthest_apart(patches, most: int = CASES) -> tuple:
+def farthest_apart(patches, most: int = MAX_CASES) -> tuple:
     """(the patches that lie farthest apart in what presses and shapes them, `most` at most, whatever their order;
     whether these are all)."""
     rows = {_numbers(one): one for one in patches}
@@ -119,12 +119,14 @@ def _numbers(asked) -> tuple:
 
 
 def _halvings(cases: list, tolerance: float) -> dict:
-    """How often the run of a case by itself halves its cells beyond the least levels, of CORNERS cases by `_numbers`.
+    """Return how often the run of a case by itself halves its cells beyond the fewest levels, by `_numbers`.
+
+    CLIMBED_CASES cases are tried.
     """
     out = {}
-    for one in farthest_apart(cases, CORNERS)[0]:
+    for one in farthest_apart(cases, CLIMBED_CASES)[0]:
         try:
-            out[_numbers(one)] = len(ladder.climb(one, one.mesh_tolerance or tolerance)) - grids.LEAST_LEVELS
+            out[_numbers(one)] = len(ladder.climb(one, one.mesh_tolerance or tolerance)) - grids.MIN_LEVELS
         except PatchfemError:  # its own run says why
             continue
     return out
@@ -136,9 +138,9 @@ def _layout(cases: list, between: bool, halvings: dict) -> Layout | None:
     between: there are more cases than these, and their contacts end between those of neighbouring ones; halvings: as
     `_halvings`, beyond those of all of them; the cells of these cases are so much shorter from the first level on.
     """
-    first, along = cases[0], grids.EDGE[cases[0].still]
+    first, along = cases[0], grids.EDGE_CELLS[cases[0].still]
     layout = None
-    for _ in range(ROUNDS):
+    for _ in range(MAX_SEARCHES):
         pair = condensed(first, *grids.grids_of(first, layout)) if layout else grids.search_pair(first)
         known = patches_on(cases, pair)
         seen = [(one, found) for one, patch in zip(cases, known) if (found := _loaded(one, pair, patch)) is not None]
@@ -185,7 +187,7 @@ def _filled(layouts: list) -> list:
         ends = sorted({(low, least) for one in layouts for low, high, least in one.bands
                        if low == high and low * side >= 0 and abs(low) < half})
         for (low, a), (high, b) in pairwise(ends):
-            count = 1 if high == low else int(np.ceil(abs(np.log(a / b)) / np.log(CLOSE))) or 1
+            count = 1 if high == low else int(np.ceil(abs(np.log(a / b)) / np.log(MAX_CELL_RATIO))) or 1
             places, sizes = np.linspace(low, high, count + 1), np.geomspace(a, b, count + 1)
             out += [(*map(float, stretch), float(max(pair))) for stretch, pair in
                     zip(pairwise(places), pairwise(sizes), strict=True)]
@@ -207,7 +209,7 @@ def _climbed(cases: list, bodies, tolerance: float, once: bool, least: int) -> t
         if missed_by <= 1:
             missed_by = next((by for one, seen in zip(cases, known) if seen is None and (
                 by := _missed(one, pairs, tolerance)) > 1), missed_by)
-        dear = bodies[0].x.size > MOST_NODES or grids.seconds_of(bodies) > ladder.most_seconds(cases[0], tolerance)
+        dear = bodies[0].x.size > MAX_NODES or grids.seconds_of(bodies) > ladder.most_seconds(cases[0], tolerance)
         if missed_by <= 1 or once or dear:
             return pairs, missed_by
 

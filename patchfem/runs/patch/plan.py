@@ -13,7 +13,7 @@ from ...model.patch import bars, block_shear
 from ...model.pieces import bodies_of
 from ..cost import Cost, MemoryPart
 from . import skin, store
-from .grids import LEAST_LEVELS, OTHER, SPENT, base_grids, is_mirrored, node_counts, seconds_of
+from .grids import MAX_SECONDS, MIN_LEVELS, OTHER_FACTOR, base_grids, is_mirrored, node_counts, seconds_of
 from .ladder import meshes_beside
 
 PACKAGES = 2e7  # bytes of the packages that pieces import
@@ -55,7 +55,7 @@ def expected_grids(asked, tolerance: float) -> Sizes:
     bodies = [body for body in levels[0] if body is not None]
     finest = tuple(map(node_counts, bodies))
     return Sizes((plan_of(bodies[0]) or bodies[0]).x.size, finest, len(levels),
-                 sum(map(seconds_of, levels)) * (OTHER if asked.mesh is not None else 1.0),
+                 sum(map(seconds_of, levels)) * (OTHER_FACTOR if asked.mesh is not None else 1.0),
                  sum(predicted_bytes(*nodes, is_mirrored(body)) for nodes, body in zip(finest, bodies)),
                  asked.outlined or asked.mesh is not None)
 
@@ -70,9 +70,9 @@ def _expected_levels(asked, tolerance: float) -> list:
     bodies, contact = base_grids(asked)
     has_edges = bool(asked.gap.jumps or (contact is not None and contact.places))
     levels = [bodies]
-    while len(levels) < LEAST_LEVELS + (has_edges and tolerance < TIGHT_TOL):
+    while len(levels) < MIN_LEVELS + (has_edges and tolerance < TIGHT_TOL):
         bodies = [finer(body) for body in bodies]
-        if len(levels) >= LEAST_LEVELS and seconds_of(bodies) > SPENT[asked.still]:
+        if len(levels) >= MIN_LEVELS and seconds_of(bodies) > MAX_SECONDS[asked.still]:
             break
         levels.insert(0, bodies)
     return levels

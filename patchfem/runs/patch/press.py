@@ -15,7 +15,7 @@ from . import strips as strip_press
 from .approach import closed_by
 from .condensed import Pair, condensed
 
-RIPPLE = 1e-2  # of the pressure on pieces whose nodes do not match, expected and found, from which it is said
+RIPPLE = 1e-2  # ripples over the pressure on pieces whose nodes do not match, above which a note states them
 
 
 class Surface(NamedTuple):

@@ -24,9 +24,9 @@ LOCKS = 0.499  # Poisson's ratio; up to it the bars of locking cells hold
 SMALL = 0.02  # strain that is taken as small: what is of its second order is left out
 
 __all__ = ["bodies", "left_out", "measured", "probed", "solve_all", "static", "static_ladder", "strained"]
-COUPLED = 0.02  # of the tangential compliance; the closing by shear is said from there on
-BENT = 0.02  # of the load under which a tall piece buckles; as much is missing from its sideways motion
-WHOLE = 1 - 1e-6  # share of a far face that counts as all of it: printed digits of a mesh file
+COUPLED = 0.02  # closing by shear over the tangential compliance, from which a note states it
+BENT = 0.02  # load over that under which a tall piece buckles; as much is missing from its sideways motion
+WHOLE = 1 - 1e-6  # fraction of a far face that counts as all of it, because a mesh file has few digits
 
 
 def probed(model) -> dict:

@@ -21,7 +21,7 @@ from .condensed import Pair, shared_pair, shared_pairs
 from .press import as_patch, with_linear_skin
 from .values import EdgeValues, peak_pressures, static_values
 
-BEYOND = 2  # cells beyond a contact on coarser cells in which the one on these may end
+BEYOND = 2  # cells beyond the end of a contact on coarser cells, in which it may end on these
 
 
 class SolvedPatch(NamedTuple):
@@ -200,7 +200,7 @@ def patches_on(patches, pair: Pair) -> list:
         with one_thread():
             level = pressed_on(asked_of([patches[k] for k in cases]), pair)
         for place, k in enumerate(cases):
-            if level.is_solved[place] and level.contacts.count[place] > one_by_one.POINT:
+            if level.is_solved[place] and level.contacts.count[place] > one_by_one.UNRESOLVED_NODES:
                 out[k] = _patch_of(patches[k], pair, level, place)
     return out
 
@@ -249,7 +249,7 @@ def pressed_together(asked: Asked, tolerance: float, pieces: list | None = None)
         theirs = () if pieces else _in_other_plane(asked, levels[1])
     fine, pair = levels[0], pairs[0]
     good = np.logical_and.reduce([level.is_solved for level in (*levels, *theirs)])
-    good &= (fine.contacts.count > one_by_one.POINT) & (not any(one.closing.any() for one in pairs))
+    good &= (fine.contacts.count > one_by_one.UNRESOLVED_NODES) & (not any(one.closing.any() for one in pairs))
     hidden = one_by_one.hidden_by_meshes(
         pair, _with_skin(first, pair), fine.contacts.force, fine.gap_range, first.moment is not None
     )
@@ -258,7 +258,7 @@ def pressed_together(asked: Asked, tolerance: float, pieces: list | None = None)
         one_by_one.least_of(hidden, fine.values),
         (first.mesh_tolerance or tolerance) if first.chosen else None,
         all(one_by_one.cells_halved(a, b) for a, b in pairwise(pairs)),
-        max(one_by_one.ALIKE, pair.rounding),
+        max(one_by_one.MIN_ERROR, pair.rounding),
     )
     return Together(
         found.values,

@@ -13,8 +13,8 @@ from ...slip import shear_modes
 from . import strips
 from .press import Patch
 
-LIKE = 2.0  # times less bent than its neighbour is still one smooth curve with it
-FINE = 4  # cells within the reach of the contact onto the rounding from which meshes show how its peak converges
+LIKE = 2.0  # a parabola that is so many times less bent than its neighbour is still one smooth curve with it
+ROUNDING_CELLS = 4  # so many cells within the reach of the contact onto a rounding show how its peak converges
 
 
 def peak_pressures(x, sigma, skin=None) -> np.ndarray:
@@ -218,7 +218,7 @@ def unresolved_rounding(patch: Patch) -> float:
         if abs(abs(x[at]) - flat) > 2 * cell:  # the contact ends elsewhere
             continue
         reach, peak = contact.rounded_corner(sigma[max(at - 2, 0):at + 3].max() * np.sqrt(cell), radius, modulus)
-        found = max(found, peak if FINE * cell > reach else 0.0)
+        found = max(found, peak if ROUNDING_CELLS * cell > reach else 0.0)
     return found
 
 
