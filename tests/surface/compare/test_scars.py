@@ -37,10 +37,10 @@ def test_always_a_standard_scar_stays_sharp():
 
 @COUNTS
 def test_always_a_wide_scar_has_both_readings_or_an_interval_near_the_truth(count):
-    """Headlines said that material grew, or that no wear was detected."""
+    """Headlines said that material grew, or that no wear was detected. Of all intervals 85 % hold at least."""
     heads, held, _ = score("wide", range(HELD_OUT, HELD_OUT + count))
     assert all(one.startswith(("worn", "a scar or")) for one in heads)
-    assert all(good >= given - 0.15 * count for good, given, _ in held.values())
+    assert sum(good for good, *_ in held.values()) >= 0.85 * sum(given for _, given, _ in held.values())
 
 
 def test_always_a_reading_never_has_a_largest_depth_below_its_mean():
@@ -83,7 +83,7 @@ def test_always_a_told_shift_does_not_make_worn_flanks_unworn():
     """A scar of 5.8 mm on 6 mm was given as one of 4.7 mm, with an interval without the truth."""
     traces, _ = parabola(5800)
     found = compared(*traces, straight=True, shift=0.0)
-    assert found.worn.mean.low == 0.0  # 50 samples of either flank do not tell a scar from a tilt
+    assert found.worn.mean.low <= 2 / 3 * 1.5 * UM * 5800 / 6000 <= found.worn.mean.high  # a parabola, 1.5 um deep
     found = compared(*traces, shift=0.0)
     assert found.worn.mean.value is None and "the datum" in found.worn.mean.reason
 
