@@ -494,7 +494,7 @@ def compare(*files: str | Path, direction: str = "", units: tuple[str, str] | No
         lost = worn_runs.compare_runs(*map(Path, files))
         return worn.data_of(lost, worn.verdict(lost))
     if pairs is None:
-        return compared_data.data_of(*verdict.judged(files, direction, **how))
+        return compared_data.data_of(*verdict.judge_files(files, direction, **how))
     if files:
         raise PatchfemError("compare: give either files or a table of pairs, not both")
     return pairs_data.data_of(pairs_data.answers(pairs_tables.read_pairs(_path(pairs, "compare: pairs")), direction,

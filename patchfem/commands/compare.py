@@ -85,7 +85,7 @@ def compare(before: Path | None = None, after: Path | None = None, /, *other: Pa
         _no_traces({"a third file": other, "--direction": direction, "--units": units, "--shift": shift,
                     "--keep-spikes": keep_spikes, "--datum": datum, "--scene": scene, "--set": set_})
         return _runs(before, after, out, json_)
-    parts, found, directions = verdict.judged(tuple(files), direction, **how)
+    parts, found, directions = verdict.judge_files(tuple(files), direction, **how)
     target = placed(out, f"{before.stem}-{after.stem}")
     with results.Folder(target) as folder:
         pressing = _pressed(scene, set_, parts[0], folder.path, quiet) if scene is not None else None

@@ -44,7 +44,8 @@ from patchfem.core import frozen_array
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.export.surfaces.compare import write_trace
 from patchfem.surface.compare.compare import compared, directions_of
-from patchfem.surface.compare.verdict import changed, verdicts
+from patchfem.surface.compare.sentences import describe_ratio_change
+from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile, level
 from patchfem.surface.roughness.report import report_of
 from patchfem.surface.roughness.spectrum import BAND, amplitude_of, spectrum_of
@@ -90,7 +91,7 @@ def cut(before, after, line: int) -> Set:
 def counts(sets: list) -> tuple:
     """How many sets are called reduced along x, along y, lower along x than along y after, and before."""
     ratios = [(*[part.amplitude_ratio for part in one.parts], one.across[1], one.across[0]) for one in sets]
-    return tuple(sum(changed(each[k]) == "reduced" for each in ratios) for k in range(4))
+    return tuple(sum(describe_ratio_change(each[k]) == "reduced" for each in ratios) for k in range(4))
 
 
 def held(sets: list, row) -> int:

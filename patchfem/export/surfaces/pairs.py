@@ -39,7 +39,7 @@ def answers(
     done : callable, optional
         Receives the fraction of the pairs that are done.
     **settings
-        units, shift, keep_spikes and datum of all files (`verdict.judged`).
+        units, shift, keep_spikes and datum of all files (`verdict.judge_files`).
 
     Returns
     -------
@@ -49,7 +49,7 @@ def answers(
 
     def answer(paths: tuple, own: str) -> dict:
         if not any(path.is_dir() for path in paths):
-            return compare.data_of(*verdict.judged(paths, own or direction, **settings))
+            return compare.data_of(*verdict.judge_files(paths, own or direction, **settings))
         if own or settings.get("shift") is not None:
             what = "a direction" if own else "a shift"
             raise PatchfemError(f"{what} can be given only for traces, not for results folders")

@@ -10,7 +10,9 @@ import pytest
 from pairs import KINDS, pair, track
 
 from patchfem.surface.compare.compare import compared
-from patchfem.surface.compare.verdict import EXCHANGED, _span, verdicts
+from patchfem.surface.compare.sentences import _span
+from patchfem.surface.compare.verdict import GREW as EXCHANGED
+from patchfem.surface.compare.verdict import verdicts
 
 HELD_OUT = 96000
 SHARES = (0.1, 0.3, 0.5)

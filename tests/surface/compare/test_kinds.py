@@ -14,7 +14,8 @@ from worn_kinds import made
 from patchfem.core import frozen_array
 from patchfem.surface.compare.compare import compared
 from patchfem.surface.compare.section import widths_of
-from patchfem.surface.compare.verdict import EXCHANGED, verdicts
+from patchfem.surface.compare.verdict import GREW as EXCHANGED
+from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile, despiked
 
 HELD_OUT = 52000

@@ -9,7 +9,8 @@ from patchfem.core import PatchfemError, frozen_array
 from patchfem.surface.areal import Areal
 from patchfem.surface.compare.compare import _waves, bridged, compared, directions_of
 from patchfem.surface.compare.ratios import Size, ratio, size_of
-from patchfem.surface.compare.verdict import changed, confidence, verdicts
+from patchfem.surface.compare.sentences import confidence_of, describe_ratio_change
+from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile
 from patchfem.surface.quantity import Quantity
 
@@ -22,7 +23,7 @@ def test_always_unchanged_surfaces_are_called_reduced_in_5_of_100_cases_at_most(
     seeds = range(70000, 70000 + count)
     sizes = [[size_of(pair(seed + part, share=0.0).before, UM) for part in (0, 5000)] for seed in seeds]
     found = [ratio("amplitude", "", *two) for one in sizes for two in (one, one[::-1])]
-    words = [changed(one) for one in found]
+    words = [describe_ratio_change(one) for one in found]
     most = max(count // 10, 1)
     assert words.count("reduced") <= most and words.count("increased") <= most
     values = np.quantile([one.value for one in found], (0.05, 0.95))
@@ -40,7 +41,7 @@ def test_always_unchanged_surfaces_in_one_place_are_called_reduced_in_5_of_100_c
     for seed in range(30100, 30100 + count):
         p = pair(seed, share=0.0)
         one = compared(p.before, p.after)
-        words.append(changed(one.amplitude_ratio))
+        words.append(describe_ratio_change(one.amplitude_ratio))
         widths.append(one.amplitude_ratio.high / one.amplitude_ratio.low)
     most = 4 if count == 40 else 1  # 5 or more of 40 at 2.5 %: one in 300; 2 or more of 5: one in 160
     assert words.count("reduced") <= most and np.median(widths) < 1.01
@@ -63,8 +64,8 @@ def test_exact_intervals_of_fisher_and_of_pitman():
 
 
 def test_exact_confidence_of_an_interval_that_just_reaches_one():
-    assert confidence(Quantity(0.5, 0.25, 1.0, "1", "")) == pytest.approx(0.95, abs=1e-6)
-    assert changed(Quantity(0.5, 0.25, 1.0, "1", "")) == "no change shown"
+    assert confidence_of(Quantity(0.5, 0.25, 1.0, "1", "")) == pytest.approx(0.95, abs=1e-6)
+    assert describe_ratio_change(Quantity(0.5, 0.25, 1.0, "1", "")) == "no change shown"
 
 
 def test_always_wear_of_peaks_is_called_reduced():
@@ -86,7 +87,7 @@ def test_always_an_areal_scan_shows_which_direction_is_smoother():
     flat = tuple(map(bridged, (before, after)))  # no search for a place, which they do not share
     parts = [_waves(before, after, flat, name) for name in ("x", "y")]
     found = directions_of(parts)
-    assert [changed(one[1]) for one in found] == ["no change shown", "increased"]
+    assert [describe_ratio_change(one[1]) for one in found] == ["no change shown", "increased"]
     text = verdicts(parts, found)[1]
     assert text[-2].startswith("Before: no anisotropy shown") and text[-1].startswith("After: anisotropic")
     assert "larger along x" in text[-1] and parts[0].worn.mean.value is None

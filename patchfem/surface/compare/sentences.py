@@ -1,0 +1,274 @@
+"""Sentences of a comparison: wear, tracks, what the depth counts from, waves and slopes, directions."""
+
+import numpy as np
+
+from ...core import say
+from ...scales import plain
+from ..areal import Areal
+from ..profile import Profile
+from ..quantity import SIDE, Quantity
+from ..scans import change as scans
+from .compare import Comparison, identical
+from .readings import describe_other
+from .reference import area_of_bow, describe_hidden_wear, describe_reference
+
+MIN_DEPOSITED = 0.05  # of the worn area, from which material above the first trace is named
+ROUNDING = 1e-6  # distance of a ratio from 1 that is rounding
+SQUARE_UM = 1e12  # um^2 in a m^2
+
+
+def describe_comparisons(parts: list, directions: list) -> list:
+    """Return the sentences of one or two comparisons.
+
+    Parameters
+    ----------
+    parts : list of Comparison
+    directions : list
+        As `directions_of` returns it.
+    """
+    out = []
+    change = parts[0].change
+    if change is not None:
+        if identical(parts[0].before, parts[0].after):
+            out.append("The heights of both scans are the same; was the same file given twice?")
+        out += scans.sentences(change)
+    for part in parts:
+        name = f" along {part.direction}" if part.direction else ""
+        if not isinstance(part.before, Areal):
+            out += _wear_of_traces(part, name)
+        out += _waves(part, name)
+        out += _beside_wear(part)
+    return out + [_compare_directions(*each) for each in directions]
+
+
+def describe_ratio_change(ratio: Quantity) -> str:
+    """Return the change that a ratio of after over before shows: reduced, increased, none, or not known."""
+    if ratio.value is None:
+        return "not known"
+    if ratio.high < 1 - ROUNDING:
+        return "reduced"
+    return "increased" if ratio.low > 1 + ROUNDING else "no change shown"
+
+
+def confidence_of(ratio: Quantity) -> float:
+    """Return the confidence [1] at which the interval of a ratio just reaches 1, by its width in the logarithm."""
+    from scipy.special import ndtr
+
+    end = ratio.high if ratio.value < 1 else ratio.low
+    error = abs(np.log(end / ratio.value)) / SIDE
+    return float(2 * ndtr(abs(np.log(ratio.value)) / error) - 1) if error > 0 else 1.0
+
+
+def _describe_confidence(ratio: Quantity) -> str:
+    percent = 100 * confidence_of(ratio)
+    if percent > 99.9:
+        return "with more than 99.9 % confidence"
+    return f"with {np.floor(percent * 10) / 10:.3g} % confidence"
+
+
+def is_sure(mean: Quantity) -> bool:
+    """Whether a mean depth is known to be above zero."""
+    return mean.value is not None and mean.low > 0
+
+
+def is_elsewhere(part: Comparison) -> bool:
+    """Whether two traces have no place in common."""
+    return isinstance(part.before, Profile) and part.registration is None
+
+
+def is_gain(part: Comparison) -> bool:
+    """Whether all heights changed by one factor, and waves or slopes with them."""
+    changes = {describe_ratio_change(part.amplitude_ratio), describe_ratio_change(part.slope_ratio)}
+    return part.gain is not None and bool(changes & {"reduced", "increased"})
+
+
+def _wear_of_traces(part: Comparison, name: str) -> list:
+    """Return what two traces show of wear; name: their direction in words."""
+    out = []
+    if part.mirrored:
+        out.append(
+            f"The second trace{name} was measured in the opposite direction; the trace was mirrored here, so "
+            "its x counts from the other end."
+        )
+    out.append(_describe_wear(part, name))
+    if is_elsewhere(part) and part.worn.mean.value is not None:
+        out.append(f"Comparison place by place{name}: not available; {part.shift.reason}.")
+    out += _describe_datum(part)
+    out += _describe_other_tracks(part)
+    return out if part.open else out + describe_other(part.registration)
+
+
+def _describe_wear(part: Comparison, name: str) -> str:
+    """Return how deep the second trace is worn, or why that is not known."""
+    if identical(part.before, part.after):
+        return f"Worn depth{name}: none; the heights before and after wear are the same."
+    mean = part.worn.mean
+    above = _describe_deposits(part)
+    if part.reference == "place" and not part.reference_by.by and not part.open:
+        seen = "" if part.visible is None else f" {describe_visible_depth(part.visible)}"
+        hidden = describe_hidden_wear(part.registration, part.hidden)
+        return f"Worn depth{name}: no wear detected.{above}{seen} {hidden}"
+    if mean.value is None:
+        return f"Worn depth{name}: not available; {mean.reason}."
+    if not is_sure(mean):
+        return f"Worn depth{name}: no wear detected; at most {say(mean.high)} on average.{above}"
+    over = "over the common length"
+    if part.reference == "flanks":
+        over = "over the track, measured from its unworn flanks"
+    text = (
+        f"Worn{name}: {_describe_track(part)}{_interval(mean)} on average {over}, "
+        f"{_interval(part.worn.largest)} at the deepest place.{above}"
+    )
+    return text if part.worn.extent is None or part.tracks.sizes else text + _describe_extent(part)
+
+
+def _describe_deposits(part: Comparison) -> str:
+    """Return how much material lies above the first trace, "" for little."""
+    deposited = part.worn.deposited
+    if deposited <= 0 or deposited <= MIN_DEPOSITED * (part.worn.area.value or 0.0):
+        return ""
+    cause = "deposits, or the two files are in the wrong order" if part.exchanged else "deposits or pile-up"
+    return (
+        f" {SQUARE_UM * deposited:.3g} um^2 of material lie above the first trace (before wear): there are {cause}."
+    )
+
+
+def _describe_extent(part: Comparison) -> str:
+    """Return from where to where a trace is worn that has no track."""
+    before, after = (_span(*(end.value for end in ends)) for ends in part.worn.extent[:2])
+    text = f" Worn from x = {before} in the first trace (before wear), that is from {after} in the second"
+    within = part.worn.within
+    if within is None:
+        return text + "."
+    return f"{text}, with a depth of {_interval(within)} on average between these places."
+
+
+def _describe_datum(part: Comparison) -> list:
+    """Return what the depth counts from, and a bow that was taken out."""
+    if part.registration is None or not part.reference_by.by:
+        return []
+    out = [describe_reference(part.reference_by)]
+    bend = part.registration.bend
+    if bend:
+        out.append(
+            f"A curvature (bow) of {say(abs(bend), 3)} over the common length was subtracted, because a bent "
+            f"datum and wear of that shape{area_of_bow(part.registration)} look alike."
+        )
+    return out
+
+
+def _describe_other_tracks(part: Comparison) -> list:
+    """Return each track beside the longest one; `compare.json` has all of their sizes."""
+    others = part.tracks.others
+    if not others:
+        return []
+    out = [f"{len(others) + 1} tracks were found; the first sentence and the table describe the longest one."]
+    for sizes in others:
+        area = plain(SQUARE_UM * sizes["area_gross"].value, 4)
+        out.append(f"Worn, too: {_describe_sizes(sizes)}the area lost in this track is {area} um^2.")
+    return out
+
+
+def _describe_track(part: Comparison) -> str:
+    """Return the longest track as the beginning of a sentence, "" without one."""
+    if part.flanks is not None:
+        span = _span(part.flanks.start, part.flanks.end)
+        return f"a track from about x = {span} in the second trace (after wear); "
+    return _describe_sizes(part.tracks.sizes)
+
+
+def _describe_sizes(sizes: dict) -> str:
+    """Return a track by its sizes as the beginning of a sentence, "" without one."""
+    if not sizes:
+        return ""
+    start, end = sizes["from"].value, sizes["to"].value
+    depths = f"{_interval(sizes['depth_mean'])} deep on average, its floor {_interval(sizes['depth_floor'])}; "
+    if start is not None and end is not None:
+        return f"a track from x = {_span(start, end)} in the second trace (after wear), {depths}"
+    first = "the beginning of the common part" if start is None else f"x = {say(start, 4)}"
+    last = "the end of the common part" if end is None else f"x = {say(end, 4)}"
+    return (
+        f"a track from {first} to {last} in the second trace (after wear), so the track may be longer than the "
+        f"{say(sizes['width'].value)} that both traces show of it; there {depths}"
+    )
+
+
+def _beside_wear(part: Comparison) -> list:
+    """Return what stands beside the wear: edges that the ratios leave out, and a new valley."""
+    out = []
+    if part.tracks.spans or part.flanks is not None:
+        out.append("Amplitude and slope are computed without the edges of the track.")
+    if part.tracks.valley is not None:
+        place, depth = part.tracks.valley
+        out.append(
+            f"A valley {say(depth, 3)} deep at x = {say(place, 4)} is only in the second trace (after wear), "
+            "such as a scratch or a pit; the worn depths include this valley."
+        )
+    return out
+
+
+def _waves(part: Comparison, name: str) -> list:
+    """Return how waves and slopes changed."""
+    if isinstance(part.before, Areal) and not part.sizes:
+        return [f"Waves{name}: not available; {part.amplitude_ratio.reason}."]
+    out = [_describe_amplitude(part.amplitude_ratio, name), _describe_slope(part.slope_ratio, name)]
+    if is_gain(part):
+        out.append(
+            f"All heights{name} after wear are {part.gain:.4g} times the heights before; a difference in the gain of "
+            "the instrument explains this factor, but wear does not; calibrate z of both measurements."
+        )
+    return out
+
+
+def _describe_amplitude(ratio: Quantity, name: str) -> str:
+    if ratio.value is None:
+        return f"Amplitude{name}: {ratio.reason}."
+    start = f"The waves of the band{name} have {_range(ratio)} times their amplitude before wear: "
+    word = describe_ratio_change(ratio)
+    if word == "no change shown":
+        return start + "the interval contains 1, so no change is shown."
+    return f"{start}{word}, {_describe_confidence(ratio)}."
+
+
+def _describe_slope(ratio: Quantity, name: str) -> str:
+    if ratio.value is None:
+        return f"Slope{name}: {ratio.reason}."
+    word = {"reduced": "flatter", "increased": "steeper"}.get(describe_ratio_change(ratio))
+    shown = "no change is shown" if word is None else f"{word}, {_describe_confidence(ratio)}"
+    return f"The slope{name} is {_range(ratio)} times the slope before wear: {shown}."
+
+
+def _compare_directions(when: str, amplitude: Quantity, slope: Quantity) -> str:
+    """Return how waves and slopes along x differ from those along y."""
+    texts = []
+    for name, ratio in (("amplitude", amplitude), ("slope", slope)):
+        if ratio.value is None:
+            continue
+        word = {"reduced": "smaller", "increased": "larger"}.get(describe_ratio_change(ratio))
+        shown = "no difference is shown" if word is None else f"{word} along x, {_describe_confidence(ratio)}"
+        texts.append(f"{name} along x divided by that along y = {_range(ratio)}: {shown}")
+    is_anisotropic = describe_ratio_change(amplitude) in ("reduced", "increased")
+    found = "anisotropic" if is_anisotropic else "no anisotropy shown"
+    return f"{when[0].upper() + when[1:]}: {found}; {'; '.join(texts)}."
+
+
+def describe_visible_depth(depth: float) -> str:
+    """Return from which mean depth [m] a track would have been found, as a sentence."""
+    return (
+        "A track over the middle third of the common length, with both of its flanks unworn, would have been found "
+        f"from a mean depth of {say(depth, 2)} on."
+    )
+
+
+def _interval(length: Quantity) -> str:
+    return f"{say(length.value)} ({say(length.low)} to {say(length.high)})"
+
+
+def _range(ratio: Quantity) -> str:
+    return f"{ratio.value:.3g} ({ratio.low:.3g} to {ratio.high:.3g})"
+
+
+def _span(first: float, last: float) -> str:
+    """Return two places [m] as words, both to the last of four digits of the farther one."""
+    step = 10.0 ** (np.floor(np.log10(max(abs(first), abs(last), 1e-12))) - 3)
+    return " to ".join(say(float(np.round(place / step)) * step) for place in (first, last))
