@@ -15,6 +15,8 @@ from .robust import BIWEIGHT, REACH
 
 N_DRAWS = 200  # draws of the bootstrap: a standard deviation is known to 5 %
 TRUNCATED_VARIANCE = 0.911  # variance of normal noise that is cut off at REACH
+MAX_BLOCKS = 8  # blocks of a trace: fewer, longer ones would show slower errors, but their number is too small
+N_DATUM = 2  # offset and tilt, which the fit takes from the slow errors of the unworn heights
 SEED = 1989
 
 
@@ -53,7 +55,9 @@ def noise_along(depth, unworn, slope, curvature, least: float) -> np.ndarray:
     variance = np.full(depth.size, start)
     for _ in range(3):
         weight = 1 / variance[used]
-        found = nnls(columns[used] * weight[:, None], depth[used] ** 2 * weight / TRUNCATED_VARIANCE)[0]
+        found = nnls(
+            columns[used] * weight[:, None], depth[used] ** 2 * weight / TRUNCATED_VARIANCE
+        )[0]
         variance = np.maximum(columns @ found, least**2)
         used = unworn & (depth**2 <= (REACH + 0.5) ** 2 * variance)
         if used.sum() < 30:
@@ -106,12 +110,13 @@ def draw_blocks(values, length: int, count: int) -> np.ndarray:
 
 
 def block_length(correlation: float, count: int) -> int:
-    """Return the block length, of order count^(1/3).
+    """Return the block length, of order count^(1/3), but an eighth of the values at least.
 
     It is twice the length of least mean square error, as intervals suffer more from blocks that are
-    too short (variance too small) than from few blocks (`student_factor`).
+    too short (variance too small) than from few blocks (`student_factor`). An instrument drifts by
+    less than the noise of a height over lengths as that of a scar; blocks of an eighth show it.
     """
-    return int(np.ceil(2 * correlation ** (2 / 3) * count ** (1 / 3)))
+    return max(int(np.ceil(2 * correlation ** (2 / 3) * count ** (1 / 3))), count // MAX_BLOCKS)
 
 
 def student_factor(blocks: float) -> float:
@@ -139,7 +144,10 @@ def draw_errors(depth, noise, unworn, jacobian, doubt) -> DrawnErrors:
     values = values / max(float(values.std()), 1e-300)
     correlation = correlation_length(np.where(unworn, relative, 0.0), unworn)
     length = block_length(correlation, values.size)
-    own = draw_blocks(values, length, depth.size) * student_factor(values.size / max(length, correlation))
+    n_blocks = values.size / max(length, correlation)
+    freedom = max(n_blocks - N_DATUM, 1.0)  # the datum was fitted to the same blocks
+    widening = student_factor(freedom + 1) * np.sqrt(n_blocks / freedom)
+    own = draw_blocks(values, length, depth.size) * widening
     off = own[:, unworn] / BIWEIGHT
     inside = np.clip(1 - off**2, 0, None)
     influence = BIWEIGHT * off * inside**2

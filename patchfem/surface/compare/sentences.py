@@ -127,10 +127,12 @@ def _describe_deposits(part: Comparison) -> str:
     deposited = part.worn.deposited
     if deposited <= 0 or deposited <= MIN_DEPOSITED * (part.worn.area.value or 0.0):
         return ""
-    cause = "deposits, or the two files are in the wrong order" if part.exchanged else "deposits or pile-up"
-    return (
-        f" {SQUARE_UM * deposited:.3g} um^2 of material lie above the first trace (before wear): there are {cause}."
+    cause = (
+        "deposits, or the two files are in the wrong order"
+        if part.exchanged
+        else "deposits or pile-up"
     )
+    return f" {SQUARE_UM * deposited:.3g} um^2 of material lie above the first trace (before wear): there are {cause}."
 
 
 def _describe_extent(part: Comparison) -> str:
@@ -162,10 +164,14 @@ def _describe_other_tracks(part: Comparison) -> list:
     others = part.tracks.others
     if not others:
         return []
-    out = [f"{len(others) + 1} tracks were found; the first sentence and the table describe the longest one."]
+    out = [
+        f"{len(others) + 1} tracks were found; the first sentence and the table describe the longest one."
+    ]
     for sizes in others:
         area = plain(SQUARE_UM * sizes["area_gross"].value, 4)
-        out.append(f"Worn, too: {_describe_sizes(sizes)}the area lost in this track is {area} um^2.")
+        out.append(
+            f"Worn, too: {_describe_sizes(sizes)}the area lost in this track is {area} um^2."
+        )
     return out
 
 
@@ -245,7 +251,11 @@ def _compare_directions(when: str, amplitude: Quantity, slope: Quantity) -> str:
         if ratio.value is None:
             continue
         word = {"reduced": "smaller", "increased": "larger"}.get(describe_ratio_change(ratio))
-        shown = "no difference is shown" if word is None else f"{word} along x, {_describe_confidence(ratio)}"
+        shown = (
+            "no difference is shown"
+            if word is None
+            else f"{word} along x, {_describe_confidence(ratio)}"
+        )
         texts.append(f"{name} along x divided by that along y = {_range(ratio)}: {shown}")
     is_anisotropic = describe_ratio_change(amplitude) in ("reduced", "increased")
     found = "anisotropic" if is_anisotropic else "no anisotropy shown"

@@ -124,8 +124,12 @@ def _find_headline(parts: list) -> str:
     if readings:
         headline = "no change detected in the waves" if headline == NO_CHANGE else headline
         headline = f"{readings[0]}; {headline}"
-    if any(is_gain(part) and describe_ratio_change(part.amplitude_ratio) != NO_CHANGE for part in parts):
-        headline += ", all heights by the same factor, as an error in the instrument's gain would do"
+    if any(
+        is_gain(part) and describe_ratio_change(part.amplitude_ratio) != NO_CHANGE for part in parts
+    ):
+        headline += (
+            ", all heights by the same factor, as an error in the instrument's gain would do"
+        )
     variant = _describe_variant(parts)
     return f"{headline}; {variant}" if variant else headline
 
@@ -134,5 +138,8 @@ def _describe_variant(parts: list[Comparison]) -> str:
     """Return what was mirrored or inverted, "" for nothing."""
     if parts[0].change is not None:
         return scans.describe_variant(parts[0].change)
-    return "one trace is mirrored relative to the other" if any(part.mirrored for part in parts) else ""
-
+    return (
+        "one trace is mirrored relative to the other"
+        if any(part.mirrored for part in parts)
+        else ""
+    )
