@@ -293,7 +293,7 @@ def _step_remedy(found: Finding, name: str, excess: dict, steps: int) -> str:
         )
         exact = f'{pinned}set accuracy.method = "exact", which has no steps'
     if order is None:
-        return f"{_no_order(name, steps)}; {exact or _default_steps(model, steps, excess)}"
+        return f"{_no_order(name, steps)}{_remedy_without_order(model, steps, excess, exact)}"
     total = sum(part.get(name, 0.0) for part in parts["parts"].values())
     of_steps = parts["parts"].get("steps", {}).get(name, 1.0)
     allowed = total / excess[name]
@@ -306,20 +306,26 @@ def _step_remedy(found: Finding, name: str, excess: dict, steps: int) -> str:
 
 def _no_order(name: str, steps: int) -> str:
     return (
-        f"the steps per cycle were doubled twice, up to {steps}, and the second doubling changed {name} at least as "
-        "much as the first, so more steps may not help"
+        f"the steps per cycle were doubled twice, up to {steps}, and the second doubling changed "
+        f"{name} at least as much as the first"
     )
 
 
-def _default_steps(model, steps: int, excess: dict) -> str:
-    """Return that a run chooses its steps, which are doubled until the displacement meets the tolerance, if it may."""
+def _remedy_without_order(model, steps: int, excess: dict, exact: str) -> str:
+    """Return what helps a run whose measures do not converge with its steps.
+
+    Steps that are left out are doubled until the displacement meets the tolerance.
+    """
+    if exact:
+        return f", so more steps may not help; {exact}"
     is_pinned = model.kind == "rig" and model.accuracy.steps_per_cycle is not None
-    if is_pinned and 2 * steps <= costs.MOST_STEPS and "relative_displacement_amplitude" in excess:
+    may_double = is_pinned and 2 * steps <= costs.MOST_STEPS
+    if may_double and "relative_displacement_amplitude" in excess:
         return (
-            "leave out accuracy.steps_per_cycle, so that patchfem doubles the number of steps until the displacement "
-            "meets the tolerance"
+            "; leave out accuracy.steps_per_cycle, so that patchfem doubles the number of steps "
+            "until the displacement meets the tolerance"
         )
-    return USE_ERROR
+    return f", so more steps may not help; {USE_ERROR}"
 
 
 def _end_remedy(cycles: float, steps: int) -> str:
