@@ -122,10 +122,9 @@ def lines_of(parts: list, verdict: tuple, pressed: Pressed | None = None) -> lis
         out += _table(part).lines()
     if pressed is not None:
         out += ["", f"{pressed.title}, pressed with each surface"]
-        rows = [
-            (words, _format_measure(name, first), _format_measure(name, second))
-            for name, words, first, second in pressed.rows()
-        ]
+        rows = []
+        for name, words, first, second in pressed.rows():
+            rows.append((words, _format_measure(name, first), _format_measure(name, second)))
         out += sides_lines(rows)
         out += [f"  {text}" for text in (*pressed.failed, *pressed.lacking)]
     return out
@@ -133,9 +132,10 @@ def lines_of(parts: list, verdict: tuple, pressed: Pressed | None = None) -> lis
 
 def sides_lines(rows: list) -> list:
     """Return (words, text before, text after) of several measures as lines of a table."""
-    return [
-        f"  {words:<38} {first:>24} {second:>24}" for words, first, second in [("", *SIDES), *rows]
-    ]
+    out = []
+    for words, first, second in [("", *SIDES), *rows]:
+        out.append(f"  {words:<38} {first:>24} {second:>24}")
+    return out
 
 
 def _format_measure(name: str, measure) -> str:
@@ -314,10 +314,9 @@ def page(parts: list, verdict: tuple, directions: list = (), pressed: Pressed | 
     names = [Path(surface.source).name for surface in (parts[0].before, parts[0].after)]
     sections = []
     if directions:
-        ratios = [
-            f"{when} {' '.join(format_quantity(amplitude)[:2])}"
-            for when, amplitude, _ in directions
-        ]
+        ratios = []
+        for when, amplitude, _ in directions:
+            ratios.append(f"{when} {' '.join(format_quantity(amplitude)[:2])}")
         crossed = figure(
             "xy",
             pictures.crossed(parts, directions),
@@ -476,16 +475,15 @@ def _levelled_heights(surface) -> np.ndarray:
 
 def _pressed_html(pressed: Pressed) -> str:
     """Return the measures and pressures of a scene with each surface as HTML."""
-    runs = [
-        (name, run) for name, run in zip(SIDES, (pressed.before, pressed.after)) if run is not None
-    ]
+    runs = zip(SIDES, (pressed.before, pressed.after))
+    runs = [(name, run) for name, run in runs if run is not None]
     warnings = [f"{name}: {text}" for name, run in runs for text in run.warnings]
     parts = [warned([*pressed.failed, *warnings])]
     if runs:
-        peaks = [
-            f"{name} {_format_measure('pressure_peak', run.measures.get('pressure_peak'))}"
-            for name, run in runs
-        ]
+        peaks = []
+        for name, run in runs:
+            peak = run.measures.get("pressure_peak")
+            peaks.append(f"{name} {_format_measure('pressure_peak', peak)}")
         drawn = pictures.pressures(
             [pictures.PressedSide(run.x, run.stress, name) for name, run in runs]
         )

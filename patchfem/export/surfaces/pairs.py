@@ -12,7 +12,7 @@ from ...surface.compare import pairs, verdict
 from ..pages.document import Section, document, figure, prose, table, warned
 from . import compare, worn
 from .pictures import PairsPanel, each_and_mean
-from .quantities import UNITS, QuantityTable, Row, format_quantity
+from .quantities import UNITS, QuantityTable, Row, csv_columns, format_quantity
 from .worn_runs import compare_runs
 
 TRACE_NUMBERS = ("worn_depth_mean", "amplitude_ratio")  # main quantities of two traces
@@ -112,26 +112,21 @@ def _title(group: str, direction: str, kind: str) -> str:
 def write_csv(rows: list, path: Path) -> None:
     """Write a line for each pair: cells, outcome, verdict, message, quantities in SI."""
     quantities = [pairs.numbers_of(row) for row in rows]
-    units = {name: quantity["unit"] for each in quantities for name, quantity in each.items()}
+    columns = csv_columns(quantities)
     before = ("before", "after", "direction")
     after = ("outcome", "verdict", "message")
-    labels = dict.fromkeys(label for row in rows for label in row["labels"])
-    labels = [label for label in labels if label not in (*before, *after, *units)]
-    columns = [(name, key) for name in units for key in ("value", "low", "high")]
-    heads = [
-        f"{name}{'' if key == 'value' else f'_{key}'} [{units[name]}]" for name, key in columns
-    ]
-    lines = [[*before, *labels, *after, *heads]]
+    labels = {}
+    names = set()
     for row, own in zip(rows, quantities):
-        numbers = [own.get(name, {}).get(key) for name, key in columns]
-        lines.append(
-            [
-                *(row[name] or "" for name in before),
-                *(row["labels"].get(label, "") for label in labels),
-                *(row.get(name, "") for name in after),
-                *("" if number is None else repr(number) for number in numbers),
-            ]
-        )
+        labels |= row["labels"]
+        names |= own.keys()
+    labels = [label for label in labels if label not in (*before, *after, *names)]
+    lines = [[*before, *labels, *after, *columns.heads]]
+    for row, cells in zip(rows, columns.cells):
+        first = [row[name] or "" for name in before]
+        first += [row["labels"].get(label, "") for label in labels]
+        first += [row.get(name, "") for name in after]
+        lines.append([*first, *cells])
     write_rows(path, lines)
 
 

@@ -483,12 +483,9 @@ def each_and_mean(panels: list) -> str:
     for panel in panels:
         mean = panel.mean
         known = {number: value for number, value in panel.values.items() if value.value is not None}
-        bounds = [
-            bound
-            for value in known.values()
-            for bound in (value.low, value.high)
-            if bound is not None
-        ]
+        bounds = []
+        for value in known.values():
+            bounds += [bound for bound in (value.low, value.high) if bound is not None]
         unit, scale = ("", 1.0) if mean.unit == "1" else axis_unit(bounds, mean.unit)
         ends = np.array([min(panel.values) - 0.5, max(panel.values) + 0.5])
         low, middle, high = (

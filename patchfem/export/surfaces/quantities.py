@@ -1,6 +1,7 @@
 """Quantities as text, and tables of quantities for the screen and for a page."""
 
 from html import escape
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -86,6 +87,30 @@ def quantity_data(quantity: Quantity) -> dict:
         "unit": quantity.unit,
     }
     return data if quantity.value is not None else {**data, "reason": quantity.reason}
+
+
+class CsvColumns(NamedTuple):
+    """Heads of the columns of several tables of quantities, and the cells of each table."""
+
+    heads: list
+    cells: list
+
+
+def csv_columns(tables: list) -> CsvColumns:
+    """Return each quantity with its bounds in SI as columns, "" for a missing number.
+
+    tables: dicts of name -> {value, low, high, unit}.
+    """
+    units = {}
+    for quantities in tables:
+        units |= {name: data["unit"] for name, data in quantities.items()}
+    columns = list(product(units, (("value", ""), ("low", "_low"), ("high", "_high"))))
+    heads = [f"{name}{suffix} [{units[name]}]" for name, (_, suffix) in columns]
+    cells = []
+    for quantities in tables:
+        numbers = [quantities.get(name, {}).get(key) for name, (key, _) in columns]
+        cells.append(["" if number is None else repr(number) for number in numbers])
+    return CsvColumns(heads, cells)
 
 
 class Row(NamedTuple):

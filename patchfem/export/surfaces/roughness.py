@@ -17,7 +17,7 @@ from ..pages.document import Section, document, figure, prose, table, warned
 from . import asperities, pictures
 from .areal import write_columns, write_profile, write_x3p
 from .pictures import Picture
-from .quantities import QuantityTable, Row, format_quantity
+from .quantities import QuantityTable, Row, csv_columns, format_quantity
 
 LATERAL = (
     "PSm",
@@ -216,18 +216,11 @@ def means_data(reports: list) -> list:
 
 def write_csv(path: Path, reports: list) -> None:
     """Write a row for each file: its parameters and their bounds in SI, "" if missing."""
-    units = {value.name: value.unit for report in reports for value in report.values}
-    columns = [(name, field) for name in units for field in ("value", "low", "high")]
-    head = ["file"]
-    for name, field in columns:
-        head.append(f"{name}{'' if field == 'value' else f'_{field}'} [{units[name]}]")
-    lines = [head]
-    for report in reports:
-        values = {value.name: value for value in report.values}
-        numbers = [getattr(values.get(name), field, None) for name, field in columns]
-        lines.append(
-            [report.source, *("" if number is None else repr(number) for number in numbers)]
-        )
+    tables = [{value.name: value._asdict() for value in report.values} for report in reports]
+    columns = csv_columns(tables)
+    lines = [["file", *columns.heads]]
+    for report, cells in zip(reports, columns.cells):
+        lines.append([report.source, *cells])
     write_rows(path, lines)
 
 
