@@ -319,7 +319,7 @@ def page(parts: list, verdict: tuple, directions: list = (), pressed: Pressed | 
             ratios.append(f"{when} {' '.join(format_quantity(amplitude)[:2])}")
         crossed = figure(
             "xy",
-            pictures.crossed(parts, directions),
+            pictures.draw_directions(parts, directions),
             "Left: spectra of both directions. Right: amplitude of the band along x divided by "
             "that along y, and slope along x divided by that along y, with their 95 % intervals; "
             "the value 1 means that the surface is equally rough in both directions.",
@@ -361,13 +361,13 @@ def _pictures(part: Comparison) -> list:
             "Each trace is drawn about its own least-squares line. No common place was found in "
             "the two traces."
         )
-        drawn = pictures.apart(part.before, part.after)
+        drawn = pictures.draw_separate(part.before, part.after)
         out.append(Picture(drawn, caption, "Traces before and after, one above the other"))
     if part.flanks is not None:
         flanks = part.flanks
         out.append(
             Picture(
-                pictures.difference(flanks.x, flanks.depth, ends=(flanks.start, flanks.end)),
+                pictures.draw_depth(flanks.x, flanks.depth, ends=(flanks.start, flanks.end)),
                 "The curve is the depth of the second trace (after wear) below the line through "
                 "its unworn flanks.",
                 f"Depth of the wear track: largest {format_quantity(part.worn.largest).short}",
@@ -383,7 +383,7 @@ def _pictures(part: Comparison) -> list:
             datum = "the line of the first trace (before wear)"
         out.append(
             Picture(
-                pictures.both_statistics(heights, spectra, BAND),
+                pictures.draw_both_statistics(heights, spectra, BAND),
                 f"Left: Abbott curves about {datum}. Right: spectra with their 95 % bands.",
                 "Abbott curves and spectra: amplitude ratio "
                 f"{format_quantity(part.amplitude_ratio).value}",
@@ -404,13 +404,13 @@ def _aligned_pictures(part: Comparison) -> list:
     found = part.registration
     worn = np.where(found.depth > 3 * found.noise, found.depth, 0.0)
     both = Picture(
-        pictures.overlay(found.x, *_aligned_heights(part), worn),
+        pictures.draw_aligned(found.x, *_aligned_heights(part), worn),
         "The trace measured after wear, moved by shift, tilt and offset, is drawn over the trace "
         "measured before.",
         f"Both traces after alignment: mean worn depth {format_quantity(part.worn.mean).short}",
     )
     depth = Picture(
-        pictures.difference(found.x, found.depth, used=found.unworn),
+        pictures.draw_depth(found.x, found.depth, used=found.unworn),
         "The curve is the depth of the second trace (after wear) below the first trace (before "
         "wear). Blue: the unworn heights to which shift, tilt and offset were fitted.",
         f"Worn depth along the trace: largest {format_quantity(part.worn.largest).short}",
@@ -426,7 +426,7 @@ def _scan_pictures(change: Change) -> list:
     second = first - depth
     out = [
         Picture(
-            pictures.maps(x, y, (first, second, depth)),
+            pictures.draw_maps(x, y, (first, second, depth)),
             "Left and middle: the first scan (before wear) and the second scan (after wear), "
             "aligned with the first; heights are measured from the reference plane of the first "
             "scan; white: no height. Right: depth of the second scan below the first; missing "
@@ -440,7 +440,7 @@ def _scan_pictures(change: Change) -> list:
     heights = (first.ravel()[known], second.ravel()[known])
     out.append(
         Picture(
-            pictures.both_heights(heights),
+            pictures.draw_both_heights(heights),
             "Left: fraction of the heights in each class. Right: Abbott curves. Heights are those "
             "of the region common to both scans, measured from the reference plane of the first "
             "scan (before wear).",
@@ -451,7 +451,7 @@ def _scan_pictures(change: Change) -> list:
         values = change.track.values
         out.append(
             Picture(
-                pictures.mean_section(change.track, values["from"].value, values["to"].value),
+                pictures.draw_mean_section(change.track, values["from"].value, values["to"].value),
                 f"Mean of {change.track.sections} sections across the track. The band extends one "
                 "standard deviation of the sections above and below the mean. The track lies "
                 "between the lines.",
@@ -484,7 +484,7 @@ def _pressed_html(pressed: Pressed) -> str:
         for name, run in runs:
             peak = run.measures.get("pressure_peak")
             peaks.append(f"{name} {_format_measure('pressure_peak', peak)}")
-        drawn = pictures.pressures(
+        drawn = pictures.draw_pressures(
             [pictures.PressedSide(run.x, run.stress, name) for name, run in runs]
         )
         caption = (

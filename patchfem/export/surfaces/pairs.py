@@ -11,7 +11,7 @@ from ...scales import plain
 from ...surface.compare import pairs, verdict
 from ..pages.document import Section, document, figure, prose, table, warned
 from . import compare, worn
-from .pictures import PairsPanel, each_and_mean
+from .pictures import PairsPanel, draw_pairs
 from .quantities import UNITS, QuantityTable, Row, csv_columns, format_quantity
 from .worn_runs import compare_runs
 
@@ -244,7 +244,7 @@ def _means_html(number: int, rows: list, averages: dict) -> str:
             "the table. The band is the mean with its interval."
         )
         texts = [f"{panel.title}: mean {format_quantity(panel.mean).short}" for panel in panels]
-        parts.append(figure(f"m{number}", each_and_mean(panels), caption, "; ".join(texts)))
+        parts.append(figure(f"m{number}", draw_pairs(panels), caption, "; ".join(texts)))
     return "\n".join([*parts, _table(averages).html(), f"<p class=soft>{prose(MEANING)}</p>"])
 
 

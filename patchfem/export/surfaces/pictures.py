@@ -36,7 +36,7 @@ class Picture(NamedTuple):
     alternative: str
 
 
-def trace(primary, waviness) -> str:
+def draw_trace(primary, waviness) -> str:
     """Draw a levelled trace and, if there is one, its waviness."""
     along, mm = axis_unit(primary.x, "m")
     up, um = axis_unit(primary.z, "m")
@@ -54,7 +54,7 @@ def trace(primary, waviness) -> str:
     )
 
 
-def rough(roughness, ends: tuple, cutoff: float) -> str:
+def draw_roughness(roughness, ends: tuple, cutoff: float) -> str:
     """Draw a roughness profile with its sections.
 
     Parameters
@@ -83,7 +83,7 @@ def rough(roughness, ends: tuple, cutoff: float) -> str:
     )
 
 
-def bearing(heights: Heights, names: tuple = ("Mr1", "Mr2")) -> dict:
+def abbott_core_chart(heights: Heights, names: tuple = ("Mr1", "Mr2")) -> dict:
     """Chart an Abbott curve with the straight line of its core.
 
     Names: of the material ratios where the core ends.
@@ -106,7 +106,7 @@ def bearing(heights: Heights, names: tuple = ("Mr1", "Mr2")) -> dict:
     )
 
 
-def statistics(heights: Heights, spectrum: Spectrum, band: tuple, cutoff: float | None) -> str:
+def draw_statistics(heights: Heights, spectrum: Spectrum, band: tuple, cutoff: float | None) -> str:
     """Draw an Abbott curve with its core, and a spectrum with its 95 % band.
 
     Parameters
@@ -123,7 +123,7 @@ def statistics(heights: Heights, spectrum: Spectrum, band: tuple, cutoff: float 
     str
         The picture as SVG.
     """
-    left = bearing(heights)
+    left = abbott_core_chart(heights)
     title = "Power spectral density"
     if not spectrum.density.any():
         return draw(
@@ -185,7 +185,7 @@ def _density_marks(
 
 
 @styled
-def scan(x, y, z):
+def draw_scan(x, y, z):
     """Draw the heights of a levelled scan and their distribution.
 
     Parameters
@@ -212,7 +212,7 @@ def scan(x, y, z):
 
 
 @styled
-def maps(x, y, heights: tuple):
+def draw_maps(x, y, heights: tuple):
     """Draw the scan before, the scan after and the worn depth side by side.
 
     Parameters
@@ -257,7 +257,7 @@ def _draw_map(figure, panel, scan: tuple, ends: tuple, colours: str, name: str =
     panel.grid(False)
 
 
-def both_heights(heights: tuple) -> str:
+def draw_both_heights(heights: tuple) -> str:
     """Draw the distributions and the Abbott curves of the heights (k,) [m] before and after."""
     both = np.concatenate(heights)
     up, um = axis_unit(both, "m")
@@ -287,7 +287,7 @@ def _abbott_chart(heights: tuple) -> dict:
     )
 
 
-def mean_section(track, start: float, end: float) -> str:
+def draw_mean_section(track, start: float, end: float) -> str:
     """Draw the mean section of a track with its scatter.
 
     Parameters
@@ -320,7 +320,7 @@ def mean_section(track, start: float, end: float) -> str:
     return draw([chart("", _full_axis("across the track", along, x * mm), down, marks)], height=2.7)
 
 
-def overlay(x, first, second, worn) -> str:
+def draw_aligned(x, first, second, worn) -> str:
     """Draw two aligned traces, and enlarged the part around the largest wear.
 
     Parameters
@@ -363,7 +363,7 @@ def _detail_ends(x, worn) -> np.ndarray:
     return np.array([centre - half, centre + half])
 
 
-def apart(before, after) -> str:
+def draw_separate(before, after) -> str:
     """Draw two traces without a common place, one above the other."""
     flat = [level(even(profile)) for profile in (before, after)]
     along, mm = axis_unit(np.concatenate([profile.x - profile.x[0] for profile in flat]), "m")
@@ -378,7 +378,7 @@ def apart(before, after) -> str:
     )
 
 
-def difference(x, depth, used=None, ends: tuple | None = None) -> str:
+def draw_depth(x, depth, used=None, ends: tuple | None = None) -> str:
     """Draw the depth of the second trace below its reference.
 
     Parameters
@@ -409,7 +409,7 @@ def difference(x, depth, used=None, ends: tuple | None = None) -> str:
     return draw([chart("", place, depth_axis(up, depth, um), marks)], height=2.5)
 
 
-def both_statistics(heights: tuple, spectra: tuple, band: tuple) -> str:
+def draw_both_statistics(heights: tuple, spectra: tuple, band: tuple) -> str:
     """Draw the Abbott curves and the spectra with their 95 % bands, before and after.
 
     Parameters
@@ -444,7 +444,7 @@ def both_statistics(heights: tuple, spectra: tuple, band: tuple) -> str:
     return draw([_abbott_chart(heights), right])
 
 
-def crossed(parts: list, directions: list) -> str:
+def draw_directions(parts: list, directions: list) -> str:
     """Draw the spectra along x and y, and the ratios x over y with their intervals.
 
     directions: (when, amplitude ratio, slope ratio) each.
@@ -477,7 +477,7 @@ class PairsPanel(NamedTuple):
     mean: Quantity
 
 
-def each_and_mean(panels: list) -> str:
+def draw_pairs(panels: list) -> str:
     """Draw quantities of pairs with their intervals and the mean of them; panels: of PairsPanel."""
     charts = []
     for panel in panels:
@@ -516,7 +516,7 @@ class PressedSide(NamedTuple):
     name: str
 
 
-def pressures(sides: list) -> str:
+def draw_pressures(sides: list) -> str:
     """Draw the normal stress of the patch with each surface; sides: of PressedSide."""
     along, mm = axis_unit(sides[0].x, "m")
     unit, scale = axis_unit(np.concatenate([side.stress for side in sides]), "Pa")

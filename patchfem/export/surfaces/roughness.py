@@ -355,14 +355,14 @@ def _text(report: RoughnessReport, name: str) -> str:
 def _scan_pictures(report: RoughnessReport) -> list:
     surface = report.surface
     heights = Picture(
-        pictures.scan(surface.x, surface.y, surface.z),
+        pictures.draw_scan(surface.x, surface.y, surface.z),
         "Heights from which the parameters are computed, and their distribution; the colours leave "
         "out the outermost 0.2 % of the points.",
         f"Map and histogram of the heights of {report.source}: {_text(report, 'Sq')} root mean "
         "square",
     )
     bearing = Picture(
-        pictures.draw([pictures.bearing(report.heights, ("Smr1", "Smr2"))]),
+        pictures.draw([pictures.abbott_core_chart(report.heights, ("Smr1", "Smr2"))]),
         "Abbott curve of these heights; dashed: the straight line of its core.",
         f"Abbott curve of {report.source}: core height {_text(report, 'Sk')}",
     )
@@ -376,7 +376,7 @@ def _trace_pictures(report: RoughnessReport) -> list:
     kind = "levelled trace" if cutoff is None else "roughness profile"
     out = [
         Picture(
-            pictures.trace(parts.primary, parts.waviness),
+            pictures.draw_trace(parts.primary, parts.waviness),
             f"Trace about the least-squares {report.treatment.form}; {waviness}.",
             f"Heights of {report.source} along x: {_text(report, 'Pt')} from the deepest valley to "
             "the highest peak",
@@ -386,7 +386,7 @@ def _trace_pictures(report: RoughnessReport) -> list:
         ends = (parts.primary.x[0], parts.primary.x[-1])
         out.append(
             Picture(
-                pictures.rough(parts.roughness, ends, cutoff),
+                pictures.draw_roughness(parts.roughness, ends, cutoff),
                 f"Roughness: the trace minus the waviness, in sections of {say(cutoff)}; half a "
                 "section is trimmed at each end.",
                 f"Roughness profile: Rq {_text(report, 'Rq')}",
@@ -395,7 +395,7 @@ def _trace_pictures(report: RoughnessReport) -> list:
     tapers = parts.spectrum.tapers
     out.append(
         Picture(
-            pictures.statistics(report.heights, parts.spectrum, BAND, cutoff),
+            pictures.draw_statistics(report.heights, parts.spectrum, BAND, cutoff),
             f"Left: Abbott curve of the {kind}; dashed: the straight line of its core. Right: "
             f"spectrum of the levelled trace, the mean of {tapers} sine tapers, with its 95 % band "
             f"by chi-square of {2 * tapers} degrees of freedom.",

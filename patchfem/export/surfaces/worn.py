@@ -16,7 +16,7 @@ from ..pages.document import Section, figure, table
 from ..pages.sweep import label
 from ..pages.words import pair
 from .compare import SIDES, TABLE_HEADS, WORDS, Article, sides_lines
-from .pictures import GREY, Picture, PressedSide, depth_axis, maps, pressures
+from .pictures import GREY, Picture, PressedSide, depth_axis, draw_maps, draw_pressures
 from .pictures import SIDES as SIDE_COLOURS
 from .quantities import MISSING, QuantityTable, Row, format_quantity, quantity_data
 from .worn_runs import Wear, hidden_depths, hidden_line
@@ -205,7 +205,7 @@ def write_page(path: Path, wear: Wear, found: tuple) -> None:
     caption = "Normal stress of the pressed patch"
     if wear.after.surface.y is not None:
         caption += ", mean over the width"
-    drawn = pressures(
+    drawn = draw_pressures(
         [PressedSide(run.surface.x, run.pressure, name) for run, name in zip(both, SIDES)]
     )
     runs = [figure("p", drawn, f"{caption}.", "Pressure along the patch before and after")]
@@ -234,7 +234,7 @@ def _pictures(wear: Wear) -> list:
     if surface.y is not None:
         return [
             Picture(
-                maps(surface.x, surface.y, (*wear.gaps, wear.depth)),
+                draw_maps(surface.x, surface.y, (*wear.gaps, wear.depth)),
                 "Left and middle: gap between the unloaded surfaces before and after, wear "
                 "included. Right: depth lost by both pieces together between the two runs. The "
                 "values of a strip stand at the middle of its width.",
@@ -247,7 +247,7 @@ def _pictures(wear: Wear) -> list:
         "Gap of the surfaces before and after",
     )
     depth = Picture(
-        _draw_depth(surface.x, wear.depth),
+        _draw_worn_depth(surface.x, wear.depth),
         "The curve is the depth lost by both pieces together between the two runs. The dashed line "
         "is the part of this depth that a trace alone could not show.",
         f"Worn depth: {mean}",
@@ -271,7 +271,7 @@ def _draw_gaps(x, gaps: tuple) -> str:
     return draw([chart("", place, axis("gap of the unloaded surfaces", up), marks)], height=2.9)
 
 
-def _draw_depth(x, depth) -> str:
+def _draw_worn_depth(x, depth) -> str:
     place, mm = _place_axis(x)
     hidden = np.array(hidden_line(x, depth))
     unit, scale = axis_unit(depth, "m")
