@@ -146,24 +146,25 @@ def lead_of(table: dict) -> Lead:
                          for key in keys if varies(key) or len(keys) == 1)
 
     found_peaks = peaks.found(keys, values, trusted, table["grid"])
-    ranks, rank, quantiles, scatter = ranked.told(table, trusted, settled)
+    keys_ranked = ranked.rank_keys(table, trusted, settled)
     span_of_measure = span(values, trusted, settled, ranked.asked_first(FIRST, table), _floors(measures, tolerance))
     unsettled = _unsettled(values, outcome)
     asked = table.get("first", "")
     said = Sentences(
         limit=limits.sentence(key_limits),
         peak=peaks.sentence(found_peaks),
-        rank=rank,
-        scatter=scatter,
+        rank=keys_ranked.rank,
+        scatter=keys_ranked.scatter,
         span=span_of_measure,
         misses=missed.sentence(measures, tolerance, where, asked),
-        left=_left(table, outcome, rank == ranked.too_few(table, settled)),
+        left=_left(table, outcome, keys_ranked.rank == ranked.too_few(table, settled)),
         ends=_peaks_at_ends(table),
         unsettled=unsettled,
     )
     if table.get("drawn"):
         said = said._replace(span=joined([one for one in (unsettled, span_of_measure) if one]), unsettled="")
-    return Lead(said, missed.counted(measures, tolerance), key_limits, ranks, quantiles, found_peaks, asked)
+    over = missed.counted(measures, tolerance)
+    return Lead(said, over, key_limits, keys_ranked.shares, keys_ranked.quantiles, found_peaks, asked)
 
 
 def _trusted(name: str, measure: dict, tolerance, settled: np.ndarray) -> np.ndarray:

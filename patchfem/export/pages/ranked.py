@@ -1,6 +1,7 @@
 """What matters most in a sweep and how far its answers scatter: sentences, a picture of the shares, a table."""
 
 from html import escape
+from typing import NamedTuple
 
 import numpy as np
 
@@ -26,19 +27,54 @@ PARTS = 5  # of the drawn cases by the size of a key, in which a measure rises o
 SURE = 2.5  # standard errors of a median (1.25 of those of a mean) by which two parts differ
 
 
-def told(table: dict, trusted: dict, settled: np.ndarray) -> tuple:
-    """(ranks, rank, quantiles, scatter) of the Lead of a sweep; trusted: as `lead` makes it; settled: (n,) whether a
-    case has."""
-    ranks, found, of = ranks_of(table), quantiles(table, trusted), len(table["outcome"])
-    left = of - int(np.sum(trusted[next(iter(ranks))])) if ranks else 0
-    moves = not settled.any() or Outcome.TRANSIENT.value in list(table["outcome"])
-    names, first = asked_first(SPREAD, table), table.get("first", "")
-    rank = sentence(ranks, left, moves, of) if not first or first in ranks or first not in table["measures"] else \
-        (f"These {of} cases do not show on which key the {label(first)} depends most; more cases may show this."
-         if ranks else "")
-    rank = joined([one for one in (rank, trend(table, ranks, settled)) if one])
+class RankedKeys(NamedTuple):
+    """Which keys matter most, and how far the results of random cases scatter.
+
+    Attributes
+    ----------
+    shares : dict
+        Shares of the keys in the variance of each measure, from `ranks_of`.
+    rank : str
+        The sentence on them; "" where there is nothing to say.
+    quantiles : dict
+        From `quantiles`.
+    scatter : str
+        The sentence on them.
+    """
+
+    shares: dict
+    rank: str
+    quantiles: dict
+    scatter: str
+
+
+def rank_keys(table: dict, trusted: dict, settled: np.ndarray) -> RankedKeys:
+    """Rank the keys of a sweep and find the scatter of its random cases.
+
+    Parameters
+    ----------
+    table : dict
+        As `sweep.page` takes it.
+    trusted : dict
+        {measure: (n,) whether a case settled and meets its tolerance}.
+    settled : (n,) ndarray of bool
+    """
+    shares, found = ranks_of(table), quantiles(table, trusted)
+    count, asked = len(table["outcome"]), table.get("first", "")
+    ends_unsettled = not settled.any() or Outcome.TRANSIENT.value in list(table["outcome"])
+    rank = ""
+    if not asked or asked in shares or asked not in table["measures"]:
+        left_out = count - int(np.sum(trusted[next(iter(shares))])) if shares else 0
+        rank = sentence(shares, left_out, ends_unsettled, count)
+    elif shares:
+        rank = (f"These {count} cases do not show on which key the {label(asked)} depends most; more cases may show "
+                "this.")
+    rank = joined([one for one in (rank, trend(table, shares, settled)) if one])
     few = "" if rank else too_few(table, settled)
-    return ranks, rank or few, found, "" if few else scatter(found, of, settled.any() and moves, names)
+    spread_text = ""
+    if not few:
+        spread_text = scatter(found, count, settled.any() and ends_unsettled, asked_first(SPREAD, table))
+    return RankedKeys(shares, rank or few, found, spread_text)
 
 
 def too_few(table: dict, settled: np.ndarray) -> str:
