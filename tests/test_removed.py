@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import surfaces
 from command_line import cli
-from scene_texts import COULOMB, DRIVE, KEYS, MODE, NONLOCAL, POINT
+from scene_texts import COATED, COULOMB, DRIVE, KEYS, MODE, NONLOCAL, POINT, TRIANGLE
 
 import patchfem as pf
 from patchfem.mesh.files import read_pieces
@@ -16,6 +16,7 @@ from patchfem.surface.files.read import read_surface
 
 RIG = POINT + COULOMB + MODE + DRIVE
 GROOVED = MODE.join([POINT + 'grooves = {wavelength = "80 um", amplitude = "7.5 um"}\n', DRIVE]) + COULOMB
+WORN = COATED + COULOMB + TRIANGLE + '[wear]\ncoefficient = "1e-15 1/Pa"\ncycles = 100\n'
 BONDS = POINT + NONLOCAL + MODE + DRIVE
 
 
@@ -52,7 +53,15 @@ def match_inverted(folder) -> None:
 
 TRIED = {  # what was removed -> (how a user tries it, what the sentence says to use instead)
     **{f"method {name}": (partial(load, RIG, {"accuracy.method": name}), "use 'march'") for name in removed.METHODS},
-    **{key: (partial(load, RIG, {key: 1.0}), "use method 'march' without it") for key in removed.KEYS},
+    **{
+        key: (partial(load, WORN if key.startswith("wear.") else RIG, {key: value}), instead)
+        for key, value, instead in (
+            ("accuracy.convergence", "force", "use method 'march' without it"),
+            ("accuracy.convergence_tolerance", 1e-4, "use method 'march' without it"),
+            ("accuracy.stick_speed", "1 mm/s", "use method 'march' without it"),
+            ("wear.scheme", "explicit", "contact and wear are always solved together"),
+        )
+    },
     "quadrature exponential": (partial(load, BONDS, {"accuracy.quadrature": "exponential"}), "use 'merged'"),
     "harmonics over grooves": (
         partial(load, GROOVED, {"accuracy.method": "harmonic", "accuracy.harmonics": 15}),
@@ -89,7 +98,7 @@ def test_refuses_what_was_removed(tmp_path, name):
 
 
 def test_always_every_removed_option_is_tried():
-    assert {" ".join(pair) for pair in removed.OPTIONS} <= set(TRIED)
+    assert {" ".join(pair) for pair in removed.OPTIONS} | set(removed.KEYS) <= set(TRIED)
     assert {f"quadrature {name}" for name in removed.QUADRATURES} <= set(TRIED)
 
 

@@ -288,10 +288,6 @@ def test_exact_the_tolerance_of_a_warning_leads_to_a_finer_mesh_under_wear():
 
 
 def test_refuses_what_wear_does_not_go_with():
-    text = TILTED + COULOMB + SINE + WEAR
-    for scheme in ("explicit", "implicit"):
-        told = only(text + f'scheme = "{scheme}"\n')
-        assert "wear.scheme: this key was removed in patchfem 1.0; leave it out" in told
     assert any("wear" in line for line in mistakes(TILTED + WEAR))
     free = POINT + COULOMB + MODE + '[drive]\nkind = "free"\ndisplacement = "1 mm"\ncycles = 5\n' + WEAR
     assert "steady motion" in only(free)

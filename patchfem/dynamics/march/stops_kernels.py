@@ -10,6 +10,12 @@ it carries its static friction. The limits may change linearly over the step, as
 The step then needs slides and speeds at its end: mean forces give the slides, blows at its end the speeds. Both are of
 second order in the step. `blows` says what work friction takes in all; the loop steps by the mean forces alone where it
 would give some. s: `contacts.arrays.Stops`. Read `watched` first.
+
+Stiff elastic-plastic faces do not replace this text. They have one coefficient of friction, so a kinetic coefficient
+below the static one cannot be given to them. With equal coefficients, on 119 random rigs, 98 % of the
+errors hold with set-valued faces; with elastic-plastic ones 50 %, 74 % and 81 % hold for bond lengths of 0.1, 0.01 and
+0.001 of the tolerance times the friction force over the stiffness of the mode, and 72 %, 88 % and 91 % of the values
+are within the tolerance, where all set-valued ones are.
 """
 
 import numpy as np

@@ -10,8 +10,8 @@ import numpy as np
 from ...core import PatchfemError
 from ...friction import record
 from ...model.source import placed
-from ...response.rows import of_number
-from ...slip.fields import element_fields
+from ...response import rows
+from ...slip import fields as slip_fields
 from ..results.result import at_rest, frames_of, surface_of
 from . import derived, result, store
 from .press import Patch
@@ -120,7 +120,7 @@ def seen(model, shots) -> tuple:
         if found is not None and shots:
             states = [shot["faces"][face.number] for shot in shots]
             length = record.law_from(one.numbers, one.load).element(one.load).length
-            tau, local = element_fields(face.patch, found, states, length)
+            tau, local = slip_fields.element_fields(face.patch, found, states, length)
             fields = frames_of(face.patch, np.array([shot["time"] for shot in shots]), tau, local,
                                np.array([slide for slide, _ in states]))
         out.append(face._replace(fields=fields))
@@ -138,13 +138,13 @@ def probed(model) -> dict:
     if model.patch is not None:
         return result.probed(model)
     with placed(model.source):
-        return {of_number(name, face.number): found for face in faces_of(model)
+        return {rows.of_number(name, face.number): found for face in faces_of(model)
                 for name, found in values(face.patch).items()}
 
 
 def measured(model) -> dict:
     """Static measures of the patches by name, of an interface after the first with its number behind the name."""
-    return {of_number(name, face.number): found for face in faces_of(model)
+    return {rows.of_number(name, face.number): found for face in faces_of(model)
             for name, found in result.measured(face.model, face.patch, face.patches[1:]).items()}
 
 
