@@ -10,6 +10,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ..core import PatchfemError
+from .variable_projection import Projection, project, standard_errors
 
 MOST = 8  # sinusoids
 GAIN = 0.8  # of the root mean square: a further sinusoid that leaves more is noise
@@ -64,16 +65,17 @@ def decay(time, value) -> Decay:
 
 def _described(time, value, poles, misfit) -> Decay:
     own, rate = poles[0::2], poles[1::2]
-    shares = _columns(time, poles) @ np.diag(_solved(time, value, poles))
-    amplitude = np.hypot(*_solved(time, value, poles)[1:].reshape(-1, 2).T)
+    columns = _columns(time, poles)
+    found = project(columns, value)
+    shares = columns * found.coefficients
+    amplitude = np.hypot(*found.coefficients[1:].reshape(-1, 2).T)
     energy = np.array([np.sum((shares[:, 2 * k + 1] + shares[:, 2 * k + 2])**2) for k in range(own.size)])
     kept = (rate > 0) & (energy > FAINT**2 * energy.max())
     if not kept.any():
         raise PatchfemError("the oscillation in the record grows instead of decaying; begin the record after the drive "
                             "has ended")
     w = np.hypot(own, rate)
-    slopes = _slopes(time, value, poles)
-    spread = misfit * np.std(value) * np.sqrt(np.maximum(np.diag(np.linalg.pinv(slopes.T @ slopes)), 0))
+    spread = standard_errors(_slopes(time, columns, found), misfit * np.std(value))
     order = np.flatnonzero(kept)[np.argsort(w[kept])]
     return Decay((w / (2 * np.pi))[order], (rate / w)[order], amplitude[order], (1.96 * spread[1::2] / w)[order],
                  float(misfit))
@@ -94,31 +96,23 @@ def _columns(time, poles) -> np.ndarray:
     return np.stack(parts, axis=1)
 
 
-def _solved(time, value, poles) -> np.ndarray:
-    return np.linalg.lstsq(_columns(time, poles), value, rcond=1e-13)[0]
-
-
-def _left(time, value, poles) -> np.ndarray:
-    columns = _columns(time, poles)
-    return columns @ np.linalg.lstsq(columns, value, rcond=1e-13)[0] - value
-
-
-def _slopes(time, value, poles) -> np.ndarray:
-    """Derivatives (k, 2 n) of what is left over the poles, outside the span of the columns (Kaufman 1975)."""
-    columns = _columns(time, poles)
-    q = np.linalg.qr(columns)[0]
-    coefficients, out = _solved(time, value, poles), []
-    for k in range(poles.size // 2):
-        cosine, sine = columns[:, 2 * k + 1], columns[:, 2 * k + 2]
-        a, b = coefficients[2 * k + 1:2 * k + 3]
+def _slopes(time, columns, found: Projection) -> np.ndarray:
+    """Return the derivatives (k, 2 n) of the residual over the poles."""
+    out = []
+    for k in range(1, columns.shape[1], 2):
+        cosine, sine = columns[:, k:k + 2].T
+        a, b = found.coefficients[k:k + 2]
         out += [time * (b * cosine - a * sine), -time * (a * cosine + b * sine)]
-    slopes = np.stack(out, axis=1)
-    return slopes - q @ (q.T @ slopes)
+    return found.jacobian(np.stack(out, axis=1))
 
 
 def _refined(time, value, poles) -> tuple:
     """(poles, what they leave) of the least-squares problem from a start."""
-    found = least_squares(lambda p: _left(time, value, p), poles, lambda p: _slopes(time, value, p), x_scale="jac",
+    def slopes(poles) -> np.ndarray:
+        columns = _columns(time, poles)
+        return _slopes(time, columns, project(columns, value))
+
+    found = least_squares(lambda p: project(_columns(time, p), value).residual, poles, slopes, x_scale="jac",
                           xtol=1e-14, ftol=1e-14, gtol=1e-15, max_nfev=60)
     return found.x, -found.fun
 

@@ -17,6 +17,7 @@ from scipy.optimize import least_squares
 from ..core import PatchfemError
 from ..structure.identify import Fit
 from .frequency_response import TOP, Estimate, h1
+from .variable_projection import Projection, project, standard_errors
 
 POWER = {"displacement": 0, "velocity": 1, "acceleration": 2}  # derivatives of displacement
 MOST = 12  # modes
@@ -80,20 +81,18 @@ class _Record:
                             -self.time * (rate * cosine + turn * sine), -self.time * (rate * sine - turn * cosine)))
         return np.stack(parts, axis=1), over_w, over_z
 
-    def solved(self, theta) -> tuple:
-        """(what is left over (k,), coefficients (3 + 3 n,), orthonormal columns (k, 3 + 3 n), derivatives)."""
-        design, *slopes = self.columns(theta)
-        norms = np.maximum(np.linalg.norm(design, axis=0), 1e-300)
-        q, r = np.linalg.qr(design / norms)
-        found = np.linalg.lstsq(r, q.T @ self.value, rcond=1e-12)[0]
-        return (design / norms) @ found - self.value, found / norms, q, slopes
+    def solved(self, theta) -> Projection:
+        """Return the linear problem with 3 + 3 n coefficients."""
+        return project(self.columns(theta)[0], self.value)
 
     def slopes(self, theta) -> np.ndarray:
-        """Derivatives (k, 2 n) of what is left over, outside the span of the columns (Kaufman 1975)."""
-        _, found, q, both = self.solved(theta)
-        out = np.stack([sum(c * column for c, column in zip(found[3 + 3 * k:6 + 3 * k], columns))
-                        for slopes in both for k, columns in enumerate(slopes)], axis=1)
-        return out - q @ (q.T @ out)
+        """Return the derivatives (k, 2 n) of the residual."""
+        design, *both = self.columns(theta)
+        found = project(design, self.value)
+        modes = found.coefficients[3:].reshape(-1, 3)
+        out = [sum(c * column for c, column in zip(mode, columns))
+               for slopes in both for mode, columns in zip(modes, slopes)]
+        return found.jacobian(np.stack(out, axis=1))
 
     def refined(self, theta, looks: int = 100, close: float = 1e-13) -> tuple:
         """(theta, what it leaves) of the least-squares problem from a start, after so many looks or a change of
@@ -101,7 +100,7 @@ class _Record:
         n, top = theta.size // 2, np.pi / self.step
         low = np.repeat([np.log(self.omega[1] / 2), np.log(LOWEST)], n)
         high = np.repeat([np.log(top), np.log(WIDEST)], n)
-        found = least_squares(lambda p: self.solved(p)[0] / self.size, np.clip(theta, low + 1e-9, high - 1e-9),
+        found = least_squares(lambda p: self.solved(p).residual / self.size, np.clip(theta, low + 1e-9, high - 1e-9),
                               lambda p: self.slopes(p) / self.size, bounds=(low, high), x_scale="jac", xtol=close,
                               ftol=close, gtol=1e-14, max_nfev=looks)
         return found.x, found.fun * self.size
@@ -118,9 +117,9 @@ def driven_modes(step: float, force, response, quantity: str, estimate: Estimate
     theta, rest = _grown(record, estimate)
     n = theta.size // 2
     w, zeta = np.exp(theta).reshape(2, -1)
-    residue = record.solved(theta)[1][3::3]
-    slopes = record.slopes(theta)
-    spread = np.sqrt(np.mean(rest**2) * np.maximum(np.diag(np.linalg.pinv(slopes.T @ slopes)), 0))[n:] * zeta
+    residue = record.solved(theta).coefficients[3::3]
+    rms = float(np.sqrt(np.mean(rest**2)))
+    spread = standard_errors(record.slopes(theta), rms)[n:] * zeta
     kept = (w >= 2 * np.pi * max(band[0], estimate.frequency[0])) & (w <= 2 * np.pi * min(band[1], TOP / (2 * step)))
     kept &= (zeta > 2 * LOWEST) & (zeta < 0.99 * WIDEST)
     if not kept.any():
@@ -130,12 +129,12 @@ def driven_modes(step: float, force, response, quantity: str, estimate: Estimate
     coherence = None if estimate.coherence is None else \
         np.interp(w[order] / (2 * np.pi), estimate.frequency, estimate.coherence)
     return Modes(w[order] / (2 * np.pi), zeta[order], residue[order], 1.96 * spread[order], read[order], coherence,
-                 float(np.sqrt(np.mean(rest**2)) / record.size))
+                 rms / record.size)
 
 
 def _grown(record: _Record, estimate: Estimate) -> tuple:
     """(theta, what is left) of as many modes as take their share."""
-    theta, rest = np.empty(0), record.solved(np.empty(0))[0]
+    theta, rest = np.empty(0), record.solved(np.empty(0)).residual
     while theta.size < 2 * MOST and np.sqrt(np.mean(rest**2)) > WHOLE * record.size:
         tries = [record.refined(_with(theta, *start), ROUGH, 1e-3) for start in _starts(record, estimate, rest)]
         better, left = min(tries, key=lambda one: one[1] @ one[1])
