@@ -10,7 +10,7 @@ from ..model.model import Model
 from ..model.source import placed
 from ..model.structure import stiffness_of
 from .patch import result as patch_result
-from .patch.derived import elements, strip_elements
+from .patch.jenkins_elements import elements, strip_elements
 
 
 def freed(model: Model, patch=None) -> Model:

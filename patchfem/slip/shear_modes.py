@@ -18,7 +18,7 @@ from functools import cached_property
 import numpy as np
 
 from ..contact.unilateral import INDEFINITE
-from ..core import Compliance, PatchfemError, frozen_array
+from ..core import PatchfemError, frozen_array
 from ..elasticity.lapack import dpotrf, dpotrs, dtrsm, dtrtri, one_thread
 
 SAME = 1e-11  # of a yield slide: nodes that yield at once, as mirrored ones do; round-off parts 801 of them by 7e-13
@@ -458,34 +458,3 @@ def _backbone(limit, shape, values, length, slides, start) -> tuple:
     out = -np.expm1(np.minimum(-(slides[:, None] - b @ shape.T) / length, 700.0)) @ limit
     out[going] = np.nan
     return out, b
-
-
-def tangential_stiffness(tangential: np.ndarray, active: np.ndarray) -> float:
-    """Return the tangential stiffness dT/d(slide) [N/m] of a patch with every node of its contact set sticking.
-
-    Of the normal compliance it is dN/d(approach) at fixed rotation. tangential: compliance (m, m) [m/N]; active: (m,)
-    bool contact set.
-    """
-    index = np.flatnonzero(active)
-    return float(np.linalg.solve(tangential[np.ix_(index, index)], np.ones(index.size)).sum())
-
-
-def coupled_stiffness(pieces: Compliance, closing: np.ndarray, active: np.ndarray) -> float:
-    """Tangential stiffness dT/d(slide) [N/m] of unlike pieces that stick, at held approach and rotation.
-
-    closing: (m, m) normal closing per shear force [m/N]; active: (m,) bool contact set, without which it is 0.
-    """
-    here = np.ix_(*2 * (np.flatnonzero(active),))
-    system = np.block([[pieces.normal[here], closing[here]], [closing[here].T, pieces.tangential[here]]])
-    slide = np.repeat([0.0, 1.0], len(system) // 2)
-    with one_thread():
-        return float(slide @ np.linalg.solve(system, slide))
-
-
-def rotational_stiffness(normal: np.ndarray, x: np.ndarray, active: np.ndarray) -> float:
-    """Rotational stiffness -dM/d(rotation) [N m/rad] > 0 about x = 0 at fixed approach and contact set.
-
-    normal: compliance (m, m) [m/N]; x: (m,) [m]; active: (m,) bool contact set.
-    """
-    index = np.flatnonzero(active)
-    return float(np.linalg.solve(normal[np.ix_(index, index)], x[index]) @ x[index])

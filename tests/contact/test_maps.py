@@ -8,9 +8,9 @@ from pieces import LENGTH, LOAD, coated_pair, rough
 from study_module import study
 
 from patchfem.contact.gaps import crown, tilt
+from patchfem.contact.stiffness import tangential_stiffness
 from patchfem.contact.unilateral import SOLVED, press
 from patchfem.core import NotConverged, Outcome, PatchfemError
-from patchfem.slip.shear_modes import tangential_stiffness
 
 maps = study("common/maps.py")
 press_map = maps.press_map

@@ -16,11 +16,11 @@ from skins import longer, solve, tangent
 
 from patchfem.contact import strips_solve
 from patchfem.contact.skin_laws import ExponentialSkin, HertzSkin, LinearSkin, peak_integral
+from patchfem.contact.stiffness import tangential_stiffness
 from patchfem.contact.strips import residuals
 from patchfem.contact.strips_solve import Slices
 from patchfem.contact.unilateral import LIMIT, press
 from patchfem.core import NotConverged, Outcome, PatchfemError
-from patchfem.slip.shear_modes import tangential_stiffness
 
 AREA = LENGTH * WIDTH
 MEAN = LOAD / AREA

@@ -14,11 +14,11 @@ from skins import solve, tangent
 from patchfem.closed_forms.contact import wedge_linear, wedge_opening, wedge_skin
 from patchfem.contact import strips_solve
 from patchfem.contact.skin_laws import ExponentialSkin, HertzSkin, LinearSkin
+from patchfem.contact.stiffness import tangential_stiffness
 from patchfem.contact.strips import one_strip, press_strips, strip_offsets, strips_tangent
 from patchfem.contact.strips_solve import Slices
 from patchfem.contact.unilateral import LIMIT, press, press_by, solve_forces
 from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
-from patchfem.slip.shear_modes import tangential_stiffness
 
 AREA = LENGTH * WIDTH
 MEAN = LOAD / AREA

@@ -10,7 +10,7 @@ import patchfem as pf
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.runs.many import one_by_one
 from patchfem.runs.many.meshes import meshed
-from patchfem.runs.patch import derived, press, store
+from patchfem.runs.patch import jenkins_elements, press, store
 from patchfem.runs.patch.store import content_key
 from patchfem.runs.rig import interface
 
@@ -29,8 +29,9 @@ def nothing_kept():
 
 
 def test_exact_runs_of_one_patch_are_those_that_share_nothing(monkeypatch):
-    made, jenkins_set = [], derived.shear_modes.jenkins_set
-    monkeypatch.setattr(derived.shear_modes, "jenkins_set", lambda *given: made.append(given) or jenkins_set(*given))
+    made, jenkins_set = [], jenkins_elements.shear_modes.jenkins_set
+    monkeypatch.setattr(jenkins_elements.shear_modes, "jenkins_set",
+                        lambda *given: made.append(given) or jenkins_set(*given))
     cases = models()
     found = one_by_one.solve(cases)
     assert len(made) == 4  # of two patches, each with that of its error

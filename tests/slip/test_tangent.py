@@ -8,9 +8,9 @@ from partial_slip import Step, advance, operators_of, start
 from pieces import COATED, COATING, HEIGHT, LENGTH, LOAD, WIDTH, bare, coated_pair
 from two_bodies import unlike_pair
 
+from patchfem.contact.stiffness import coupled_stiffness, tangential_stiffness
 from patchfem.core import Compliance, Interface
 from patchfem.mesh.tensor import graded_grid
-from patchfem.slip.shear_modes import coupled_stiffness, tangential_stiffness
 
 MU = 0.4
 

@@ -23,7 +23,7 @@ from ...model.model import Model, build
 from ...model.source import placed
 from ...runs.joint import held_patch
 from ...runs.patch import ladder
-from ...runs.patch.derived import elements, strip_elements
+from ...runs.patch.jenkins_elements import elements, strip_elements
 from ...scene.scene import Scene
 
 AMPLITUDES_PER_DECADE = 8  # Enough that no regime of a law lies between two amplitudes.

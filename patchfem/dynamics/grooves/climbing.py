@@ -4,9 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...contact.stiffness import tangential_stiffness
 from ...core import Outcome, PatchfemError, Response
 from ...friction.grooves import Grooves
-from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes, tangential_stiffness
+from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes
 from ..contacts.arrays import Climbing
 from ..integrated import accelerations
 from ..march.march import Run

@@ -10,7 +10,7 @@ from ...friction.record import law_from
 from ...response.coarser import Coarser
 from ...response.errors import GAPS, change, convergence_errors
 from ...slip.fields import element_fields, point_fields, shear_of
-from ..patch.derived import elements
+from ..patch.jenkins_elements import elements
 from .follow import follow_path
 from .ledger import Slid, Watch
 from .rigid import climbing

@@ -13,7 +13,7 @@ from ...model.source import placed
 from ...response import rows
 from ...slip import fields as slip_fields
 from ..results.result import at_rest, frames_of, surface_of
-from . import derived, result, store
+from . import jenkins_elements, result, store
 from .press import Patch
 from .values import values
 
@@ -96,8 +96,8 @@ def elements_of(one, tolerance: float, coarser: bool = False) -> tuple:
         return np.array([1 / patch.giving.mean()]), np.zeros(1), None
     length = record.law_from(one.numbers, one.load).element(one.load).length
     if patch.strips is not None:
-        return *map(np.concatenate, zip(*derived.strip_elements(patch, static, length))), None
-    found = derived.elements(patch, static, length)
+        return *map(np.concatenate, zip(*jenkins_elements.strip_elements(patch, static, length))), None
+    found = jenkins_elements.elements(patch, static, length)
     return found.stiffness, found.yield_slide, found
 
 

@@ -6,7 +6,7 @@ from ...core import Measure
 from ...response.errors import convergence_errors
 from ...response.rows import floor_of
 from ...slip.shear_modes import JenkinsSet
-from .derived import elements
+from .jenkins_elements import elements
 
 
 def slip_zones(patch, slip, ends: list) -> tuple:

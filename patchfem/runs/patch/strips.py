@@ -2,12 +2,11 @@
 
 import numpy as np
 
-from ...contact import edges
+from ...contact import edges, stiffness
 from ...contact.skin_laws import LinearSkin
 from ...contact.strips import one_strip, press_strips, strip_offsets, strips_tangent
 from ...contact.strips_solve import Slices, smooth
 from ...core import Compliance, Pressure, frozen_array
-from ...slip import shear_modes
 from .skin import BEARING, borne, skin_law
 
 
@@ -52,7 +51,7 @@ def rotational_stiffness(state, c, x, weight) -> float:
         stiff = rate * weight
         active = stiff > 1e-12 * (state.stiffness.max() * weight.max())
         if active.any():
-            out += shear_modes.rotational_stiffness(c + np.diag(1 / np.where(active, stiff, 1.0)), x, active)
+            out += stiffness.rotational_stiffness(c + np.diag(1 / np.where(active, stiff, 1.0)), x, active)
     return out
 
 

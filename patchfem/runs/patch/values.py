@@ -6,10 +6,9 @@ from typing import NamedTuple
 import numpy as np
 
 from ...closed_forms import contact
-from ...contact import edges
+from ...contact import edges, stiffness
 from ...core import Outcome, Pressure
 from ...elasticity.lapack import one_thread
-from ...slip import shear_modes
 from . import strips
 from .press import Patch
 
@@ -184,7 +183,7 @@ def shear_stiffness(patch: Patch, found: list) -> float:
         return edges.stiffness(patch.pieces.tangential, patch.active, np.ones(patch.x.size), found)
 
     def of(active) -> float:
-        return shear_modes.coupled_stiffness(patch.pieces, patch.pair.closing, active)
+        return stiffness.coupled_stiffness(patch.pieces, patch.pair.closing, active)
 
     whole = out = of(patch.active)
     for end in found if patch.active.sum() > 2 else ():

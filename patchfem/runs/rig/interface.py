@@ -16,7 +16,7 @@ from ...model.model import Model
 from ...slip import fields, shear_modes
 from ...structure.drive_sizes import omega_of
 from ..bench import averaged, rigid, shear
-from ..patch import derived, faces
+from ..patch import faces, jenkins_elements
 from . import strips, varying_load
 from .lists import quadrature_of
 from .numerics import Numerics
@@ -61,7 +61,7 @@ def _side_by_side(model: Model, numerics: Numerics, patch) -> list:
     f = model.friction
     if model.soft:
         length = law_from(f, patch.pressure.load).element(patch.pressure.load).length
-        return [parallel(*one) for one in derived.strip_elements(patch, f.static, length)]
+        return [parallel(*one) for one in jenkins_elements.strip_elements(patch, f.static, length)]
     return [element_of(model.rig.interfaces[0], load, model.rig.speed) for load in strips.strip_loads(patch)]
 
 
@@ -113,8 +113,9 @@ def contact_model(model: Model, numerics: Numerics, patch):
         return models.element_model(one)
 
     if patch.strips is not None:  # one slide of them all
-        return models.jenkins_model(*map(np.concatenate, zip(*derived.strip_elements(patch, f.static, one.length))))
-    found = derived.elements(patch, f.static, one.length)
+        strips = jenkins_elements.strip_elements(patch, f.static, one.length)
+        return models.jenkins_model(*map(np.concatenate, zip(*strips)))
+    found = jenkins_elements.elements(patch, f.static, one.length)
     return models.jenkins_model(found.stiffness, found.yield_slide, found)
 
 
