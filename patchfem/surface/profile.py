@@ -44,6 +44,11 @@ class Profile:
         """Distance from the first to the last sample [m]."""
         return float(self.x[-1] - self.x[0])
 
+    @property
+    def step(self) -> float:
+        """Mean distance of neighbouring samples [m]."""
+        return self.length / (self.x.size - 1)
+
 
 def level(profile: Profile) -> Profile:
     """Subtract the least-squares line of the measured samples."""

@@ -43,7 +43,7 @@ from told import told
 from patchfem.core import frozen_array
 from patchfem.export.drawing.pictures import BLUE, GREY, ORANGE
 from patchfem.export.surfaces.compare import write_trace
-from patchfem.surface.compare.compare import compared, directions_of
+from patchfem.surface.compare.compare import compare_directions, compare_traces
 from patchfem.surface.compare.sentences import describe_ratio_change
 from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile, level
@@ -84,19 +84,19 @@ def cut(before, after, line: int) -> Set:
     other = (line + APART) % bands.POINTS
     pairs = ((trace(before[line], "before, x"), trace(after[other], "after, x")),
              (trace(before[:, line], "before, y"), trace(after[:, other], "after, y")))
-    parts = [compared(*pair, direction) for pair, direction in zip(pairs, "xy")]
-    return Set(pairs, parts, tuple(amplitude for _, amplitude, _ in directions_of(parts)))
+    parts = [compare_traces(*pair, direction) for pair, direction in zip(pairs, "xy")]
+    return Set(pairs, parts, tuple(amplitude for _, amplitude, _ in compare_directions(parts)))
 
 
 def counts(sets: list) -> tuple:
     """How many sets are called reduced along x, along y, lower along x than along y after, and before."""
-    ratios = [(*[part.amplitude_ratio for part in one.parts], one.across[1], one.across[0]) for one in sets]
+    ratios = [(*[part.ratios.amplitude for part in one.parts], one.across[1], one.across[0]) for one in sets]
     return tuple(sum(describe_ratio_change(each[k]) == "reduced" for each in ratios) for k in range(4))
 
 
 def held(sets: list, row) -> int:
     """In how many comparisons of the sets the interval holds the ratio of the whole areas."""
-    return sum(one.parts[way].amplitude_ratio.low < row.after[way] < one.parts[way].amplitude_ratio.high
+    return sum(one.parts[way].ratios.amplitude.low < row.after[way] < one.parts[way].ratios.amplitude.high
                for one in sets for way in (0, 1))
 
 
@@ -138,7 +138,7 @@ def picture(sets: list, path: Path) -> Path:
                                f"{2 * found.value / UM:.1f} um ({2 * found.low / UM:.0f} to {2 * found.high / UM:.0f})")
                 axis.title.set_fontsize(10)
         at = np.arange(1, len(sets) + 1)
-        along = [[one.parts[way].amplitude_ratio for one in sets] for way in (0, 1)]
+        along = [[one.parts[way].ratios.amplitude for one in sets] for way in (0, 1)]
         across = [[one.across[when] for one in sets] for when in (0, 1)]
         for axis, pair, colours, names in ((axes[2, 0], along, (BLUE, ORANGE), ("along x", "along y")),
                                            (axes[2, 1], across, (GREY, BLUE), ("before", "after"))):
@@ -181,7 +181,7 @@ def main(strokes=STROKES, count: int = SETS, path: Path | None = HERE / "figures
               f"along y; wave heights of traces {low[0]:.1f} to {low[1]:.1f} um before, {high[0]:.1f} to {high[1]:.1f} "
               f"um after; of {count} sets reduced along x {x}, along y {y}, lower along x than along y after {less}, "
               f"before {earlier}; the interval holds the ratio of the areas in {held(sets, row)} of {2 * count}; "
-              f"with a worn depth {sum(bool(part.reference) for one in sets for part in one.parts)}")
+              f"with a worn depth {sum(bool(part.basis) for one in sets for part in one.parts)}")
         for way, (first, last) in zip((0, 1), zip(*PRINTED)):
             high = totals(sets, way)
             print(f"  along {'xy'[way]}: Pt {spread(high[0] / UM, 1)} um before, {spread(high[1] / UM, 1)} um after, "
@@ -189,7 +189,7 @@ def main(strokes=STROKES, count: int = SETS, path: Path | None = HERE / "figures
                   f"{last / first:.2f}")
     sets = found[strokes[0]][0]
     parts = middle(sets).parts
-    print("the drawn set: " + verdicts(parts, directions_of(parts))[0])
+    print("the drawn set: " + verdicts(parts, compare_directions(parts))[0])
     if path is not None:
         picture(sets, path)
     print(ANSWER)

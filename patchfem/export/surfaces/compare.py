@@ -188,12 +188,12 @@ def data_of(parts: list, verdict: tuple, directions: list, pressed: Pressed | No
 def _part_data(part: Comparison) -> dict:
     """Return one direction as plain data: sources, quantities, alignment."""
     out = {"before": part.before.source, "after": part.after.source}
-    out |= {"direction": part.direction or None, "reference": part.reference or None}
+    out |= {"direction": part.direction or None, "reference": part.basis or None}
     out |= _values_data(part.values)
     if _averaged_part(part) is not None:
         out["worn_depth_mean"]["over"] = _averaged_part(part)
     if isinstance(part.before, Profile):
-        out["registration"] = {"shift": quantity_data(part.shift), "mirrored": part.mirrored}
+        out["registration"] = {"shift": quantity_data(part.motion.shift), "mirrored": part.is_mirrored}
         sizes, *others = (_values_data(found) for found in (part.tracks.sizes, *part.tracks.others))
         out |= {
             "track": sizes or None,
@@ -237,7 +237,7 @@ def surfaces(comparison: Comparison) -> tuple:
 
     x counts from the middle, and heights are levelled by least squares, as the scene levels them.
     """
-    found = comparison.registration
+    found = comparison.alignment
     if found is None:
         traces = (comparison.before, comparison.after)
     else:
@@ -352,7 +352,7 @@ def page(parts: list, verdict: tuple, directions: list = (), pressed: Pressed | 
 def _pictures(part: Comparison) -> list:
     """Draw the pictures of one direction."""
     out = []
-    if part.registration is not None:
+    if part.alignment is not None:
         out += _aligned_pictures(part)
     elif part.change is not None and part.change.found is not None:
         out += _scan_pictures(part.change)
@@ -373,9 +373,9 @@ def _pictures(part: Comparison) -> list:
                 f"Depth of the wear track: largest {format_quantity(part.worn.largest).short}",
             )
         )
-    spectra = [size.spectrum for size in part.sizes]
+    spectra = [size.spectrum for size in part.ratios.sizes]
     if spectra and all(spectrum.density.any() for spectrum in spectra):
-        if part.registration is None:
+        if part.alignment is None:
             heights = [_levelled_heights(surface) for surface in (part.before, part.after)]
             datum = "the least-squares line or plane of each surface"
         else:
@@ -386,7 +386,7 @@ def _pictures(part: Comparison) -> list:
                 pictures.draw_both_statistics(heights, spectra, BAND),
                 f"Left: Abbott curves about {datum}. Right: spectra with their 95 % bands.",
                 "Abbott curves and spectra: amplitude ratio "
-                f"{format_quantity(part.amplitude_ratio).value}",
+                f"{format_quantity(part.ratios.amplitude).value}",
             )
         )
     return out
@@ -394,14 +394,14 @@ def _pictures(part: Comparison) -> list:
 
 def _aligned_heights(part: Comparison) -> tuple:
     """Return both aligned traces (n,) [m] about the least-squares line of the first."""
-    found = part.registration
+    found = part.alignment
     line = np.polyval(np.polyfit(found.x, found.first, 1), found.x)
     return found.first - line, found.first - found.depth - line
 
 
 def _aligned_pictures(part: Comparison) -> list:
     """Draw two aligned traces and the depth between them."""
-    found = part.registration
+    found = part.alignment
     worn = np.where(found.depth > 3 * found.noise, found.depth, 0.0)
     both = Picture(
         pictures.draw_aligned(found.x, *_aligned_heights(part), worn),

@@ -44,7 +44,7 @@ def answers(
     Returns
     -------
     list of dict
-        Plain data of each pair (`pairs.each_pair`).
+        Plain data of each pair (`pairs.compare_pairs`).
     """
 
     def answer(paths: tuple, own: str) -> dict:
@@ -56,13 +56,13 @@ def answers(
         wear = compare_runs(*paths)
         return worn.data_of(wear, worn.verdict(wear))
 
-    return pairs.each_pair(asked, answer, done)
+    return pairs.compare_pairs(asked, answer, done)
 
 
 def data_of(rows: list) -> dict:
     """Return the pairs and the means over them as plain data in SI."""
     means = []
-    for (group, direction, kind), count, averages in pairs.means_of(rows):
+    for (group, direction, kind), count, averages in pairs.average_pairs(rows):
         entry = {"group": group, "direction": direction or None, "kind": kind, "pairs": count}
         for name, average in averages.items():
             value, low, high, unit = average.mean[:4]
@@ -75,14 +75,14 @@ def data_of(rows: list) -> dict:
 def notes(rows: list) -> list:
     """State the limits of the means as sentences."""
     out = []
-    firsts = [(pairs.group_of(row), row["before"]) for row in rows if row["outcome"] == "done"]
+    firsts = [(pairs.find_group(row), row["before"]) for row in rows if row["outcome"] == "done"]
     if len(set(firsts)) < len(firsts):
         out.append(
             "some pairs share the surface measured before wear; the errors of this surface are "
             "then common to these pairs, and the intervals of the means do not include such common "
             "errors"
         )
-    for group, count, averages in pairs.means_of(rows):
+    for group, count, averages in pairs.average_pairs(rows):
         fewer = [
             f"{_words(name)} ({average.count})"
             for name, average in averages.items()
@@ -111,7 +111,7 @@ def _title(group: str, direction: str, kind: str) -> str:
 
 def write_csv(rows: list, path: Path) -> None:
     """Write a line for each pair: cells, outcome, verdict, message, quantities in SI."""
-    quantities = [pairs.numbers_of(row) for row in rows]
+    quantities = [pairs.collect_quantities(row) for row in rows]
     columns = csv_columns(quantities)
     before = ("before", "after", "direction")
     after = ("outcome", "verdict", "message")
@@ -136,7 +136,7 @@ def lines_of(rows: list) -> list:
     for row in rows:
         out.append(f"{row['before']} -> {row['after']}{_direction(row)}")
         out.append("; ".join([f"  {row['message'] or row['verdict']}", *_main_texts(row)]))
-    for group, count, averages in pairs.means_of(rows):
+    for group, count, averages in pairs.average_pairs(rows):
         if averages:
             out += ["", _heading(group, count), *_table(averages).lines()]
     return out
@@ -170,7 +170,7 @@ def _main_texts(row: dict) -> list:
         return []
     out = []
     for name in _main_names(row):
-        text = format_quantity(pairs.quantity(row[name]))
+        text = format_quantity(pairs.make_quantity(row[name]))
         if text.interval:
             interval = text.interval.replace(" .. ", " to ")
             out.append(f"{_words(name)} {text.value} ({interval}) {text.unit}".rstrip())
@@ -198,9 +198,9 @@ def page(rows: list, name: str) -> str:
     lead = f"<p class=soft>patchfem {escape(__version__)}</p><div class=verdict><b>{_headline(rows)}.</b></div>"
     lead += warned([f"{text}." for text in notes(rows)])
     sections = []
-    for number, (group, count, averages) in enumerate(pairs.means_of(rows)):
+    for number, (group, count, averages) in enumerate(pairs.average_pairs(rows)):
         if averages:
-            own = [row for row in rows if row["outcome"] == "done" and pairs.group_of(row) == group]
+            own = [row for row in rows if row["outcome"] == "done" and pairs.find_group(row) == group]
             sections.append(
                 Section(
                     f"means{number}", _heading(group, count), _means_html(number, own, averages)
@@ -235,7 +235,7 @@ def _means_html(number: int, rows: list, averages: dict) -> str:
     panels = []
     for name in _main_names(rows[0]):
         if name in averages:
-            values = {row["line"]: pairs.quantity(row[name]) for row in rows}
+            values = {row["line"]: pairs.make_quantity(row[name]) for row in rows}
             panels.append(PairsPanel(_words(name), values, averages[name].mean))
     parts = []
     if panels:

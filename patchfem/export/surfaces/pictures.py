@@ -449,10 +449,10 @@ def draw_directions(parts: list, directions: list) -> str:
 
     directions: (when, amplitude ratio, slope ratio) each.
     """
-    unit, scale = _wavelength_unit(parts[0].sizes[0].spectrum)
+    unit, scale = _wavelength_unit(parts[0].ratios.sizes[0].spectrum)
     curves = []
     for part, colour in zip(parts, ("accent", "warm")):
-        for size, when, dash in zip(part.sizes, ("before", "after"), ("dashed", "solid")):
+        for size, when, dash in zip(part.ratios.sizes, ("before", "after"), ("dashed", "solid")):
             *_, curve = _density_marks(size.spectrum, scale, colour, f"{part.direction} {when}")
             curves.append(curve | {"dash": dash})
     bars = [(f"amplitude\n{when}", amplitude) for when, amplitude, _ in directions]

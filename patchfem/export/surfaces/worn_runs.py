@@ -390,12 +390,14 @@ def _wave_ratios(x, gaps: tuple) -> dict:
 
 def _profile_ratios(before: Profile, after: Profile, texts: dict) -> dict:
     step = float(np.diff(before.x).min())
-    size_before, size_after = (ratios.size_of(profile, step) for profile in (before, after))
-    first, width = ratios.at_step(before, step)
-    second, _ = ratios.at_step(after, step)
+    size_before, size_after = (ratios.measure_size(profile, step) for profile in (before, after))
+    first, width = ratios.resample(before, step)
+    second, _ = ratios.resample(after, step)
     out = {}
-    for (part, text), likeness in zip(texts.items(), ratios.likeness(first, second, width)):
-        out[f"{part}_ratio"] = ratios.ratio(part, text, size_after, size_before, likeness)
+    for (part, text), correlation in zip(texts.items(), ratios.correlate_traces(first, second, width)):
+        out[f"{part}_ratio"] = ratios.divide_sizes(
+            part, text, size_after, size_before, correlation
+        )
     return out
 
 

@@ -1,13 +1,13 @@
 """Alignment of a second trace on a first one: its model, the floor that did not wear, and the errors of the depth."""
 
 from dataclasses import dataclass, field, replace
-from functools import cache, cached_property
-from typing import NamedTuple
+from functools import cached_property
 
 import numpy as np
 
 from ...core import PatchfemError, frozen_array
 from ..profile import Profile, runs_of
+from .boxes import make_boxes, part_means, split_edges
 from .errors import DrawnErrors, correlation_length, draw_errors, noise_along
 from .model import BENT, DATUM, MIN_HEIGHTS, RIGID, STRAIGHT, Parameter, TraceModel
 from .robust import MIN_UNWORN, REACH, find_floors, fit_biweight, solve_weighted
@@ -302,10 +302,9 @@ def find_shallow_track(depth, scale: float) -> tuple:
     """
     if depth.size < 8 * N_PARTS:
         return None, np.inf
-    edges = np.linspace(0, depth.size, N_PARTS + 1).astype(int)
-    clipped = np.clip(depth, -CLIPPED * scale, CLIPPED * scale)
-    means = np.add.reduceat(clipped, edges[:-1]) / np.diff(edges)
-    boxes = _boxes()
+    edges = split_edges(depth.size, N_PARTS)
+    means = part_means(np.clip(depth, -CLIPPED * scale, CLIPPED * scale), edges)
+    boxes = make_boxes(N_PARTS, FLANK_PARTS, MIN_PARTS, DATUM_DEGREE)
     means = means - boxes.datum @ (boxes.datum.T @ means)
     heights = boxes.shapes @ means
     best = int(np.argmax(heights))
@@ -320,34 +319,6 @@ def find_shallow_track(depth, scale: float) -> tuple:
         return None, threshold
     first, last = boxes.spans[best]
     return (int(edges[first]), int(edges[last]) - 1), threshold
-
-
-class _Boxes(NamedTuple):
-    """Boxes over the parts of a trace, less their cubic.
-
-    shapes: (m, parts) array, each of length one; sizes: (m,) lengths of a box of height one; spans:
-    first part and last part + 1 of each; datum: (parts, 4) orthonormal cubics.
-    """
-
-    shapes: np.ndarray
-    sizes: np.ndarray
-    spans: list
-    datum: np.ndarray
-
-
-@cache
-def _boxes() -> _Boxes:
-    spans = [
-        (first, last)
-        for first in range(FLANK_PARTS, N_PARTS)
-        for last in range(first + MIN_PARTS, N_PARTS - FLANK_PARTS + 1)
-    ]
-    part = np.arange(N_PARTS)
-    shapes = np.array([(part >= first) & (part < last) for first, last in spans], float)
-    datum = np.linalg.qr(np.vander(np.linspace(-1, 1, N_PARTS), DATUM_DEGREE + 1))[0]
-    shapes -= shapes @ datum @ datum.T
-    sizes = np.linalg.norm(shapes, axis=1)
-    return _Boxes(shapes / sizes[:, None], sizes, spans, datum)
 
 
 def _line_through_ends(model, best: Alignment, state, free: tuple, share: float) -> Alignment | None:

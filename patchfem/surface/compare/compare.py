@@ -1,6 +1,7 @@
-"""Two traces or two areal scans, before and after: everything that tells them apart, in one frozen record."""
+"""Comparison of two traces or two areal scans, before and after wear, as a frozen record."""
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,38 +12,91 @@ from ..profile import Profile, despiked, even
 from ..quantity import SIDE, Quantity, around, refused
 from ..roughness.spectrum import BAND
 from ..scans.change import Change, compare_scans
-from .alignment import Alignment, align
-from .flanks import Flanks, flanks_of
+from .alignment import Alignment
+from .flanks import Flanks, find_flanks
 from .gain import find_gain
 from .model import Parameter
-from .place import CLEAR, Match
-from .ratios import BEYOND, Size, at_step, bridged, likeness, loose, of_noise, ratio, scattered, size_along, size_of
-from .readings import BENT, find_readings, find_worn_flanks
+from .place import Place, find_place, try_align
+from .ratios import (
+    RATIO_ERROR,
+    Size,
+    correlate_traces,
+    divide_sizes,
+    estimate_freedom,
+    fill_scan,
+    measure_scan_size,
+    measure_size,
+    noise_fractions,
+    resample,
+    widen_ratio,
+)
+from .readings import BENT, Reading, find_readings, find_worn_flanks
 from .reference import Reference, cut_at_wear, find_reference, has_grown, limit_hidden_wear
-from .same import Place, found_place
-from .specks import without_specks
+from .search import Match
+from .section import Section
+from .specks import remove_specks
 from .worn import (
+    NO_TRACKS,
     Tracks,
     Worn,
-    beside_flanks,
+    make_section,
+    measure_flank_track,
+    measure_flank_wear,
     measure_tracks,
     measure_worn,
-    pieces_of,
-    section_of,
-    tracks_of_flanks,
-    unknown_worn,
-    worn_of_flanks,
+    refuse_worn,
+    split_at_flanks,
+    split_at_tracks,
 )
 
+# definitions of the quantities that a user reads
 SHIFT = "shift: the point at x in the first trace (before wear) is at x + shift in the second trace (after wear)"
-STRETCH = ("length of the second trace (after wear) divided by the length of the first trace for the same stretch of "
-           "surface, found from the unworn valleys")
-MIN_STRETCH = 1e-4  # difference in length that is told, however well it is known
-LOUD = 1.0  # mean square of the noise over that of the surface, from which a ratio is one of noise
+STRETCH = (
+    "length of the second trace (after wear) divided by the length of the first trace for the same stretch of "
+    "surface, found from the unworn valleys"
+)
 TILT = "tilt of the second trace (after wear) relative to the first (before wear)"
-AMPLITUDE = ("amplitude of a sine with the same mean square as the waves of 60 um to 110 um: value after wear divided "
-             "by value before")
-SLOPE = "root mean square slope between neighbouring samples: value after wear divided by value before"
+AMPLITUDE = (
+    "amplitude of a sine with the same mean square as the waves of 60 um to 110 um: value after wear divided "
+    "by value before"
+)
+SLOPE = (
+    "root mean square slope between neighbouring samples: value after wear divided by value before"
+)
+
+MIN_STRETCH = (
+    1e-4  # relative difference in length below which no note reports it, even if it is significant
+)
+MAX_NOISE_FRACTION = (
+    1.0  # noise / surface in a mean square, from which a ratio is that of the noise
+)
+N_SPECK_ROUNDS = (
+    2  # alignments after specks were removed; the second shows specks beside the first ones
+)
+
+
+class Ratios(NamedTuple):
+    """Ratios of amplitude and slope after / before wear, and `Size` before and after (none if unknown)."""
+
+    amplitude: Quantity
+    slope: Quantity
+    sizes: tuple
+
+
+class Motion(NamedTuple):
+    """Shift [m], ratio of lengths [1] and tilt [rad] of the second trace relative to the first."""
+
+    shift: Quantity
+    stretch: Quantity
+    tilt: Quantity
+
+
+class DirectionRatios(NamedTuple):
+    """Ratios of amplitude and slope along x to those along y; when: "before" or "after" wear."""
+
+    when: str
+    amplitude: Quantity
+    slope: Quantity
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,108 +108,121 @@ class Comparison:
     before, after : Profile or Areal
     direction : str
         "x" or "y" for traces of scans, else "".
-    reference : str
+    basis : str
         What the worn depth counts from: "place" (heights that agree in both traces), "flanks" (of the
-        trace after) or "" (nothing; there is no worn depth).
+        second trace) or "" (nothing; there is no worn depth).
+    motion : Motion
+    worn : Worn
+    ratios : Ratios
     match : Match or None
         Search for the same place; None for scans and where the shift is given.
-    shift, stretch, tilt, amplitude_ratio, slope_ratio : Quantity
-    worn : Worn
-    sizes : tuple
-        `Size` before and after.
-    registration : Alignment or None
+    alignment : Alignment or None
     flanks : Flanks or None
     notes : tuple of str
-    exchanged : bool
-        Whether material stands above the first trace and none is missing, or the traces share a place in
-        the other order alone.
+    is_exchanged : bool
+        Whether material stands above the first trace and none is missing, or the traces share a place
+        only if the second one is taken as the unworn one.
     tracks : Tracks
-    reference_by : Reference or None
+    reference : Reference or None
         Unworn parts or valleys that the alignment rests on.
-    hidden : Quantity
-        Wear that a wedge may hide.
+    hidden : Quantity or None
+        Wear that a wedge may hide; None for scans.
     removed : tuple of int
         Heights that are missing or left out in each.
-    mirrored : bool
+    is_mirrored : bool
         Whether the second trace was mirrored.
     gain : float or None
         Heights after over heights before, where they differ by a factor alone.
     change : Change or None
         Of two scans.
-    visible : float or None
+    detection_limit : float or None
         Depth [m] from which a track would have been found, where none was.
-    open : str
-        Readings that explain both traces alike, "" where there is one.
+    ambiguity : str
+        Readings that explain both traces equally well, "" where there is a single one.
     """
 
     before: Profile | Areal
     after: Profile | Areal
     direction: str
-    reference: str
-    match: Match | None
-    shift: Quantity
-    stretch: Quantity
-    tilt: Quantity
+    basis: str
+    motion: Motion
     worn: Worn
-    amplitude_ratio: Quantity
-    slope_ratio: Quantity
-    sizes: tuple
-    registration: Alignment | None = None
+    ratios: Ratios
+    match: Match | None = None
+    alignment: Alignment | None = None
     flanks: Flanks | None = None
-    notes: tuple = field(default=())
-    exchanged: bool = False
-    tracks: Tracks = field(default=Tracks(()))
-    reference_by: Reference | None = None
-    hidden: Quantity = field(default_factory=lambda: limit_hidden_wear(None, None))
+    notes: tuple = ()
+    is_exchanged: bool = False
+    tracks: Tracks = NO_TRACKS
+    reference: Reference | None = None
+    hidden: Quantity | None = None
     removed: tuple = (0, 0)
-    mirrored: bool = False
+    is_mirrored: bool = False
     gain: float | None = None
     change: Change | None = None
-    visible: float | None = None
-    open: str = ""
+    detection_limit: float | None = None
+    ambiguity: str = ""
 
     @property
     def values(self) -> dict:
         """Every `Quantity` by its name."""
+        ratios = {"amplitude_ratio": self.ratios.amplitude, "slope_ratio": self.ratios.slope}
         if isinstance(self.before, Areal):
-            own = {} if self.change is None else {**self.change.values, **self.change.registration}
-            if self.change is not None and self.change.track is not None and not self.change.track.why:
-                own |= _named(self.change.track.values)
-            return {**own, "amplitude_ratio": self.amplitude_ratio, "slope_ratio": self.slope_ratio}
-        out = {"shift": self.shift, "worn_depth_max": self.worn.largest, "worn_depth_mean": self.worn.mean,
-               "worn_area": self.worn.area, "amplitude_ratio": self.amplitude_ratio, "slope_ratio": self.slope_ratio,
-               "tilt": self.tilt, "scale": self.stretch}
+            return {**self._scan_values(), **ratios}
+        values = {
+            "shift": self.motion.shift,
+            "worn_depth_max": self.worn.largest,
+            "worn_depth_mean": self.worn.mean,
+            "worn_area": self.worn.area,
+            **ratios,
+            "tilt": self.motion.tilt,
+            "scale": self.motion.stretch,
+        }
         if self.worn.extent is not None:
-            names = (f"worn_{end}_{when}" for when in ("before", "after") for end in ("from", "to"))
             known = self.worn.extent.known
-            out.update(zip(names, (*known.before, *known.after)))
-            out |= {} if self.worn.within is None else {"worn_depth_within": self.worn.within}
-        out |= _named(self.tracks.sizes)
-        if isinstance(self.before, Profile):
-            out["hidden_wear"] = self.hidden
-        return out
+            for when, (start, end) in (("before", known.before), ("after", known.after)):
+                values[f"worn_from_{when}"] = start
+                values[f"worn_to_{when}"] = end
+            if self.worn.within is not None:
+                values["worn_depth_within"] = self.worn.within
+        values |= _name_track_sizes(self.tracks.sizes)
+        values["hidden_wear"] = self.hidden
+        return values
+
+    def _scan_values(self) -> dict:
+        if self.change is None:
+            return {}
+        values = {**self.change.values, **self.change.registration}
+        track = self.change.track
+        if track is not None and not track.why:
+            values |= _name_track_sizes(track.values)
+        return values
 
 
-def compared(before: Profile, after: Profile, direction: str = "", band: tuple = BAND, shift: float | None = None,
-             keep_spikes: bool = False, straight: bool = False) -> Comparison:
+def compare_traces(
+    before: Profile,
+    after: Profile,
+    direction: str = "",
+    *,
+    shift: float | None = None,
+    keep_spikes: bool = False,
+    is_straight: bool = False,
+) -> Comparison:
     """Compare two traces of a surface.
 
     Spikes, dropouts and dust are left out first. Traces that share a place, as they are or mirrored, are
-    aligned on the heights that did not wear, and the worn depth is what is missing. Else the worn depth
-    counts from unworn flanks of the second trace, or there is none.
+    aligned on the heights that did not wear, and the worn depth is what is missing. Otherwise the worn
+    depth counts from unworn flanks of the second trace, or there is none.
 
     Parameters
     ----------
     before, after : Profile
     direction : str
-    band : tuple
-        Shortest and longest wave [m] of the amplitude ratio.
     shift : float, optional
-        Known shift [m]: a place at x of the first trace is at x + shift of the second, give or take half
-        a wave.
+        Known shift [m]: a place at x of the first trace is at x + shift of the second, within half a wave.
     keep_spikes : bool
         Whether spikes stay.
-    straight : bool
+    is_straight : bool
         Whether the datum is known to be straight, so that no bow is subtracted.
 
     Raises
@@ -163,194 +230,301 @@ def compared(before: Profile, after: Profile, direction: str = "", band: tuple =
     PatchfemError
         If a trace is too short for the band.
     """
-    sides = (before, after) if keep_spikes else (despiked(before), despiked(after))
-    place = found_place(*sides, shift, not straight)
-    if place.found is not None and not keep_spikes:
-        place = _without_specks(place, not straight)
-    removed = tuple(int(one.missing.sum()) for one in (place.before, place.after))
-    return _placed(place, direction, band, removed) if place.found is not None else \
-        _flanked(_apart(place, direction, band, removed), straight, shift)
+    traces = (before, after) if keep_spikes else (despiked(before), despiked(after))
+    place = find_place(*traces, shift, is_straight=is_straight)
+    if place.alignment is None:
+        return _check_flanks(_compare_apart(place, direction), shift, is_straight)
+    if not keep_spikes:
+        place = _remove_specks(place, is_straight)
+    return _compare_aligned(place, direction)
 
 
-def _named(track) -> dict:
-    """Sizes of a track by the names that a comparison has for them."""
-    return {f"track_{name.removesuffix('_mean')}": one for name, one in track.items()}
+def _name_track_sizes(sizes) -> dict:
+    """Return the sizes of a track by the names that a comparison has for them."""
+    return {f"track_{name.removesuffix('_mean')}": size for name, size in sizes.items()}
 
 
-def identical(before, after) -> bool:
+def are_identical(before, after) -> bool:
     """Whether two surfaces have the same heights at the same places, as a file has with itself."""
-    return type(before) is type(after) and all(
-        np.array_equal(getattr(before, name), getattr(after, name), equal_nan=True) for name in "xyz"
-        if hasattr(before, name))
+    if type(before) is not type(after):
+        return False
+    names = [name for name in "xyz" if hasattr(before, name)]
+    return all(
+        np.array_equal(getattr(before, name), getattr(after, name), equal_nan=True)
+        for name in names
+    )
 
 
-def _without_specks(place: Place, bow: bool) -> Place:
-    """The place again without what stands out of the difference as no surface does."""
-    for _ in range(2):
-        before, after = without_specks(place.found, place.before, place.after)
+def _count_removed(place: Place) -> tuple:
+    return tuple(int(trace.missing.sum()) for trace in (place.before, place.after))
+
+
+def _remove_specks(place: Place, is_straight: bool) -> Place:
+    """Align the traces again without specks."""
+    for _ in range(2):  # the second time shows specks beside the first ones
+        before, after = remove_specks(place.alignment, place.before, place.after)
         if before is place.before and after is place.after:
             break
-        try:
-            found = align(before, after, place.found.shift, is_straight=not bow)
-        except PatchfemError:
+        alignment = try_align(before, after, place.alignment.shift, is_straight)
+        if alignment is None:
             break
-        place = place._replace(before=before, after=after, found=found)
+        place = place._replace(before=before, after=after, alignment=alignment)
     return place
 
 
-def _placed(place: Place, direction: str, band: tuple, removed: tuple) -> Comparison:
-    """The comparison of two traces of one place."""
-    before, after, found = place.before, place.after, place.found
-    if identical(before, after):  # but for round-off the fit finds no shift and no tilt
-        found = replace(found, state=frozen_array(np.zeros(5)))
-    section = section_of(found)
-    by = find_reference(found, section)
-    grew = has_grown(found, section)
-    reading = find_readings(found, bool(by.by), bool(by.by) or grew)
-    if reading.headline:
-        by = by._replace(by="")
-    tracks = measure_tracks(found, section, band[1]) if by.by else Tracks(())
-    worn = measure_worn(found, section, tracks)
-    gone = worn.deposited > (worn.area.high or 0.0)
-    if by.by and not worn.mean.low > 0 and gone:
-        by = by._replace(by="")
-    hidden = limit_hidden_wear(found, by)
-    if not by.by:
-        tracks = Tracks(())
-        why = (
-            "no part of the traces is known to be unworn, so uniform, wedge-shaped or bow-shaped wear cannot be "
-            "told from no wear"
-        )
-        worn = unknown_worn(reading.reason or why, worn.deposited if grew else 0.0)
-    notes, step = _steps(before, after)
-    notes += _note_stretch(found)
-    ratios, sizes = _ratios(found, tracks, step, band)
-    by = cut_at_wear(by, worn.extent)
-    shift = around(found.shift, found.error_of(Parameter.SHIFT), "m", SHIFT)
-    tilt = around(found.slope, found.error_of(Parameter.SLOPE) / found.half, "rad", TILT)
-    stretch = around(1 + found.stretch, found.error_of(Parameter.STRETCH), "1", STRETCH)
-    grown = not reading.headline and gone and grew and not (worn.mean.low or 0.0) > 0
+class _Wear(NamedTuple):
+    """What is known of the wear of aligned traces; fields as those of `Comparison`."""
+
+    worn: Worn
+    tracks: Tracks
+    reference: Reference
+    hidden: Quantity
+    reading: Reading
+    has_grown: bool
+    is_exchanged: bool
+
+
+def _compare_aligned(place: Place, direction: str) -> Comparison:
+    """Compare two traces of the same place."""
+    before, after, alignment = place.before, place.after, place.alignment
+    if are_identical(before, after):  # except for rounding the fit finds no shift and no tilt
+        alignment = replace(alignment, state=frozen_array(np.zeros(5)))
+    wear = _measure_wear(alignment, make_section(alignment))
+    is_unchanged = not wear.reference.kind and not wear.has_grown
+    step = _common_step(before, after)
+    notes = [*_note_steps(before, after), *_note_stretch(alignment)]
     return Comparison(
         before=before,
         after=after,
         direction=direction,
-        reference="place",
+        basis="place",
+        motion=_measure_motion(alignment),
+        worn=wear.worn,
+        ratios=_divide_aligned(alignment, wear.tracks, step),
         match=place.match,
-        shift=shift,
-        stretch=stretch,
-        tilt=tilt,
-        worn=worn,
-        amplitude_ratio=ratios[0],
-        slope_ratio=ratios[1],
-        sizes=sizes,
-        registration=found,
+        alignment=alignment,
         notes=tuple(notes),
-        exchanged=grown,
-        tracks=tracks,
-        reference_by=by,
-        hidden=hidden,
-        removed=removed,
-        mirrored=place.mirrored,
-        gain=None if by.by or grew else find_gain(found),
-        visible=None if by.by or grew or reading.headline else found.visible,
-        open=reading.headline,
+        is_exchanged=wear.is_exchanged,
+        tracks=wear.tracks,
+        reference=cut_at_wear(wear.reference, wear.worn.extent),
+        hidden=wear.hidden,
+        removed=_count_removed(place),
+        is_mirrored=place.is_mirrored,
+        gain=find_gain(alignment) if is_unchanged else None,
+        detection_limit=alignment.visible if is_unchanged and not wear.reading.headline else None,
+        ambiguity=wear.reading.headline,
     )
 
 
-def _ratios(found: Alignment, tracks: Tracks, step: float, band: tuple) -> tuple:
-    """Ratios of amplitude and slope of aligned traces without the edges of the tracks, and the sizes of both sides."""
-    pieces = pieces_of(found, tracks, band[1])
-    flat = pieces_of(found, tracks, band[1], True)
-    sizes = [tuple(_pooled(side, step, band) for side in zip(*one)) for one in (flat, pieces)]
-    noise_rms = float(np.sqrt(np.mean(found.noise_at**2)))
-    shares = of_noise(sizes[0], noise_rms, step, band)
+def _measure_wear(alignment: Alignment, section: Section) -> _Wear:
+    """Measure the worn depth and tracks of aligned traces, or refuse them where no reference is known."""
+    reference = find_reference(alignment, section)
+    grew = has_grown(alignment, section)
+    reading = find_readings(alignment, bool(reference.kind), bool(reference.kind) or grew)
+    if reading.headline:
+        reference = reference._replace(kind="")
+    tracks = measure_tracks(alignment, section, BAND[1]) if reference.kind else NO_TRACKS
+    worn = measure_worn(alignment, section, tracks)
+    is_mostly_deposit = worn.deposited > (worn.area.high or 0.0)
+    if not worn.mean.low > 0 and is_mostly_deposit:
+        reference = reference._replace(kind="")
+    hidden = limit_hidden_wear(alignment, reference)
+    if not reference.kind:
+        tracks = NO_TRACKS
+        reason = reading.reason or (
+            "no part of the traces is known to be unworn, so uniform, wedge-shaped or bow-shaped wear cannot be "
+            "told from no wear"
+        )
+        worn = refuse_worn(reason, worn.deposited if grew else 0.0)
+    is_worn = (worn.mean.low or 0.0) > 0
+    is_exchanged = not reading.headline and is_mostly_deposit and grew and not is_worn
+    return _Wear(worn, tracks, reference, hidden, reading, grew, is_exchanged)
+
+
+def _measure_motion(alignment: Alignment) -> Motion:
+    shift_error = alignment.error_of(Parameter.SHIFT)
+    tilt_error = alignment.error_of(Parameter.SLOPE) / alignment.half
+    stretch_error = alignment.error_of(Parameter.STRETCH)
+    return Motion(
+        around(alignment.shift, shift_error, "m", SHIFT),
+        around(1 + alignment.stretch, stretch_error, "1", STRETCH),
+        around(alignment.slope, tilt_error, "rad", TILT),
+    )
+
+
+def _refuse_motion(reason: str) -> Motion:
+    return Motion(
+        refused("m", SHIFT, reason), refused("1", STRETCH, reason), refused("rad", TILT, reason)
+    )
+
+
+def _divide_aligned(alignment: Alignment, tracks: Tracks, step: float) -> Ratios:
+    """Divide the amplitudes and slopes of aligned traces, without the edges of the tracks.
+
+    The difference between the ratios with and without the form of the tracks widens the intervals.
+    """
+    pieces = split_at_tracks(alignment, tracks, BAND[1])
+    flat = split_at_tracks(alignment, tracks, BAND[1], is_flat=True)
+    sizes = _pool_sides(pieces, step)
+    flat_sizes = _pool_sides(flat, step)
+    noise = float(np.sqrt(np.mean(alignment.noise_at**2)))
+    fractions = noise_fractions(flat_sizes, noise, step, BAND)
+    correlations = _correlate_pieces(flat, step)
     ratios = []
-    for name, text, alike, noise in zip(("amplitude", "slope"), (AMPLITUDE, SLOPE), _alike(flat, step, band), shares):
-        if noise >= LOUD:
-            why = (
-                f"the noise of the measurement, {say(found.noise)} between the traces, has a larger {name} than "
+    for name, text, correlation, fraction in zip(
+        ("amplitude", "slope"), (AMPLITUDE, SLOPE), correlations, fractions
+    ):
+        if fraction >= MAX_NOISE_FRACTION:
+            reason = (
+                f"the noise of the measurement, {say(alignment.noise)} between the traces, has a larger {name} than "
                 "the surface, so this ratio tells nothing of the surface; measure with less noise, or smooth both "
                 "traces alike"
             )
-            ratios.append(refused("1", text, why))
+            ratios.append(refused("1", text, reason))
             continue
-        one, other = (ratio(name, text, *pair[::-1], alike) for pair in sizes)
-        off = abs(np.log(one.value / other.value)) if one.value and other.value else 0.0
-        ratios.append(loose(one, float(np.hypot(np.hypot(BEYOND, noise), off))))
-    return ratios, sizes[0]
+        ratio, other = (
+            divide_sizes(name, text, after, before, correlation)
+            for before, after in (flat_sizes, sizes)
+        )
+        has_both = ratio.value and other.value
+        form_error = abs(np.log(ratio.value / other.value)) if has_both else 0.0
+        ratios.append(
+            widen_ratio(ratio, float(np.hypot(np.hypot(RATIO_ERROR, fraction), form_error)))
+        )
+    return Ratios(*ratios, flat_sizes)
 
 
-def _apart(place: Place, direction: str, band: tuple, removed: tuple) -> Comparison:
-    """The comparison of two traces without a common place."""
-    before, after, why = place.before, place.after, place.why
-    notes, step = _steps(before, after)
-    if place.order:
-        why = "the two traces match only if the second is taken as the unworn one: material grew between the " \
-              "measurements, or the two files are in the wrong order"
-    flanks = flanks_of(before, after)
-    if place.order and flanks is not None:
-        notes.append(why)
-    sides = [[before], [after] if flanks is None else beside_flanks(after, flanks, band[1])]
-    worn = worn_of_flanks(flanks) if flanks is not None else unknown_worn(why if place.order else
-        f"{why}; the second trace shows no track between unworn flanks either; a worn depth needs one of the two")
-    sizes = tuple(_pooled(side, step, band) for side in sides)
-    freedom = [[scattered(one, step, band) for one in side] for side in sides]
-    sizes = tuple(one._replace(freedom=tuple(min(a, b) for a, b in zip(one.freedom, np.sum(each, axis=0))))
-                  for one, each in zip(sizes, freedom))
-    ratios = [ratio(name, text, sizes[1], sizes[0]) for name, text in (("amplitude", AMPLITUDE), ("slope", SLOPE))]
-    blank = [refused(unit, text, why) for unit, text in (("m", SHIFT), ("1", STRETCH), ("rad", TILT))]
-    return Comparison(before, after, direction, "" if flanks is None else "flanks", place.match, *blank, worn, *ratios,
-                      sizes, None, flanks, tuple(notes), place.order,
-                      tracks_of_flanks(flanks) if flanks is not None else Tracks(()), removed=removed)
+def _compare_apart(place: Place, direction: str) -> Comparison:
+    """Compare two traces without a common place."""
+    before, after, reason = place.before, place.after, place.reason
+    step = _common_step(before, after)
+    notes = _note_steps(before, after)
+    flanks = find_flanks(before, after)
+    if place.is_reversed:
+        reason = (
+            "the two traces match only if the second is taken as the unworn one: material grew between the "
+            "measurements, or the two files are in the wrong order"
+        )
+    after_pieces = [after]
+    tracks = NO_TRACKS
+    if flanks is not None:
+        notes += [reason] * place.is_reversed
+        after_pieces = split_at_flanks(after, flanks, BAND[1])
+        tracks = measure_flank_track(flanks)
+        worn = measure_flank_wear(flanks)
+    elif place.is_reversed:
+        worn = refuse_worn(reason)
+    else:
+        worn = refuse_worn(
+            f"{reason}; the second trace shows no track between unworn flanks either; a worn depth needs one of the two"
+        )
+    sizes = tuple(_pool_with_scatter(side, step) for side in ([before], after_pieces))
+    return Comparison(
+        before=before,
+        after=after,
+        direction=direction,
+        basis="" if flanks is None else "flanks",
+        motion=_refuse_motion(reason),
+        worn=worn,
+        ratios=_divide_apart(sizes),
+        match=place.match,
+        flanks=flanks,
+        notes=tuple(notes),
+        is_exchanged=place.is_reversed,
+        tracks=tracks,
+        hidden=limit_hidden_wear(None, None),
+        removed=_count_removed(place),
+    )
 
 
-def _flanked(one: Comparison, straight: bool, shift: float | None) -> Comparison:
-    """The comparison without the depth below flanks which the first trace shows to be worn, at the shift [m] that is
-    known or clear."""
-    match = one.match
-    if shift is None and match is not None and not match.repeats and match.clear > CLEAR:
+def _divide_apart(sizes: tuple) -> Ratios:
+    """Divide the amplitudes and slopes of traces of different places."""
+    before, after = sizes
+    amplitude = divide_sizes("amplitude", AMPLITUDE, after, before)
+    return Ratios(amplitude, divide_sizes("slope", SLOPE, after, before), sizes)
+
+
+def _check_flanks(comparison: Comparison, shift: float | None, is_straight: bool) -> Comparison:
+    """Refuse the depth below flanks that the first trace shows to be worn, at a known or clear shift [m]."""
+    match = comparison.match
+    if shift is None and match is not None and not match.is_ambiguous and match.is_clear:
         shift = match.shift
-    if one.flanks is None or shift is None:
-        return one
-    why = find_worn_flanks(one.before, one.after, shift, one.flanks, straight)
-    return one if not why else replace(one, reference="", worn=unknown_worn(why), tracks=Tracks(()),
-                                       flanks=None, open="" if straight else BENT)
+    flanks = comparison.flanks
+    if flanks is None or shift is None:
+        return comparison
+    reason = find_worn_flanks(comparison.before, comparison.after, shift, flanks, is_straight)
+    if not reason:
+        return comparison
+    return replace(
+        comparison,
+        basis="",
+        worn=refuse_worn(reason),
+        tracks=NO_TRACKS,
+        flanks=None,
+        ambiguity="" if is_straight else BENT,
+    )
 
 
-def _steps(before: Profile, after: Profile) -> tuple:
-    """Notes of both traces, and the coarser of their steps [m]."""
-    steps = [one.length / (one.x.size - 1) for one in (even(before), even(after))]
-    notes = list(before.notes + after.notes)
+def _common_step(before: Profile, after: Profile) -> float:
+    """Return the coarser of the steps [m] of two traces."""
+    return max(even(before).step, even(after).step)
+
+
+def _note_steps(before: Profile, after: Profile) -> list:
+    """Collect the notes of two traces, and add one where their steps differ."""
+    steps = [even(trace).step for trace in (before, after)]
+    notes = [*before.notes, *after.notes]
     if max(steps) > 1.01 * min(steps):
-        notes.append(f"samples lie {say(steps[0])} apart before wear and {say(steps[1])} apart after wear; slopes and "
-                     f"amplitudes are computed at a step of {say(max(steps))}")
-    return notes, max(steps)
+        notes.append(
+            f"samples lie {say(steps[0])} apart before wear and {say(steps[1])} apart after wear; slopes and "
+            f"amplitudes are computed at a step of {say(max(steps))}"
+        )
+    return notes
 
 
-def _pooled(pieces: tuple, step: float, band: tuple) -> Size:
-    """Size of the pieces of a trace: mean squares by their lengths; the spectrum is that of the longest."""
-    sizes = [size_of(one, step, band) for one in pieces]
-    share = _shares(pieces)
-    squares = share @ np.array([(one.amplitude**2, one.slope**2) for one in sizes])
-    freedom = tuple(float(each) for each in np.sum([one.freedom for one in sizes], axis=0))
-    return Size(*(float(each) for each in np.sqrt(squares)), freedom, sizes[int(np.argmax(share))].spectrum)
+def _pool(pieces, step: float) -> Size:
+    """Pool the sizes of the pieces of a trace, weighted by length; the spectrum is that of the longest."""
+    sizes = [measure_size(piece, step, BAND) for piece in pieces]
+    weights = _length_fractions(pieces)
+    squares = weights @ np.array([(size.amplitude**2, size.slope**2) for size in sizes])
+    amplitude, slope = (float(value) for value in np.sqrt(squares))
+    freedom = tuple(float(value) for value in np.sum([size.freedom for size in sizes], axis=0))
+    return Size(amplitude, slope, freedom, sizes[int(np.argmax(weights))].spectrum)
 
 
-def _alike(pieces: list, step: float, band: tuple) -> tuple:
-    """Likeness of the registered pieces at an even step, by their lengths."""
-    sides = [[at_step(one, step) for one in pair] for pair in pieces]
-    found = np.array([likeness(first[0], second[0], first[1], band) for first, second in sides])
-    return tuple(float(each) for each in _shares([pair[0] for pair in pieces]) @ found)
+def _pool_sides(pairs: list, step: float) -> tuple:
+    """Pool the sizes of pairs of pieces, before and after wear."""
+    return tuple(_pool(side, step) for side in zip(*pairs))
 
 
-def _shares(pieces) -> np.ndarray:
-    length = np.array([one.length for one in pieces])
-    return length / length.sum()
+def _pool_with_scatter(pieces: list, step: float) -> Size:
+    """Pool sizes, with no more degrees of freedom than their scatter along the trace shows."""
+    size = _pool(pieces, step)
+    scatter = np.sum([estimate_freedom(piece, step, BAND) for piece in pieces], axis=0)
+    freedom = tuple(min(own, other) for own, other in zip(size.freedom, scatter))
+    return size._replace(freedom=freedom)
 
 
-def _note_stretch(found: Alignment) -> list:
-    """Note that the traces differ in length, as a sentence; nothing where they do not for sure."""
-    value, error = found.stretch, found.error_of(Parameter.STRETCH)
+def _correlate_pieces(pairs: list, step: float) -> tuple:
+    """Correlate the bands and the slopes of pairs of aligned pieces, weighted by length."""
+    correlations = []
+    for before, after in pairs:
+        first, own_step = resample(before, step)
+        second, _ = resample(after, step)
+        correlations.append(correlate_traces(first, second, own_step, BAND))
+    weights = _length_fractions([before for before, _ in pairs])
+    return tuple(float(value) for value in weights @ np.array(correlations))
+
+
+def _length_fractions(pieces) -> np.ndarray:
+    lengths = np.array([piece.length for piece in pieces])
+    return lengths / lengths.sum()
+
+
+def _note_stretch(alignment: Alignment) -> list:
+    """Note that the traces differ in length; nothing where the difference is not significant."""
+    value = alignment.stretch
+    error = alignment.error_of(Parameter.STRETCH)
     if not abs(value) >= max(SIDE * 2 * error, MIN_STRETCH):
         return []
     return [
@@ -359,78 +533,152 @@ def _note_stretch(found: Alignment) -> list:
     ]
 
 
-def compared_scans(before: Areal, after: Areal, first: str = "x", keep_spikes: bool = False) -> list[Comparison]:
-    """Compare two areal scans, place by place and by their waves in each direction: two `Comparison`, the first of
-    which has the `Change`."""
-    flat, found = tuple(map(bridged, (before, after))), compare_scans(before, after, keep_spikes)
-    notes = tuple(dict.fromkeys((*found.before.notes, *found.after.notes)))
-    return [replace(_waves(before, after, flat, first), change=found, notes=notes, removed=found.removed),
-            _waves(before, after, flat, "y" if first == "x" else "x")]
+def compare_areal_scans(
+    before: Areal, after: Areal, direction: str = "x", *, keep_spikes: bool = False
+) -> list[Comparison]:
+    """Compare two areal scans, place by place and by their waves in each direction.
+
+    Parameters
+    ----------
+    before, after : Areal
+    direction : str
+        That of the first comparison, which also has the `Change`.
+    keep_spikes : bool
+        Whether spikes stay.
+    """
+    scans = (before, after)
+    filled = tuple(fill_scan(scan) for scan in scans)
+    change = compare_scans(before, after, keep_spikes)
+    notes = tuple(dict.fromkeys((*change.before.notes, *change.after.notes)))
+    first = _compare_waves(scans, filled, direction)
+    first = replace(first, change=change, notes=notes, removed=change.removed)
+    return [first, _compare_waves(scans, filled, _other_direction(direction))]
 
 
-def _waves(before: Areal, after: Areal, flat: tuple, direction: str) -> Comparison:
-    """The waves of two scans in one direction; flat: both as `bridged`."""
-    why = "areal scans are compared point by point in x and y together"
+def _other_direction(direction: str) -> str:
+    return "y" if direction == "x" else "x"
+
+
+def _compare_waves(scans: tuple, filled: tuple, direction: str) -> Comparison:
+    """Compare the waves of two scans in one direction; filled: both as `fill_scan` returns them."""
+    reason = "areal scans are compared point by point in x and y together"
     try:
-        sizes = tuple(size_along(*one, direction) for one in flat)
-        ratios = [ratio(part, text, *sizes[::-1]) for part, text in (("amplitude", AMPLITUDE), ("slope", SLOPE))]
-    except PatchfemError as error:  # a scan too short for the waves of the band
-        sizes, ratios = (), [refused("1", text, str(error)) for text in (AMPLITUDE, SLOPE)]
-    blank = [refused(unit, text, why) for unit, text in (("m", SHIFT), ("1", STRETCH), ("rad", TILT))]
-    return Comparison(before, after, direction, "", None, *blank, unknown_worn(why), *ratios, sizes)
+        ratios = _divide_apart(tuple(measure_scan_size(*scan, direction, BAND) for scan in filled))
+    except PatchfemError as error:  # a scan may be too short for the waves of the band
+        unknown = [refused("1", text, str(error)) for text in (AMPLITUDE, SLOPE)]
+        ratios = Ratios(*unknown, ())
+    return Comparison(*scans, direction, "", _refuse_motion(reason), refuse_worn(reason), ratios)
 
 
-def directions_of(parts: list) -> list:
-    """Direction x against y, before and after: (when, amplitude ratio, slope ratio) each; nothing for one direction.
+def compare_directions(parts: list) -> list[DirectionRatios]:
+    """Compare direction x with y, before and after wear; nothing for a single direction.
 
     Traces are read at the coarsest step of all of them, so that slopes compare.
     """
-    if len(parts) < 2 or not all(one.sizes for one in parts):
+    if len(parts) < 2 or not all(part.ratios.sizes for part in parts):
         return []
-    along = {one.direction: one for one in parts}
-    sides = [(along["x"].before, along["y"].before), (along["x"].after, along["y"].after)]
-    sizes = [(one, other) for one, other in zip(along["x"].sizes, along["y"].sizes)]
+    along = {part.direction: part for part in parts}
+    directions = (along["x"], along["y"])
+    sides = [part.ratios.sizes for part in directions]
     if isinstance(parts[0].before, Profile):
-        step = max(one.length / (one.x.size - 1) for pair in sides for one in map(even, pair))
-        sizes = [tuple(size_of(one, step) for one in pair) for pair in sides]
-    return [(when, *(ratio(part, f"{part} along x divided by that along y, "
-                                 f"{when}", *pair) for part in ("amplitude", "slope")))
-            for when, pair in zip(("before", "after"), sizes)]
+        step = max(_common_step(part.before, part.after) for part in directions)
+        sides = [
+            [measure_size(trace, step) for trace in (part.before, part.after)]
+            for part in directions
+        ]
+    ratios = []
+    for when, along_x, along_y in zip(("before", "after"), *sides):
+        amplitude, slope = (
+            divide_sizes(part, f"{part} along x divided by that along y, {when}", along_x, along_y)
+            for part in ("amplitude", "slope")
+        )
+        ratios.append(DirectionRatios(when, amplitude, slope))
+    return ratios
 
 
-def compared_files(paths: tuple, direction: str = "", units: tuple | None = None,
-                   shift: float | None = None, keep_spikes: bool = False, datum: str = "") -> list[Comparison]:
-    """One `Comparison` for each direction that the files show.
+def compare_files(
+    paths: tuple,
+    direction: str = "",
+    units: tuple | None = None,
+    shift: float | None = None,
+    *,
+    keep_spikes: bool = False,
+    datum: str = "",
+) -> list[Comparison]:
+    """Compare files in each direction that they show.
 
-    paths: of the surface before and after, along one direction; two more for the other direction, of traces only. An
-    areal scan shows both. direction: "x", "y" or "" for two traces of no told direction; with four files or a scan it
-    is that of the first pair, x unless told. units: of x and of z as `read_surface` takes them. shift [m]: where it
-    is known, as `compared` takes it, of two traces alone; keep_spikes as there. datum: "straight" where that of the
-    traces is known to be, so that no bow is taken out. PatchfemError for another number of files, another direction, a
-    trace beside a scan, four scans, a shift of other than two traces, another datum, and one of scans.
+    Parameters
+    ----------
+    paths : tuple
+        Files before and after wear, along one direction; of traces, two more along the other one. An areal
+        scan shows both.
+    direction : str
+        "x" or "y", that of the first pair; "" for two traces of unknown direction, otherwise "x".
+    units : tuple, optional
+        Units of x and z for `read_surface`.
+    shift : float, optional
+        Known shift [m] of two traces, as in `compare_traces`.
+    keep_spikes : bool
+        Whether spikes stay.
+    datum : str
+        "straight" where that of the traces is known to be, so that no bow is subtracted.
+
+    Raises
+    ------
+    PatchfemError
+        If the number of files, the direction, the datum or the shift do not fit the surfaces, or a trace
+        stands beside a scan.
     """
-    if datum not in ("", "straight"):
-        raise PatchfemError(f"compare: datum {datum!r}: straight is needed, or nothing")
-    if direction not in ("", "x", "y"):
-        raise PatchfemError(f"compare: direction {direction!r}: x or y is needed")
-    if len(paths) not in (2, 4):
-        raise PatchfemError(f"compare: {len(paths)} files; two files are needed, or four: before and after along one "
-                            "direction, then before and after along the other direction")
-    files = [read_surface(path, units) for path in paths]
-    scans = {isinstance(one, Areal) for one in files}
-    if shift is not None and len(files) != 2:
-        raise PatchfemError("compare: a shift needs exactly two traces; compare each direction separately")
-    if len(scans) > 1 or (True in scans and len(files) == 4):
-        raise PatchfemError("compare: two or four traces are needed, or two areal scans")
-    if shift is not None and True in scans:
-        raise PatchfemError("compare: a shift can be given only for traces; areal scans are registered automatically")
-    if datum and True in scans:
-        raise PatchfemError("compare: a datum can be given only for traces; the plane of areal scans is fitted")
-    how = {"keep_spikes": keep_spikes, "straight": bool(datum)}
-    if True in scans:
-        return compared_scans(*files, direction or "x", keep_spikes)
-    if len(files) == 2:
-        return [compared(*files, direction, shift=shift, **how)]
+    _refuse_if(
+        (datum not in ("", "straight"), f"datum {datum!r}: straight is needed, or nothing"),
+        (direction not in ("", "x", "y"), f"direction {direction!r}: x or y is needed"),
+        (
+            len(paths) not in (2, 4),
+            f"{len(paths)} files; two files are needed, or four: before and after along one "
+            "direction, then before and after along the other direction",
+        ),
+    )
+    surfaces = [read_surface(path, units) for path in paths]
+    has_scans = _check_surfaces(surfaces, shift, datum)
+    if has_scans:
+        return compare_areal_scans(*surfaces, direction or "x", keep_spikes=keep_spikes)
+    settings = {"keep_spikes": keep_spikes, "is_straight": bool(datum)}
+    if len(surfaces) == 2:
+        return [compare_traces(*surfaces, direction, shift=shift, **settings)]
     first = direction or "x"
-    return [compared(*pair, along, **how) for pair, along in
-            ((files[:2], first), (files[2:], "y" if first == "x" else "x"))]
+    return [
+        compare_traces(*surfaces[:2], first, **settings),
+        compare_traces(*surfaces[2:], _other_direction(first), **settings),
+    ]
+
+
+def _check_surfaces(surfaces: list, shift: float | None, datum: str) -> bool:
+    """Check that shift and datum suit the surfaces, and find whether these are scans."""
+    n_scans = sum(isinstance(surface, Areal) for surface in surfaces)
+    has_shift = shift is not None
+    _refuse_if(
+        (
+            has_shift and len(surfaces) == 4,
+            "a shift needs exactly two traces; compare each direction separately",
+        ),
+        (
+            n_scans not in (0, 2) or (n_scans and len(surfaces) == 4),
+            "two or four traces are needed, or two areal scans",
+        ),
+        (
+            n_scans and has_shift,
+            "a shift can be given only for traces; areal scans are registered automatically",
+        ),
+        (
+            n_scans and datum,
+            "a datum can be given only for traces; the plane of areal scans is fitted",
+        ),
+    )
+    return n_scans > 0
+
+
+def _refuse_if(*rules: tuple) -> None:
+    """Raise the message of the first rule (condition, message) that holds."""
+    for is_wrong, message in rules:
+        if is_wrong:
+            raise PatchfemError(f"compare: {message}")

@@ -1,16 +1,19 @@
-"""A gain of the instrument: heights of the second trace that differ from the first by one factor."""
+"""A gain of the instrument: heights of the second trace that differ from the first by a single factor."""
 
 import numpy as np
 
 from .alignment import Alignment
 
-MAX_LEFT = 0.8  # of the differences, at most, that one factor of the heights leaves where it is a gain
+MAX_REMAINDER = 0.8  # remaining / total scatter of the differences; a wrong gain leaves less
 
 
-def find_gain(found: Alignment) -> float | None:
-    """Find the heights of the second trace over those of the first where one factor explains their difference."""
-    along = np.vander(np.linspace(-1, 1, found.x.size), 3)
-    high, depth = (z - along @ np.linalg.lstsq(along, z, rcond=None)[0] for z in (found.first, found.depth))
-    share = float(high @ depth) / max(float(high @ high), 1e-300)
-    left = float(np.std(depth - share * high))
-    return 1 - share if left < MAX_LEFT * float(np.std(depth)) else None
+def find_gain(alignment: Alignment) -> float | None:
+    """Find the factor between the heights after and before; None where it does not explain their difference."""
+    parabolas = np.vander(np.linspace(-1, 1, alignment.x.size), 3)
+    heights, depth = (
+        z - parabolas @ np.linalg.lstsq(parabolas, z, rcond=None)[0]
+        for z in (alignment.first, alignment.depth)
+    )
+    loss = float(heights @ depth) / max(float(heights @ heights), 1e-300)
+    remainder = float(np.std(depth - loss * heights))
+    return 1 - loss if remainder < MAX_REMAINDER * float(np.std(depth)) else None

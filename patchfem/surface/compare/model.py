@@ -54,7 +54,7 @@ class TraceModel:
         self.spline = CubicSpline(even_before.x, even_before.z)
         self.slope = self.spline.derivative()
         self.half = even_before.length / 2
-        self.step = even_before.length / (even_before.x.size - 1)
+        self.step = even_before.step
         self.height = float(level(even_before).z.std())
         largest = float(np.abs(self.z).max(initial=0.0))
         self.least = max(ROUNDING * self.height, 1e-13 * largest, 1e-300)

@@ -1,4 +1,4 @@
-"""A table of pairs of surfaces, before and after, and what the answers of several pairs have in the mean."""
+"""A table of pairs of surfaces, before and after wear, and the means over several pairs."""
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -8,18 +8,46 @@ from ...core import PatchfemError
 from ...inputs.cells import cells_of, header_of, text_of
 from ..quantity import Quantity, mean_of
 
-HEADER = "before,after"
-KINDS = {"scans": "areal scans", "run": "results folders", "place": "registered traces",
-         "flanks": "traces compared by the unworn flanks of a "
-                   "track", "nothing": "traces that cannot be registered to each other"}
-AVERAGED = ("worn_volume", "grown_volume", "worn_share", "worn_depth_mean", "worn_depth_within", "worn_depth_max",
-            "worn_area", "track_width", "track_depth", "track_depth_floor", "track_step", "track_area_gross",
-            "track_area_net", "track_pile_up", "track_pile_up_left", "track_pile_up_right", "track_length",
-            "track_volume", "amplitude_ratio", "slope_ratio")  # no places, which differ by how a trace was laid
+COLUMNS = ("before", "after")  # columns that every table has
+# what the answer of a pair is based on, in words; means are taken over pairs of the same kind only
+KINDS = {
+    "scans": "areal scans",
+    "run": "results folders",
+    "place": "registered traces",
+    "flanks": "traces compared by the unworn flanks of a track",
+    "nothing": "traces that cannot be registered to each other",
+}
+# quantities that have a mean; places have none, as they depend on where a trace begins
+AVERAGED = (
+    "worn_volume",
+    "grown_volume",
+    "worn_share",
+    "worn_depth_mean",
+    "worn_depth_within",
+    "worn_depth_max",
+    "worn_area",
+    "track_width",
+    "track_depth",
+    "track_depth_floor",
+    "track_step",
+    "track_area_gross",
+    "track_area_net",
+    "track_pile_up",
+    "track_pile_up_left",
+    "track_pile_up_right",
+    "track_length",
+    "track_volume",
+    "amplitude_ratio",
+    "slope_ratio",
+)
 
 
-class Asked(NamedTuple):
-    """A line of a table of pairs: its number, both files as written and where they lie, direction, other cells."""
+class TableLine(NamedTuple):
+    """A line of a table of pairs.
+
+    line: its number; names: both files as written; paths: where they are; direction: "x", "y" or "";
+    labels: the other cells by column.
+    """
 
     line: int
     names: tuple
@@ -28,88 +56,163 @@ class Asked(NamedTuple):
     labels: Mapping
 
 
-def read_pairs(path) -> list[Asked]:
-    """The pairs of a table with the columns before and after, files or results folders; they count from its folder.
+class Group(NamedTuple):
+    """What the pairs of a mean have in common.
 
-    A column direction (x, y or empty) tells along which the traces of a pair run; other columns are kept as text, and a
-    column group parts the means. PatchfemError for a table that is none, with file and line; Missing where it is not
-    there.
+    label: cell of the column group; direction: "x", "y" or ""; kind: key of `KINDS`. Depths that count
+    from a place, from flanks, or over an area are different quantities, and so are computed ones.
+    """
+
+    label: str
+    direction: str
+    kind: str
+
+
+class GroupMeans(NamedTuple):
+    """Means over the pairs of a group: number of pairs, and `Mean` by name."""
+
+    group: Group
+    count: int
+    means: dict
+
+
+def read_pairs(path) -> list[TableLine]:
+    """Read the pairs of a table with the columns before and after, which name files or results folders.
+
+    Names are relative to the folder of the table. A column direction (x, y or empty) gives the axis along
+    which the traces of a pair run; other columns are kept as text, and a column group separates the means.
+
+    Raises
+    ------
+    Missing
+        If the table is not there.
+    PatchfemError
+        If it is no such table, with file and line.
     """
     path = Path(path)
-    lines = text_of(path, "the table").split("\n")
-    names, _ = header_of(path, lines[0], {}, tuple(HEADER.split(",")), HEADER, True)
-    out, seen = [], {}
-    for number, line in enumerate(lines[1:], 2):
-        if not line.replace(",", "").strip():
+    header, *rows = text_of(path, "the table").split("\n")
+    columns, _ = header_of(path, header, {}, COLUMNS, ",".join(COLUMNS), True)
+    lines = []
+    numbers = {}
+    for number, row in enumerate(rows, 2):
+        if not row.replace(",", "").strip():
             continue
-        cells = cells_of(path, number, line, names)
-        if empty := [name for name in HEADER.split(",") if not cells[name]]:
-            raise PatchfemError(f"{path}:{number}: {empty[0]}: the name of a file is needed")
-        if cells.get("direction", "") not in ("", "x", "y"):
-            raise PatchfemError(f"{path}:{number}: direction: must be x, y or empty, not '{cells['direction'][:40]}'")
-        pair = tuple(path.parent / cells[name] for name in HEADER.split(","))
-        if pair in seen:
-            raise PatchfemError(f"{path}:{number}: repeats the pair of line {seen[pair]}; this pair would count twice "
-                                "in a mean")
-        seen[pair] = number
-        labels = {name: cell for name, cell in cells.items() if name not in ("before", "after", "direction")}
-        out.append(Asked(number, tuple(cells[name] for name in HEADER.split(",")), pair, cells.get("direction", ""),
-                         labels))
-    if not out:
-        raise PatchfemError(f"{path}: no pair below its header; a line such as `new.csv,worn.csv` is needed for each")
-    return out
+        line = _read_line(path, number, cells_of(path, number, row, columns))
+        if line.paths in numbers:
+            raise PatchfemError(
+                f"{path}:{number}: repeats the pair of line {numbers[line.paths]}; this pair would count twice "
+                "in a mean"
+            )
+        numbers[line.paths] = number
+        lines.append(line)
+    if not lines:
+        raise PatchfemError(
+            f"{path}: no pair below its header; a line such as `new.csv,worn.csv` is needed for each"
+        )
+    return lines
 
 
-def each_pair(asked: list, answer: Callable, done: Callable | None = None) -> list[dict]:
-    """What `answer(paths, direction)` gives of each pair, a dict, with the line of the table it stands in.
+def _read_line(path: Path, number: int, cells: dict) -> TableLine:
+    """Check the cells of a line."""
+    names = tuple(cells[column] for column in COLUMNS)
+    for column, name in zip(COLUMNS, names):
+        if not name:
+            raise PatchfemError(f"{path}:{number}: {column}: the name of a file is needed")
+    direction = cells.get("direction", "")
+    if direction not in ("", "x", "y"):
+        raise PatchfemError(
+            f"{path}:{number}: direction: must be x, y or empty, not '{direction[:40]}'"
+        )
+    labels = {
+        column: cell for column, cell in cells.items() if column not in (*COLUMNS, "direction")
+    }
+    return TableLine(number, names, tuple(path.parent / name for name in names), direction, labels)
 
-    A pair that fails has `outcome` "failed" and the reason as `message`; the others go on. done: takes the share that
-    is done.
+
+def compare_pairs(
+    lines: list, answer: Callable, report_progress: Callable | None = None
+) -> list[dict]:
+    """Compare each pair of a table.
+
+    Parameters
+    ----------
+    lines : list of TableLine
+    answer : callable
+        answer(paths, direction) returns the plain data of a pair.
+    report_progress : callable, optional
+        Receives the fraction of the pairs that are done.
+
+    Returns
+    -------
+    list of dict
+        Plain data with the cells of the line. A pair that fails has `outcome` "failed" and the reason as
+        `message`; the others continue.
     """
-    out = []
-    for one in asked:
-        own = {"line": one.line, "before": one.names[0], "after": one.names[1], "labels": dict(one.labels)}
+    rows = []
+    for line in lines:
+        before, after = line.names
+        cells = {"line": line.line, "before": before, "after": after, "labels": dict(line.labels)}
         try:
-            out.append({**answer(one.paths, one.direction), **own, "outcome": "done", "message": ""})
+            row = {**answer(line.paths, line.direction), **cells, "outcome": "done", "message": ""}
         except Exception as error:  # a defect of one pair must not cost the answers of the others
-            known = isinstance(error, PatchfemError)
-            text = str(error) if known else f"internal fault, please report it: {type(error).__name__}: {error}"
-            out.append({**own, "direction": one.direction or None, "outcome": "failed", "message": text})
-        if done is not None:
-            done(len(out) / len(asked))
-    return out
+            reason = str(error)
+            if not isinstance(error, PatchfemError):
+                reason = f"internal fault, please report it: {type(error).__name__}: {error}"
+            direction = line.direction or None
+            row = {**cells, "direction": direction, "outcome": "failed", "message": reason}
+        rows.append(row)
+        if report_progress is not None:
+            report_progress(len(rows) / len(lines))
+    return rows
 
 
-def numbers_of(row: dict) -> dict:
-    """Name -> {value, low, high, unit} of the answer of a pair; of a scan's other direction as `amplitude_ratio_y`."""
-    other = {f"{name}_{along}": part[name] for along, part in row.get("directions", {}).items()
-             if along != row["direction"] for name in ("amplitude_ratio", "slope_ratio")}
-    return {name: one for name, one in {**row, **other}.items() if isinstance(one, dict) and "value" in one}
+def collect_quantities(row: dict) -> dict:
+    """Collect the quantities {value, low, high, unit} of a pair by name.
+
+    Ratios in the other direction of a scan are named after it, such as `amplitude_ratio_y`.
+    """
+    values = dict(row)
+    for direction, part in row.get("directions", {}).items():
+        if direction != row["direction"]:
+            for name in ("amplitude_ratio", "slope_ratio"):
+                values[f"{name}_{direction}"] = part[name]
+    return {
+        name: data for name, data in values.items() if isinstance(data, dict) and "value" in data
+    }
 
 
-def quantity(one: dict) -> Quantity:
-    """A number of a pair as a `Quantity`."""
-    return Quantity(one["value"], one["low"], one["high"], one["unit"], "", one.get("reason", ""))
+def make_quantity(data: dict) -> Quantity:
+    """Make a `Quantity` from its plain data."""
+    reason = data.get("reason", "")
+    return Quantity(data["value"], data["low"], data["high"], data["unit"], "", reason)
 
 
-def means_of(rows: list) -> list[tuple]:
-    """(`group_of`, how many pairs, name -> `Mean`) of the answers of pairs, for each group of them."""
+def average_pairs(rows: list) -> list[GroupMeans]:
+    """Average the quantities of the pairs of each group, in plain data as `compare_pairs` returns it."""
     groups = {}
     for row in rows:
         if row["outcome"] == "done":
-            groups.setdefault(group_of(row), []).append(numbers_of(row))
-    out = []
-    for group, each in groups.items():
-        names = dict.fromkeys(name for one in each for name in one if name.removesuffix("_x").removesuffix("_y")
-                              in AVERAGED)
-        found = {name: mean_of([quantity(one[name]) for one in each if one.get(name, {}).get("high") is not None],
-                               "mean over the pairs") for name in names}
-        out.append((group, len(each), {name: one for name, one in found.items() if one is not None}))
-    return out
+            groups.setdefault(find_group(row), []).append(collect_quantities(row))
+    return [GroupMeans(group, len(parts), _average(parts)) for group, parts in groups.items()]
 
 
-def group_of(row: dict) -> tuple:
-    """(cell of the column group, direction, kind of `KINDS`) of the answer of a pair: depths that count from a place,
-    from flanks, or over an area are means of different things, and so are measured and computed ones."""
-    kind = row["reference"] or ("scans" if "worn_volume" in row else "nothing")
-    return row["labels"].get("group", ""), "" if "worn_volume" in row else row["direction"] or "", kind
+def _average(parts: list) -> dict:
+    """Average the quantities of several pairs that have an interval."""
+    names = dict.fromkeys(name for part in parts for name in part)
+    means = {}
+    for name in names:
+        if name.removesuffix("_x").removesuffix("_y") not in AVERAGED:
+            continue
+        known = [part[name] for part in parts if part.get(name, {}).get("high") is not None]
+        mean = mean_of([make_quantity(data) for data in known], "mean over the pairs")
+        if mean is not None:
+            means[name] = mean
+    return means
+
+
+def find_group(row: dict) -> Group:
+    """Find the group of a pair from its plain data."""
+    label = row["labels"].get("group", "")
+    if "worn_volume" in row:
+        return Group(label, "", row["reference"] or "scans")
+    return Group(label, row["direction"] or "", row["reference"] or "nothing")

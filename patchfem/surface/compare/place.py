@@ -1,203 +1,270 @@
-"""Whether two traces run over the same place: their valleys against those of traces made by chance, or part by part.
+"""Decision whether two traces run over the same place, by correlation and by the heights that agree there."""
 
-A track, a scratch or a step spoils the parts that it crosses, and no others.
-"""
-
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from ...core import PatchfemError
-from ..profile import Profile, even
-from ..roughness.filter import mean_line
+from ...core import PatchfemError, frozen_array, say
+from ..profile import Profile
+from .alignment import SHORT_END, Alignment, align
+from .boxes import subtract_line
+from .errors import correlation_length
+from .robust import MIN_UNWORN
+from .search import (
+    MIN_CLEARANCE,
+    Match,
+    decorrelation_lag,
+    find_period,
+    resample_both,
+    search_shift,
+    search_shift_in_parts,
+)
+from .worn import wear_balance
 
-COARSE = 1 << 13  # samples of a trace in the search
-OVERLAP = 0.5  # of the shorter trace, at least, lies on the other one
-LONGEST = 0.25  # of the trace: longer waves, tilt among them, do not count in the search
-CHANCE = 100  # made traces
-CLEAR = 5.0  # standard deviations above the made traces: chance reaches it in about one of a thousand pairs
-APART = 0.3  # of Fisher's z between the best and the second best shift; 150 made pairs had 0.64 at least
-TWIN = 0.97  # correlation of the second best shift from which the surface is periodic
-SEED = 1985
-PARTS, BEST = 12, 4  # of the first trace, and how many of them count: those that agree best
-FEWEST = 16  # samples of a part
-MOST = 0.999  # likeness of a part that counts: one part alone proves no place
+MAX_NOISE = 0.1  # noise / root mean square height; a larger noise may be wear of the valleys too
+MAX_LOW_NOISE = 0.02  # same ratio, below which a smaller clearance is enough
+MIN_LOW_CLEARANCE = (
+    2.5  # standard deviations above the random traces that are enough at this low noise
+)
+MAX_WHITE_NOISE = (
+    0.3  # noise / height of white noise, which is that of the instrument: wear is not white
+)
+MAX_WHITE_NOISE_AT_MARK = 0.5  # same ratio at a shift that the user gave
+MAX_WHITE_LENGTH = 1.5  # neighbouring heights that err alike in white noise
+MIN_WEAR_BALANCE = (
+    0.9  # (missing - grown) / (missing + grown) area from which wear alone explains it
+)
+MIN_AGREED = 0.6  # fraction of the heights that agree; chance brings 0.41 at MAX_WHITE_NOISE
+MARK = "if both traces were measured from the same mark, use --shift '0 mm'"
 
 
-class Match(NamedTuple):
-    """Where the valleys of two traces agree best.
+class Place(NamedTuple):
+    """Place that two traces share, or the reason why there is none.
 
-    shift [m]: a place at x of the one stands at x + shift of the other; likeness: correlation there; second: the best
-    correlation at another shift, beyond the next one without correlation; chance: mean and
-    scatter of the best correlation of made traces, as Fisher's z; clear: how many scatters the likeness lies above it.
+    match: the search, None where the shift is given; alignment: None where the places are not the same;
+    reason: why, in words; is_reversed: whether the traces share a place if the second one is taken as
+    the unworn one; before, after: the traces as they were compared; is_mirrored: whether the second
+    one was mirrored for that.
     """
 
-    shift: float
-    likeness: float
-    second: float
-    chance: tuple
-    clear: float
-
-    @property
-    def repeats(self) -> bool:
-        """Whether another shift fits nearly as well, as on a turned surface."""
-        return self.second > TWIN or fisher(self.likeness) - fisher(self.second) < APART
+    match: Match | None
+    alignment: Alignment | None
+    reason: str = ""
+    is_reversed: bool = False
+    before: Profile | None = None
+    after: Profile | None = None
+    is_mirrored: bool = False
 
 
-def matched(before: Profile, after: Profile) -> Match:
-    """Search the shift at which the valleys of both traces agree best, and how clearly it stands out.
+class _Candidate(NamedTuple):
+    """Match and alignment (None where it fails) of the search, and the match of the valleys."""
 
-    Waves longer than a quarter of the shorter trace are filtered off both and what lies above the median is cut off, as
-    wear does. Every shift with half of the shorter trace in common is tried. The same search with `CHANCE` traces that
-    have the spectrum of the first one and random phases tells what chance brings; a surface that repeats itself, such
-    as a turned one, shows in the second best shift. PatchfemError for fewer than 16 samples.
+    match: Match
+    alignment: Alignment | None
+    valleys: Match
+
+
+def find_place(
+    before: Profile, after: Profile, shift: float | None = None, *, is_straight: bool = False
+) -> Place:
+    """Find the place that two traces share, as they are, else with the second one mirrored.
+
+    Traces of a periodic surface, and traces at a known shift, are not mirrored.
+
+    Parameters
+    ----------
+    before, after : Profile
+    shift : float, optional
+        Shift [m] that is known from a mark.
+    is_straight : bool
+        Whether the datum is known to be straight, so that no bow is subtracted.
     """
-    first, second, step, start = prepared(before, after)
-    search = _Search(first.size, _valleys(second))
-    lag, likeness, second = search.best(_valleys(first))
-    random = np.random.default_rng(SEED)
-    found = np.array([search.best(_valleys(shuffled(first, random)))[1] for _ in range(CHANCE)])
-    z = fisher(found)
-    clear = (fisher(likeness) - z.mean()) / z.std(ddof=1)
-    return Match(start + lag * step, likeness, second, (float(z.mean()), float(z.std(ddof=1))),
-                 float(clear))
+    place = find_place_as_given(before, after, shift, is_straight=is_straight)
+    place = place._replace(before=before, after=after)
+    if place.alignment is not None or shift is not None:
+        return place
+    if place.match.is_ambiguous and place.match.is_clear:
+        return place
+    x = frozen_array(after.x[0] + after.x[-1] - after.x[::-1])
+    mirrored = replace(after, x=x, z=frozen_array(after.z[::-1]))
+    match, alignment, _ = _search_place(before, mirrored, is_straight)
+    if alignment is None:
+        return place
+    return Place(match, alignment, before=before, after=mirrored, is_mirrored=True)
 
 
-def prepared(before: Profile, after: Profile) -> tuple:
-    """Heights (n,) [m] of both traces at one even step without their long waves, that step, and the shift of the first
-    samples [m]. PatchfemError for fewer than 16 samples."""
-    one, other = even(before), even(after)
-    if min(one.x.size, other.x.size) < 16:
-        raise PatchfemError(f"{one.source}, {other.source}: at least 16 samples are needed to compare two traces")
-    step = max(max(one.length, other.length) / COARSE, *(each.length / (each.x.size - 1) for each in (one, other)))
-    first, second = (_read(each, step) for each in (one, other))
-    cutoff = LONGEST * min(first.size, second.size)
-    first, second = (z - mean_line(z, cutoff, tilted=True) for z in (first, second))
-    return first, second, step, float(other.x[0] - one.x[0])
+def find_place_as_given(
+    before: Profile, after: Profile, shift: float | None = None, *, is_straight: bool = False
+) -> Place:
+    """Find the place that two traces share by their valleys, else part by part.
 
-
-def within(count: int, other: int) -> np.ndarray:
-    """Lags at which two traces of so many samples have enough in common."""
-    lags = np.arange(1 - count, other)
-    common = np.minimum(count, other - lags) - np.maximum(0, -lags)
-    return lags[common >= OVERLAP * min(count, other)]
-
-
-def fisher(likeness):
-    """Fisher's z of a correlation: its scatter does not depend on it."""
-    return np.arctanh(np.clip(likeness, -1 + 1e-12, 1 - 1e-12))
-
-
-def _read(trace: Profile, step: float) -> np.ndarray:
-    """Heights at an even step, each the mean of the trace over it where it is coarser than the samples."""
-    count = int(trace.length / step * (1 + 1e-9)) + 1
-    own = trace.length / (trace.x.size - 1)
-    many = max(1, round(step / own))
-    z = np.convolve(np.pad(trace.z, (many // 2, many - 1 - many // 2), "edge"), np.full(many, 1 / many), "valid")
-    return np.interp(trace.x[0] + step * np.arange(count), trace.x, z)
-
-
-def _valleys(z) -> np.ndarray:
-    low = np.minimum(z - np.median(z), 0.0)
-    return low - low.mean()
-
-
-def shuffled(z, random) -> np.ndarray:
-    transform = np.fft.rfft(z - z.mean())
-    return np.fft.irfft(np.abs(transform) * np.exp(2j * np.pi * random.uniform(size=transform.size)), z.size)
-
-
-class _Search:
-    """Correlation of one trace with others of a length at all lags with enough in common, by transforms."""
-
-    def __init__(self, count: int, fixed):
-        from scipy.fft import next_fast_len, rfft
-
-        self.count, self.fixed = count, fixed
-        self.size = next_fast_len(count + fixed.size, real=True)
-        self.transform, self.squares = rfft(fixed, self.size), rfft(fixed**2, self.size)
-        self.lags = within(count, fixed.size)
-        self.power = self._through(np.ones(count), self.squares)
-
-    def _through(self, moved, transform):
-        """Sum of moved[i] fixed[i + lag] at the lags."""
-        from scipy.fft import irfft, rfft
-
-        whole = irfft(transform * np.conj(rfft(moved, self.size)), self.size)
-        return whole[self.lags % self.size]
-
-    def best(self, moved) -> tuple:
-        """Lag of the largest correlation, that, and the largest one beyond the next lags without correlation."""
-        from scipy.fft import rfft
-
-        own = self._through(moved**2, rfft(np.ones(self.fixed.size), self.size))
-        product = np.maximum(own, 0.0) * np.maximum(self.power, 0.0)
-        worth = product > 1e-20 * product.max(initial=0.0)
-        found = np.zeros(self.lags.size)
-        np.divide(self._through(moved, self.transform), np.sqrt(product), out=found, where=worth)
-        at = int(np.argmax(found))
-        none = np.flatnonzero(found <= 0)
-        low, high = none[none < at], none[none > at]
-        beyond = np.concatenate([found[:low[-1]] if low.size else [], found[high[0]:] if high.size else []])
-        return (int(self.lags[at]), float(np.clip(found[at], -1.0, 1.0)),
-                float(np.clip(beyond.max(initial=-1.0), -1.0, 1.0)))
-
-
-def matched_in_parts(before: Profile, after: Profile) -> Match | None:
-    """Search the shift at which single parts of both traces agree best; None for traces of less than 192 samples.
-
-    Traces are read as in `matched`, but nothing is cut off. The first is cut into 12 parts, each is laid on the second
-    at every shift, both less their means there, and the mean of Fisher's z of the four likest parts is the score; its
-    tanh stands for the likeness. Chance is told as in `matched`, by the same search with traces of the same spectrum.
+    A place counts where it stands out from chance, only once, and the unworn heights agree there, within
+    10 % of the root mean square height or within 30 % where their differences are white noise.
+    Parameters as in `find_place`.
     """
-    first, second, step, start = prepared(before, after)
-    size = first.size // PARTS
-    if size < FEWEST or second.size < size:
+    if shift is not None:
+        return _align_at_mark(before, after, shift, is_straight)
+    match, alignment, valleys = _search_place(before, after, is_straight)
+    if alignment is not None:
+        return Place(match, alignment)
+    is_reversed = _is_reversed(before, after, match)
+    return Place(match, None, _describe_failure(before, after, match, valleys), is_reversed)
+
+
+def _search_place(before: Profile, after: Profile, is_straight: bool) -> _Candidate:
+    """Search the place by the valleys, and part by part where these do not show it."""
+    match = search_shift(before, after)
+    valleys = match
+    alignment = None
+    if not match.is_ambiguous:
+        alignment = _align_at_match(before, after, match, is_straight)
+    if alignment is None:
+        parts = search_shift_in_parts(before, after)
+        if parts is not None and parts.is_clear and not parts.is_ambiguous:
+            match = parts
+            alignment = _align_at_match(before, after, parts, is_straight)
+    return _Candidate(match, alignment, valleys)
+
+
+def try_align(
+    before: Profile, after: Profile, shift: float, is_straight: bool = False
+) -> Alignment | None:
+    """Align two traces as `align` does; None where hardly any heights agree."""
+    try:
+        return align(before, after, shift, is_straight=is_straight)
+    except PatchfemError:
         return None
-    lags = within(first.size, second.size)
-    search = _PartSearch(second, size, lags)
-    score = search.scores(first)
-    at, apart = int(np.argmax(score)), alone(first)
-    beyond = score[abs(lags - lags[at]) > apart]
-    random = np.random.default_rng(SEED)
-    found = np.array([search.scores(shuffled(first, random)).max() for _ in range(CHANCE)])
-    clear = (score[at] - found.mean()) / max(float(found.std(ddof=1)), 1e-12)
-    return Match(start + float(lags[at]) * step, float(np.tanh(score[at])), float(np.tanh(beyond.max(initial=0.0))),
-                 (float(found.mean()), float(found.std(ddof=1))), float(clear))
 
 
-def alone(first) -> int:
-    """Samples beyond which a trace is no longer like itself: to the first zero of its correlation."""
-    power = np.abs(np.fft.rfft(first - first.mean(), 2 * first.size)) ** 2
-    none = np.flatnonzero(np.fft.irfft(power)[:first.size] <= 0)
-    return int(none[0]) if none.size else first.size // 2
+def _align_at_match(
+    before: Profile, after: Profile, match: Match, is_straight: bool
+) -> Alignment | None:
+    """Align two traces at a match; None where their unworn heights do not agree there."""
+    if not match.clearance > min(MIN_CLEARANCE, MIN_LOW_CLEARANCE):
+        return None
+    alignment = try_align(before, after, match.shift, is_straight)
+    if alignment is None or not _is_same_place(alignment, match):
+        return None
+    return alignment
 
 
-class _PartSearch:
-    """Scores of the parts of a trace on a fixed one at the lags, by transforms."""
+def _align_at_mark(before: Profile, after: Profile, shift: float, is_straight: bool) -> Place:
+    """Align two traces from a shift [m] that is known; refuse them where they do not agree near it."""
+    start = f"at the given shift of {say(shift)}, "
+    alignment = try_align(before, after, shift, is_straight)
+    if alignment is None:
+        return Place(
+            None, None, f"{start}hardly any heights of the traces agree; is the shift right?"
+        )
+    resampled = resample_both(before, after)
+    if abs(alignment.shift - shift) > decorrelation_lag(resampled.first) * resampled.step:
+        best = say(alignment.shift)
+        return Place(
+            None, None, f"{start}the traces do not match: the best fit has a shift of {best}"
+        )
+    is_quiet = _is_quiet(alignment, MAX_WHITE_NOISE_AT_MARK) and _has_enough_unworn(alignment)
+    if not (_has_high_agreement(alignment) or is_quiet):
+        reason = f"{start}{_describe_noise(alignment)}, which is no better than chance; is the shift right?"
+        return Place(None, None, reason)
+    return Place(None, alignment)
 
-    def __init__(self, fixed, size: int, lags):
-        from scipy.fft import next_fast_len, rfft
 
-        self.fixed, self.size, self.lags = fixed, size, lags
-        self.length = next_fast_len(fixed.size + size, real=True)
-        self.transform = rfft(fixed, self.length)
-        sums = [np.concatenate([[0.0], np.cumsum(z)]) for z in (fixed, fixed**2)]
-        mean, square = ((one[size:] - one[:-size]) / size for one in sums)
-        self.power = size * np.maximum(square - mean**2, 1e-12 * max(float(fixed.var()), 1e-300))
+def _has_enough_unworn(alignment: Alignment) -> bool:
+    """Whether enough heights agree: more than both flanks where the datum was declared straight."""
+    return alignment.agreed > (2 * SHORT_END if alignment.is_straight else MIN_UNWORN)
 
-    def scores(self, moved) -> np.ndarray:
-        """Score at each lag of a trace cut into parts."""
-        from scipy.fft import irfft, rfft
 
-        size, many = self.size, self.power.size
-        parts = moved[:PARTS * size].reshape(PARTS, size)
-        parts = parts - parts.mean(axis=1, keepdims=True)
-        own = np.maximum((parts**2).sum(axis=1), 1e-300)
-        product = irfft(self.transform * np.conj(rfft(parts, self.length, axis=1)), self.length, axis=1)[:, :many]
-        likeness = product / np.sqrt(own[:, None] * self.power)
-        place = self.lags + size * np.arange(PARTS)[:, None]
-        there = (place >= 0) & (place < many)
-        z = np.where(there, np.take_along_axis(likeness, np.clip(place, 0, many - 1), axis=1), 0.0)
-        z = fisher(np.clip(z, 0.0, MOST))
-        return np.partition(z, PARTS - BEST, axis=0)[PARTS - BEST:].mean(axis=0)
+def _rms_height(x, z) -> float:
+    """Return the root mean square height [m] about the least-squares line."""
+    return float(np.std(subtract_line(x, z)))
+
+
+def _relative_noise(alignment: Alignment) -> float:
+    """Return the noise over the root mean square height of the first trace."""
+    return alignment.noise / _rms_height(alignment.x, alignment.first)
+
+
+def _is_same_place(alignment: Alignment, match: Match) -> bool:
+    """Whether the unworn heights are so many and so similar that the place is the same."""
+    if _agrees_closely(alignment, match):
+        return True
+    is_quiet = _is_quiet(alignment, MAX_WHITE_NOISE) and _has_enough_unworn(alignment)
+    return match.is_clear and (is_quiet or _has_high_agreement(alignment))
+
+
+def _has_high_agreement(alignment: Alignment) -> bool:
+    """Whether more heights agree than chance brings at this noise."""
+    height = _rms_height(alignment.x, alignment.first)
+    return alignment.agreed > MIN_AGREED and alignment.noise < MAX_WHITE_NOISE * height
+
+
+def _agrees_closely(alignment: Alignment, match: Match, max_height: float = np.inf) -> bool:
+    """Whether the noise is so small that it needs not be white.
+
+    max_height [m] limits the height that the noise is compared with: the depth of a track does not
+    count as roughness.
+    """
+    height = min(_rms_height(alignment.x, alignment.first), max_height)
+    is_close = alignment.noise < MAX_NOISE * height and match.is_clear
+    if not is_close:
+        is_close = alignment.noise < MAX_LOW_NOISE * height and match.clearance > MIN_LOW_CLEARANCE
+    return is_close and _has_enough_unworn(alignment)
+
+
+def _is_quiet(alignment: Alignment, max_white: float) -> bool:
+    """Whether the relative noise is below 10 %, or white and below a limit."""
+    noise = _relative_noise(alignment)
+    if noise < MAX_NOISE:
+        return True
+    length = correlation_length(np.asarray(alignment.depth), alignment.unworn)
+    return noise < max_white and length <= MAX_WHITE_LENGTH
+
+
+def _is_reversed(before: Profile, after: Profile, match: Match) -> bool:
+    """Whether the traces share a place if the second one is taken as the unworn one.
+
+    Wear alone, and nothing grown, must then explain the difference, and as given no end may be unworn:
+    traces that are too noisy for a place, with a floor that wore uniformly, are not reversed.
+    """
+    if not match.is_clear or match.is_ambiguous:
+        return False
+    back = try_align(after, before, -match.shift)
+    if back is None or not _agrees_closely(back, match, _rms_height(before.x, before.z)):
+        return False
+    if not wear_balance(back) > MIN_WEAR_BALANCE:
+        return False
+    alignment = try_align(before, after, match.shift)
+    return alignment is None or not any(alignment.unworn_ends())
+
+
+def _describe_noise(alignment: Alignment) -> str:
+    return (
+        f"the best-matching {100 * alignment.unworn.mean():.0f} % of the heights still differ by "
+        f"{say(alignment.noise)}, {100 * _relative_noise(alignment):.0f} % of the root mean square height before wear"
+    )
+
+
+def _describe_failure(before: Profile, after: Profile, match: Match, valleys: Match) -> str:
+    """Describe why no place was found and what to do."""
+    if valleys.is_ambiguous and valleys.is_clear and match is valleys:
+        return (
+            f"the surface is periodic, with a period of {say(find_period(before, after))}, so shifts that are far "
+            f"apart match equally well (correlations {valleys.correlation:.3f} and {valleys.second:.3f}); {MARK}"
+        )
+    if match.is_clear and not match.is_ambiguous:
+        alignment = try_align(before, after, match.shift)
+        if alignment is None:
+            return f"at the most likely shift, {say(match.shift)}, hardly any heights are unworn"
+        return (
+            f"no unworn part was found that both traces show: at the most likely shift, {say(match.shift)}, "
+            f"{_describe_noise(alignment)}; {MARK}"
+        )
+    mean, scatter = valleys.chance
+    threshold = np.tanh(mean + MIN_CLEARANCE * scatter)
+    return (
+        f"the two traces show no common part: the best correlation of their valleys is {valleys.correlation:.2f}, but "
+        f"only values above {threshold:.2f} are significant; {MARK}; if the "
+        "heights of one trace count into the material, change their sign (the search for such traces was removed "
+        "in patchfem 1.0)"
+    )

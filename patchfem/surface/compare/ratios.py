@@ -1,4 +1,4 @@
-"""Ratio of two amplitudes or slopes with the interval that single traces allow."""
+"""Ratios of the amplitudes and slopes of two surfaces, with the interval that a single pair allows."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -12,15 +12,16 @@ from ..quantity import LEVEL, SIDE, Quantity, refused
 from ..roughness.intervals import Intervals
 from ..roughness.parameters import Heights
 from ..roughness.spectrum import BAND, Spectrum, amplitude_of, refuse_band, spectrum_of
+from .boxes import part_means, split_edges
 
-BEYOND = 0.004  # standard deviation of a ratio by what noise does not tell: the tip, interpolation, the datum
-BRIDGED = 1 / 3  # of the heights of a trace of a scan, at most, may be missing
-MOST = 256  # traces of a scan in one direction that are read, spread over it: neighbours tell nearly the same
-PLACES = 6  # parts of a trace whose mean squares scatter from place to place
+RATIO_ERROR = 0.004  # standard deviation of a ratio by tip, interpolation and datum, which noise does not show
+MAX_MISSING = 1 / 3  # fraction of the heights of a line of a scan that may be missing
+MAX_LINES = 256  # lines of a scan that are read; more are nearly equal to their neighbours
+N_PARTS = 6  # parts of a trace whose mean squares show the scatter from place to place
 
 
 class Size(NamedTuple):
-    """Amplitude of the band [m] and root mean square of the slope [1], their degrees of freedom, and the spectrum."""
+    """Amplitude of the band [m], root mean square slope [1], degrees of freedom of each, and spectrum."""
 
     amplitude: float
     slope: float
@@ -28,152 +29,226 @@ class Size(NamedTuple):
     spectrum: Spectrum
 
 
-def size_of(trace: Profile, step: float, band: tuple = BAND) -> Size:
-    """Amplitude and slope of a trace, read at a step [m] so that slopes of several traces compare.
+def measure_size(trace: Profile, step: float, band: tuple = BAND) -> Size:
+    """Measure the amplitude and the slope of a trace.
 
-    PatchfemError where the trace cannot show the band.
+    Parameters
+    ----------
+    trace : Profile
+    step : float
+        Step [m] at which the trace is read; slopes compare at the same step only.
+    band : tuple
+        Shortest and longest wave [m] of the amplitude.
+
+    Raises
+    ------
+    PatchfemError
+        If the trace is too short or too coarse for the band.
     """
-    z, step = at_step(trace, step)
+    z, step = resample(trace, step)
     refuse_band(trace.source, *band, step * (z.size - 1), step)
-    return _size(z, step, band)
+    return _measure_heights(z, step, band)
 
 
-def _size(z, step: float, band: tuple) -> Size:
-    found = spectrum_of(z, step)
-    heights = Heights(z, step)
-    inner = Intervals(heights, 1, found, band)
-    freedom = (inner.freedom("band"), inner.freedom("slope")) if found.density.any() else (1.0, 1.0)
-    return Size(amplitude_of(found, *band), float(np.sqrt(np.mean(np.diff(z) ** 2))) / step, freedom, found)
+def _measure_heights(z, step: float, band: tuple) -> Size:
+    """Measure levelled heights (n,) [m] at a step [m]."""
+    spectrum = spectrum_of(z, step)
+    freedom = (1.0, 1.0)
+    if spectrum.density.any():
+        intervals = Intervals(Heights(z, step), 1, spectrum, band)
+        freedom = (intervals.freedom("band"), intervals.freedom("slope"))
+    slope = float(np.sqrt(np.mean(np.diff(z) ** 2))) / step
+    return Size(amplitude_of(spectrum, *band), slope, freedom, spectrum)
 
 
-def at_step(trace: Profile, step: float) -> tuple:
-    """Levelled heights (n,) [m] of a trace near a step [m] that is no finer than its own, and that step."""
+def resample(trace: Profile, step: float) -> tuple:
+    """Return levelled heights (n,) [m] near a step [m] that is no finer than that of the trace, and the step."""
     flat = level(even(trace))
-    own = flat.length / (flat.x.size - 1)
-    if step < own * 1.01:
-        return flat.z, own
+    if step < flat.step * 1.01:
+        return flat.z, flat.step
     count = int(flat.length / step * (1 + 1e-9)) + 1
     x = flat.x[0] + step * np.arange(count)
-    flat = level(Profile(frozen_array(x), frozen_array(np.interp(x, flat.x, flat.z)), flat.source))
-    return flat.z, step
+    z = np.interp(x, flat.x, flat.z)
+    return level(Profile(frozen_array(x), frozen_array(z), flat.source)).z, step
 
 
-def bridged(scan: Areal) -> tuple:
-    """A scan about its least-squares plane with a smooth surface over missing heights, and which these are (m, n)."""
+def fill_scan(scan: Areal) -> tuple:
+    """Level a scan and fill its missing heights smoothly; returns it and the missing heights (m, n)."""
     flat = level_plane(scan)
     return replace(flat, z=filled(flat.z, flat.missing)), flat.missing
 
 
-def size_along(scan: Areal, lost, direction: str, band: tuple = BAND) -> Size:
-    """Amplitude and slope of the traces of a `bridged` scan in one direction, rows for x and columns for y.
+def measure_scan_size(scan: Areal, missing, direction: str, band: tuple = BAND) -> Size:
+    """Measure the amplitude and the slope of the lines of a scan in one direction.
 
-    Mean squares are averaged, of traces of which a third at most was missing, `MOST` of them. Neighbouring traces tell
-    nearly the same: the degrees of freedom of one trace count as often as traces are independent, by the correlation of
-    their mean squares across the scan. PatchfemError where no whole trace is left, or the traces cannot show the band.
+    Mean squares are averaged over the lines. Neighbouring lines are nearly equal, so the degrees of
+    freedom of a line are multiplied by the number of independent lines.
+
+    Parameters
+    ----------
+    scan : Areal
+    missing : (m, n) bool array
+        As `fill_scan` returns both.
+    direction : str
+        "x" for rows, "y" for columns.
+    band : tuple
+        Shortest and longest wave [m].
+
+    Raises
+    ------
+    PatchfemError
+        If every line lacks too many heights, or the lines cannot show the band.
     """
-    z, lost, x = (scan.z, lost, scan.x) if direction == "x" else (scan.z.T, lost.T, scan.y)
-    rows = np.flatnonzero(lost.mean(axis=1) <= BRIDGED)
-    z = z[rows[np.linspace(0, rows.size - 1, min(rows.size, MOST)).astype(int)]]
+    z, x = (scan.z, scan.x) if direction == "x" else (scan.z.T, scan.y)
+    missing = missing if direction == "x" else missing.T
+    rows = np.flatnonzero(missing.mean(axis=1) <= MAX_MISSING)
+    z = z[rows[np.linspace(0, rows.size - 1, min(rows.size, MAX_LINES)).astype(int)]]
     if not len(z):
-        raise PatchfemError(f"{scan.source}: along {direction} every line of the scan lacks more than a third of its "
-                            "heights")
+        raise PatchfemError(
+            f"{scan.source}: along {direction} every line of the scan lacks more than a third of its heights"
+        )
     step = float(x[-1] - x[0]) / (x.size - 1)
     refuse_band(scan.source, *band, step * (x.size - 1), step)
-    sizes = [_size(level(Profile(x, row, scan.source)).z, step, band) for row in z]
-    squares = np.array([(one.amplitude**2, one.slope**2) for one in sizes])
-    mean = np.sqrt(squares.mean(axis=0))
-    freedom = np.mean([one.freedom for one in sizes], axis=0)
-    freedom = tuple(float(f * _independent(column)) for f, column in zip(freedom, squares.T))
-    density = np.mean([one.spectrum.density for one in sizes], axis=0)
-    found = Spectrum(sizes[0].spectrum.frequency, frozen_array(density), sizes[0].spectrum.tapers,
-                     sizes[0].spectrum.length)
-    return Size(float(mean[0]), float(mean[1]), freedom, found)
+    sizes = [_measure_heights(level(Profile(x, row, scan.source)).z, step, band) for row in z]
+    squares = np.array([(size.amplitude**2, size.slope**2) for size in sizes])
+    amplitude, slope = np.sqrt(squares.mean(axis=0))
+    freedom = np.mean([size.freedom for size in sizes], axis=0)
+    freedom = [float(each * _count_independent(part)) for each, part in zip(freedom, squares.T)]
+    density = np.mean([size.spectrum.density for size in sizes], axis=0)
+    spectrum = sizes[0].spectrum
+    spectrum = Spectrum(spectrum.frequency, frozen_array(density), spectrum.tapers, spectrum.length)
+    return Size(float(amplitude), float(slope), tuple(freedom), spectrum)
 
 
-def _independent(values) -> float:
-    """How many of neighbouring values are independent: n / (1 + 2 sum of their correlations up to the first zero)."""
-    off = values - values.mean()
-    power, total = float(off @ off), 1.0
+def _count_independent(values) -> float:
+    """Estimate the number of independent values: n / (1 + 2 sum of correlations up to the first zero)."""
+    deviation = values - values.mean()
+    power = float(deviation @ deviation)
     if power == 0:
         return 1.0
+    total = 1.0
     for lag in range(1, values.size):
-        found = float(off[lag:] @ off[:-lag]) / power
-        if found <= 0:
+        correlation = float(deviation[lag:] @ deviation[:-lag]) / power
+        if correlation <= 0:
             break
-        total += 2 * found
+        total += 2 * correlation
     return max(values.size / total, 1.0)
 
 
-def ratio(part: str, text: str, over: Size, under: Size, alike: float = 0.0) -> Quantity:
-    """Ratio of the amplitudes or slopes of two traces, part "amplitude" or "slope".
+def divide_sizes(
+    part: str, text: str, over: Size, under: Size, correlation: float = 0.0
+) -> Quantity:
+    """Divide the amplitudes or slopes of two traces.
 
-    alike: correlation of the two. Mean squares of traces from different places are independent chi-squares, and the
-    interval is that of F; those of one place before and after vary together, and the interval is Pitman's for two
-    correlated variances (Biometrika 31 (1939) 9), by Student's t with the fewer degrees of freedom.
+    Mean squares of traces of different places are independent chi-squares, and the interval is that of
+    F. Those of the same place vary together, and the interval is Pitman's for two correlated variances
+    (Biometrika 31 (1939) 9), by Student's t with the smaller degrees of freedom.
+
+    Parameters
+    ----------
+    part : str
+        "amplitude" or "slope".
+    text : str
+        Definition of the ratio.
+    over, under : Size
+    correlation : float
+        Correlation of the two traces.
     """
     from scipy.special import fdtri, stdtrit
 
-    place = ("amplitude", "slope").index(part)
-    one, other = over[place], under[place]
-    if other <= 0:
+    place = Size._fields.index(part)
+    if under[place] <= 0:
         return refused("1", text, f"the {part} before wear is zero")
-    value, (first, second) = one / other, (over.freedom[place], under.freedom[place])
+    value = over[place] / under[place]
+    first, second = over.freedom[place], under.freedom[place]
     tail = (1 - LEVEL) / 2
-    if alike <= 0:
+    if correlation <= 0:
         low, high = (1 / fdtri(first, second, p) for p in (1 - tail, tail))
     else:
         freedom = max(min(first, second) - 1, 1.0)
-        k = 2 * (1 - min(alike, 1.0) ** 2) * stdtrit(freedom, 1 - tail) ** 2 / freedom
+        k = 2 * (1 - min(correlation, 1.0) ** 2) * stdtrit(freedom, 1 - tail) ** 2 / freedom
         high = 1 + k + np.sqrt(k * (2 + k))
         low = 1 / high
     return Quantity(value, value * float(np.sqrt(low)), value * float(np.sqrt(high)), "1", text)
 
 
-def loose(one: Quantity, error: float) -> Quantity:
-    """A ratio with a further standard deviation of its logarithm."""
-    if one.value is None or one.value <= 0:
-        return one
-    sides = [np.hypot(np.log(end / one.value), SIDE * error) for end in (max(one.low, 1e-300), one.high)]
-    return one._replace(low=one.value * float(np.exp(-sides[0])), high=one.value * float(np.exp(sides[1])))
+def widen_ratio(ratio: Quantity, error: float) -> Quantity:
+    """Widen the interval of a ratio by a further standard deviation of its logarithm."""
+    if ratio.value is None or ratio.value <= 0:
+        return ratio
+    limits = (max(ratio.low, 1e-300), ratio.high)
+    below, above = (np.hypot(np.log(limit / ratio.value), SIDE * error) for limit in limits)
+    return ratio._replace(
+        low=ratio.value * float(np.exp(-below)), high=ratio.value * float(np.exp(above))
+    )
 
 
-def of_noise(sizes: tuple, noise: float, step: float, band: tuple) -> tuple:
-    """Relative share of the noise [m] of a height difference in the amplitude and the slope of registered traces.
+def noise_fractions(sizes: tuple, noise: float, step: float, band: tuple) -> tuple:
+    """Return the relative errors of the amplitude and the slope that noise adds.
 
-    Half of the mean square that white noise of one trace adds: it may be another one in each, and where the first trace
-    is read between its samples, less. That takes most of it from the slope, of which all counts. noise [m]: of the
-    difference.
+    Half of the mean square of white noise counts in the amplitude, as the noise of both traces differs,
+    and all of it in the slope, from which interpolation between samples takes most.
+
+    Parameters
+    ----------
+    sizes : tuple of Size
+    noise : float
+        Noise [m] of the difference of both traces.
+    step : float
+        Step [m] of the traces.
+    band : tuple
+        Shortest and longest wave [m].
     """
-    least = [min(one[part] for one in sizes) for part in (0, 1)]
-    squares = noise**2 * 2 * step * (1 / band[0] - 1 / band[1]), noise**2 / step**2
-    return tuple(float(share * added / max(size**2, 1e-300)) for share, added, size in zip((0.5, 1.0), squares, least))
+    amplitude = min(size.amplitude for size in sizes)
+    slope = min(size.slope for size in sizes)
+    in_band = noise**2 * 2 * step * (1 / band[0] - 1 / band[1])
+    in_slope = noise**2 / step**2
+    return (
+        float(0.5 * in_band / max(amplitude**2, 1e-300)),
+        float(in_slope / max(slope**2, 1e-300)),
+    )
 
 
-def scattered(trace: Profile, step: float, band: tuple = BAND) -> tuple:
-    """Degrees of freedom of amplitude and slope by how their mean squares scatter along a trace at a step [m].
+def estimate_freedom(trace: Profile, step: float, band: tuple = BAND) -> tuple:
+    """Estimate the degrees of freedom of amplitude and slope from their scatter along a trace.
 
-    The trace is cut into six parts; as the scatter of six is known to a third, half of what they show counts.
+    The trace is read at a step [m] and cut into six parts. The scatter of six values is known to a
+    third, so half of what they show counts.
     """
-    z, step = at_step(trace, step)
-    wave = np.fft.rfftfreq(z.size, step)
-    inside = (wave >= 1 / band[1]) & (wave <= 1 / band[0])
-    edges = np.linspace(0, z.size - 1, PLACES + 1).astype(int)[:-1]
-    out = []
-    for part in (np.fft.irfft(np.where(inside, np.fft.rfft(z), 0.0), z.size)[:-1], np.diff(z)):
-        means = np.add.reduceat(part**2, edges) / np.diff([*edges, part.size])
-        scatter = float(means.var(ddof=1)) / PLACES
-        out.append(float(np.clip(means.mean() ** 2 / max(scatter, 1e-300), 2.0, 1e9)))
-    return tuple(out)
+    z, step = resample(trace, step)
+    in_band = np.fft.irfft(np.where(_is_in_band(z.size, step, band), np.fft.rfft(z), 0.0), z.size)
+    edges = split_edges(z.size - 1, N_PARTS)
+    freedom = []
+    for values in (in_band[:-1], np.diff(z)):
+        means = part_means(values**2, edges)
+        scatter = float(means.var(ddof=1)) / N_PARTS
+        freedom.append(float(np.clip(means.mean() ** 2 / max(scatter, 1e-300), 2.0, 1e9)))
+    return tuple(freedom)
 
 
-def likeness(first, second, step: float, band: tuple = BAND) -> tuple:
-    """Correlation of two registered traces (n,) [m] every `step` [m]: that of their band and that of their slopes."""
+def _is_in_band(count: int, step: float, band: tuple) -> np.ndarray:
+    """Return which frequencies of the Fourier transform of so many samples lie in the band."""
+    frequency = np.fft.rfftfreq(count, step)
+    return (frequency >= 1 / band[1]) & (frequency <= 1 / band[0])
+
+
+def correlate_traces(first, second, step: float, band: tuple = BAND) -> tuple:
+    """Return the correlation of two aligned traces in their band, and that of their slopes.
+
+    Parameters
+    ----------
+    first, second : (n,) array [m]
+    step : float
+        Step [m].
+    band : tuple
+        Shortest and longest wave [m].
+    """
     window = np.hanning(first.size)
-    one, other = (np.fft.rfft((z - z.mean()) * window) for z in (first, second))
-    wave = np.fft.rfftfreq(first.size, step)
-    inside = (wave >= 1 / band[1]) & (wave <= 1 / band[0])
-    out = []
-    for a, b in ((one[inside], other[inside]), (np.diff(first), np.diff(second))):
-        size = float(np.sqrt(np.vdot(a, a).real * np.vdot(b, b).real))
-        out.append(float(np.clip(np.vdot(a, b).real / size, 0.0, 1.0)) if size > 0 else 0.0)
-    return tuple(out)
+    is_inside = _is_in_band(first.size, step, band)
+    waves = [np.fft.rfft((z - z.mean()) * window)[is_inside] for z in (first, second)]
+    correlations = []
+    for one, other in (waves, (np.diff(first), np.diff(second))):
+        size = float(np.sqrt(np.vdot(one, one).real * np.vdot(other, other).real))
+        value = np.vdot(one, other).real / size if size > 0 else 0.0
+        correlations.append(float(np.clip(value, 0.0, 1.0)))
+    return tuple(correlations)

@@ -12,6 +12,7 @@ from ...core import say
 from ...scales import plain
 from ..profile import Profile
 from .alignment import N_PARTS, SHORT_END, Alignment
+from .boxes import part_means, split_edges, subtract_line
 from .errors import correlation_length
 from .flanks import Flanks
 from .section import median_of_five
@@ -64,12 +65,12 @@ def _name(bow: Alignment) -> str:
 
 def slow_means(depth, unworn=None) -> np.ndarray:
     """Means (k,) [m] of the depths, or of the unworn ones, in parts of the trace, about the line through them."""
-    edges = np.linspace(0, depth.size, N_PARTS + 1).astype(int)[:-1]
+    edges = split_edges(depth.size, N_PARTS)[:-1]
     unworn = np.ones(depth.size, bool) if unworn is None else unworn
     count = np.add.reduceat(unworn.astype(float), edges)
     means = (np.add.reduceat(np.where(unworn, depth, 0.0), edges) / np.maximum(count, 1))[count > 2]
     at = np.flatnonzero(count > 2)
-    return means - np.polyval(np.polyfit(at, means, 1), at) if at.size > 2 else np.zeros(at.size)
+    return subtract_line(at, means) if at.size > 2 else np.zeros(at.size)
 
 
 def drifts(found: Alignment) -> bool:
@@ -171,12 +172,11 @@ def find_worn_flanks(before: Profile, after: Profile, shift: float, flanks: Flan
     x, off = x[both], np.interp(at[both], before.x[known], before.z[known]) - after.z[both]
     means = slow_means(off, (x < flanks.start) | (x > flanks.end))
     slow = float(means.max() - means.min()) if means.size else 0.0
-    if slow < MAX_FLANK_ERROR * flanks.largest[0]:
+    if slow < MAX_FLANK_ERROR * flanks.largest.value:
         return ""
     ends = np.minimum(np.arange(x.size), np.arange(x.size)[::-1]) < max(int(SHORT_END * x.size), 1)
     deep = off - np.polyval(np.polyfit(x[ends], off[ends], 1), x)
-    edges = np.linspace(0, x.size, N_PARTS + 1).astype(int)
-    means = np.add.reduceat(deep, edges[:-1]) / np.diff(edges)
+    means = part_means(deep, split_edges(x.size, N_PARTS))
     worn = (
         f"{say(float(deep.mean()), 3)} wore off on average over the common length and "
         f"{say(float(means.max()), 3)} at the deepest place"

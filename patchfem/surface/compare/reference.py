@@ -1,4 +1,4 @@
-"""What carries a registration: unworn parts, valleys, or nothing, so that uniform wear, a wedge and a bend may hide."""
+"""Reference of the worn depth: unworn parts or valleys of the traces; without one, wear may hide."""
 
 from typing import NamedTuple
 
@@ -8,21 +8,26 @@ from ...core import say
 from ...scales import plain
 from ..profile import runs_of
 from ..quantity import SIDE, Quantity, refused
-from .alignment import LONG_END, SHORT_END, Alignment
+from .alignment import FILLED, LONG_END, SHORT_END, Alignment
+from .boxes import subtract_line
 from .model import Parameter
 from .robust import REACH
 from .section import Section, median_of_five
 
 MIN_SAMPLES = 40  # samples of an unworn part
-FILLED = 0.7  # fraction of unworn heights of an unworn part
-WORN = 2 * REACH  # standard deviations of a worn place
-SPECK_SAMPLES = 16  # samples at half of its depth from which a worn place is no speck of interpolation
+MIN_WORN = 2 * REACH  # standard deviations of the deepest height of a worn place
+SPECK_SAMPLES = (
+    16  # samples at half of its depth from which a worn place is no speck of interpolation
+)
 MIN_LENGTH = 0.005  # fraction of the common length from which a worn place is no speck
-NARROW_SAMPLES = 5  # samples at half of its depth of a place that is far deeper than noise
-FAR = 20.0  # standard deviations of a depth that is far deeper than noise
-CURVED, BOWED = 30.0, 0.75  # chi-squared of a bow in an unworn part, and its size in noises, from which it is none
-TURNS, HIGHER, VALLEYS = 8, 0.65, 0.1  # worn tops, share of unworn heights that lie lower than they, share of valleys
-HIDDEN = (
+NARROW_SAMPLES = 5  # samples at half of its depth of a scratch, which is far deeper than noise
+MIN_SCRATCH = 20.0  # standard deviations of the depth of a scratch
+MAX_BOW_CHI2 = 30.0  # chi-squared of a bow in an unworn part; a larger one is the foot of wear
+MAX_BOW_NOISE = 0.75  # size of that bow / noise; both limits must be exceeded
+MIN_TOPS = 8  # worn tops between which valleys are a reference
+MIN_HIGHER = 0.65  # fraction of the unworn heights that lie lower than worn ones, in the mean; 1 for cut tops
+MIN_VALLEYS = 0.1  # fraction of unworn heights from which valleys are a reference
+HIDDEN_TEXT = (
     "largest mean depth of wedge-shaped wear that is possible if the tilt between the traces (upper end of its "
     "interval) is due to wear alone; uniform wear of any depth would not be detected"
 )
@@ -30,137 +35,166 @@ NO_LIMIT = "no limit"
 
 
 class Reference(NamedTuple):
-    """by: "parts", "valleys" or "" for nothing; parts: (from, to) [m] of the unworn parts in the x of the trace after;
-    share: of the heights that are unworn."""
+    """What the worn depth counts from.
 
-    by: str
-    parts: tuple
-    share: float
-
-
-def find_reference(found: Alignment, section: Section) -> Reference:
-    """What tells the worn heights of a registration from unworn ones.
-
-    Unworn parts are runs of a twentieth of the length or more (a fiftieth, where the datum is straight) whose heights
-    are unworn and straight, beside rubbed places (`_broad`); a part that is bowed is the foot of wear that runs out
-    slowly. Valleys carry where more than eight worn tops stand between them. Without either, wear that is the same
-    everywhere, a wedge, or a bow may be anything: specks where interpolation errs are no rubbed place.
+    kind: "parts", "valleys" or "" for nothing; parts: (from, to) [m] of each unworn part in x of the
+    second trace; unworn: fraction of the heights that are unworn.
     """
-    off, x = median_of_five(section.depth / section.noise), found.x
-    share = float(found.unworn.mean())
-    places = deep_runs(off)
-    tops = len(places) >= TURNS and _higher(found, off) > HIGHER
-    if not tops and not _is_broad(found, off, places):
-        return Reference("", (), share)
-    covered = off <= REACH
-    for first, last in _shallow_runs(found):
-        covered[first : last + 1] = False
-    long = [(a, b) for a, b in runs_of(covered) if _is_flank(found, a, b)]
-    if long:
-        return Reference("parts", tuple((float(x[a]), float(x[b])) for a, b in long), share)
-    return Reference("valleys" if tops and share > VALLEYS else "", (), share)
+
+    kind: str
+    parts: tuple
+    unworn: float
 
 
-def deep_runs(off) -> list:
-    """First and last of each run of depths (n,) [deviations] that are no noise, and clearly none at the deepest."""
-    return [(a, b) for a, b in runs_of(off > REACH) if off[a : b + 1].max() > WORN]
+def find_reference(alignment: Alignment, section: Section) -> Reference:
+    """Find what separates the worn heights of aligned traces from unworn ones.
+
+    Unworn parts are runs of a twentieth of the length or more (a fiftieth, where the datum is straight)
+    whose heights are unworn and straight, beside worn places; a part that is bowed is the foot of wear that
+    runs out slowly. Valleys are a reference where at least eight worn tops stand between them. Without
+    either, the difference may be uniform wear, a wedge, or a bow; specks of interpolation are no wear.
+
+    Parameters
+    ----------
+    alignment : Alignment
+    section : Section
+        Of the same traces.
+    """
+    relative = median_of_five(section.depth / section.noise)
+    unworn = float(alignment.unworn.mean())
+    places = find_deep_runs(relative)
+    has_tops = len(places) >= MIN_TOPS and _higher_fraction(alignment, relative) > MIN_HIGHER
+    if not has_tops and not _has_wear(alignment, relative, places):
+        return Reference("", (), unworn)
+    is_unworn = relative <= REACH
+    for first, last in _shallow_runs(alignment):
+        is_unworn[first : last + 1] = False
+    runs = [run for run in runs_of(is_unworn) if _is_flank(alignment, *run)]
+    if runs:
+        x = alignment.x
+        parts = tuple((float(x[first]), float(x[last])) for first, last in runs)
+        return Reference("parts", parts, unworn)
+    has_valleys = has_tops and unworn > MIN_VALLEYS
+    return Reference("valleys" if has_valleys else "", (), unworn)
 
 
-def _shallow_runs(found: Alignment) -> list:
-    """Runs that the fit left out as worn although single heights do not show it."""
-    left_out = ~found.unworn & (np.abs(found.depth) <= REACH * found.noise)
-    return [(a, b) for a, b in runs_of(left_out) if b - a > MIN_SAMPLES]
+def find_deep_runs(relative) -> list:
+    """Find runs (first, last) of depths (n,) [standard deviations] that are beyond noise."""
+    runs = runs_of(relative > REACH)
+    return [(first, last) for first, last in runs if relative[first : last + 1].max() > MIN_WORN]
 
 
-def _is_broad(found: Alignment, off, places: list) -> bool:
+def _shallow_runs(alignment: Alignment) -> list:
+    """Return the runs that the fit left out as worn although single heights do not show it."""
+    is_shallow = ~alignment.unworn & (np.abs(alignment.depth) <= REACH * alignment.noise)
+    return [(first, last) for first, last in runs_of(is_shallow) if last - first > MIN_SAMPLES]
+
+
+def _has_wear(alignment: Alignment, relative, places: list) -> bool:
     """Whether a deep place is wider than a speck, or narrow and far deeper than noise, as a scratch is."""
-    if _shallow_runs(found) or _is_wide(found, off, places):
+    if _shallow_runs(alignment) or _is_wide(alignment, relative, places):
         return True
     for first, last in places:
-        deep = off[first : last + 1]
-        if (deep > deep.max() / 2).sum() >= NARROW_SAMPLES and deep.max() > FAR:
+        deep = relative[first : last + 1]
+        if (deep > deep.max() / 2).sum() >= NARROW_SAMPLES and deep.max() > MIN_SCRATCH:
             return True
     return False
 
 
-def _is_wide(found: Alignment, off, places: list) -> bool:
+def _is_wide(alignment: Alignment, relative, places: list) -> bool:
     """Whether one of the deep places is wider than a speck, at half of its depth too."""
-    least = MIN_LENGTH * (found.x[-1] - found.x[0])
-    return any(
-        (off[a : b + 1] > off[a : b + 1].max() / 2).sum() >= SPECK_SAMPLES and found.x[b] - found.x[a] > least
-        for a, b in places
-    )
+    x = alignment.x
+    min_length = MIN_LENGTH * (x[-1] - x[0])
+    for first, last in places:
+        deep = relative[first : last + 1]
+        n_deep = (deep > deep.max() / 2).sum()
+        if n_deep >= SPECK_SAMPLES and x[last] - x[first] > min_length:
+            return True
+    return False
 
 
-def _higher(found: Alignment, off) -> float:
-    """Share of the unworn heights that lie lower than a clearly worn one, in the mean of these: 1 for tops cut off."""
-    high = found.first - np.polyval(np.polyfit(found.x, found.first, 1), found.x)
-    unworn = np.sort(high[off <= REACH])
-    return float(np.searchsorted(unworn, high[off > WORN]).mean() / max(unworn.size, 1))
+def _higher_fraction(alignment: Alignment, relative) -> float:
+    """Return the mean fraction of the unworn heights that lie lower than a worn one: 1 for tops cut off."""
+    height = subtract_line(alignment.x, alignment.first)
+    unworn = np.sort(height[relative <= REACH])
+    n_lower = np.searchsorted(unworn, height[relative > MIN_WORN])
+    return float(n_lower.mean() / max(unworn.size, 1))
 
 
-def _is_flank(found: Alignment, first: int, last: int) -> bool:
+def _is_flank(alignment: Alignment, first: int, last: int) -> bool:
     """Whether a run of heights is long, unworn and straight."""
-    least = SHORT_END if found.is_straight else LONG_END
-    x, trim = found.x, (last - first) // 10
-    part = slice(first + (trim if first else 0), last + 1 - (trim if last < x.size - 1 else 0))
-    if x[last] - x[first] < least * (x[-1] - x[0]) or last - first < MIN_SAMPLES or found.unworn[part].mean() < FILLED:
+    x = alignment.x
+    min_length = (SHORT_END if alignment.is_straight else LONG_END) * (x[-1] - x[0])
+    if x[last] - x[first] < min_length or last - first < MIN_SAMPLES:
         return False
-    used = found.unworn[part]
-    along, rest = np.linspace(-1, 1, used.size)[used], found.depth[part][used]
+    margin = (last - first) // 10  # the wear may begin in the outermost tenth beside it
+    start = first + margin if first else 0
+    stop = last + 1 - margin if last < x.size - 1 else last + 1
+    unworn = alignment.unworn[start:stop]
+    if unworn.mean() < FILLED:
+        return False
+    along = np.linspace(-1, 1, unworn.size)[unworn]
+    depth = alignment.depth[start:stop][unworn]
     base = np.linalg.qr(np.vander(along, 3, True))[0]
-    bow = base[:, 1:].T @ rest
-    size = float(np.sqrt((bow**2).sum() / rest.size))
-    left = float(np.std(rest - base @ (base.T @ rest)))
-    return not (float((bow**2).sum()) > CURVED * found.errors.correlation * left**2 and size > BOWED * found.noise)
+    power = float(((base[:, 1:].T @ depth) ** 2).sum())
+    scatter = float(np.std(depth - base @ (base.T @ depth)))
+    is_clear = power > MAX_BOW_CHI2 * alignment.errors.correlation * scatter**2
+    is_large = float(np.sqrt(power / depth.size)) > MAX_BOW_NOISE * alignment.noise
+    return not (is_clear and is_large)
 
 
-def has_grown(found: Alignment, section: Section) -> bool:
+def has_grown(alignment: Alignment, section: Section) -> bool:
     """Whether heights stand clearly above the first trace, wider than a speck."""
-    off = median_of_five(-section.depth / section.noise)
-    return _is_wide(found, off, deep_runs(off))
+    relative = median_of_five(-section.depth / section.noise)
+    return _is_wide(alignment, relative, find_deep_runs(relative))
 
 
-def limit_hidden_wear(found: Alignment | None, by: Reference | None) -> Quantity:
-    """What a wedge may hide [m]: half of the tilt times the common length; no numbers where nothing can hide.
+def limit_hidden_wear(alignment: Alignment | None, reference: Reference | None) -> Quantity:
+    """Limit the mean depth [m] of wear that a wedge may hide; refused where nothing can hide.
 
-    A tilt between both traces is that of their mounting or of a wedge that wore off; its mean depth is then half of the
-    tilt times the length. Uniform wear adds any depth, as does a mounting that turns a wedge back: there is no limit.
+    A tilt between both traces is that of their mounting or of a wedge that wore off; its mean depth is
+    then half of the tilt times the length. Uniform wear adds any depth, as does a mounting that turns a
+    wedge back, so there is no upper limit.
     """
-    if found is None:
-        return refused("m", HIDDEN, "the traces are not registered to each other")
-    if by.by:
-        return refused("m", HIDDEN, f"{_what(by)} are used for the alignment")
-    length = float(found.x[-1] - found.x[0])
-    return Quantity(
-        (abs(found.slope) + SIDE * found.error_of(Parameter.SLOPE) / found.half) * length / 2, 0.0, None, "m", HIDDEN
-    )
+    if alignment is None:
+        return refused("m", HIDDEN_TEXT, "the traces are not registered to each other")
+    if reference.kind:
+        what = "valleys between worn tops" if reference.kind == "valleys" else "unworn parts"
+        return refused("m", HIDDEN_TEXT, f"{what} are used for the alignment")
+    length = float(alignment.x[-1] - alignment.x[0])
+    error = SIDE * alignment.error_of(Parameter.SLOPE) / alignment.half
+    return Quantity((abs(alignment.slope) + error) * length / 2, 0.0, None, "m", HIDDEN_TEXT)
 
 
-def cut_at_wear(by: Reference, extent) -> Reference:
-    """The same with the unworn parts cut off where the wear begins and ends; extent: `worn.Extent` or None."""
+def cut_at_wear(reference: Reference, extent) -> Reference:
+    """Cut off the unworn parts where the wear begins and ends; extent: `worn.Extent` or None."""
     if extent is None:
-        return by
-    first, last = (one.value for one in extent.after)
-    parts = ((a, min(b, first) if a < first else b) for a, b in by.parts)
-    parts = ((max(a, last) if b > last else a, b) for a, b in parts)
-    return by._replace(parts=tuple((a, b) for a, b in parts if b > a))
+        return reference
+    wear_start, wear_end = (end.value for end in extent.after)
+    parts = []
+    for start, end in reference.parts:
+        if start < wear_start:
+            end = min(end, wear_start)
+        if end > wear_end:
+            start = max(start, wear_end)
+        if end > start:
+            parts.append((start, end))
+    return reference._replace(parts=tuple(parts))
 
 
-def _what(by: Reference) -> str:
-    return "valleys between worn tops" if by.by == "valleys" else "unworn parts"
-
-
-def describe_reference(by: Reference) -> str:
-    """What the worn depths count from, as a sentence."""
-    if by.by == "valleys":
+def describe_reference(reference: Reference) -> str:
+    """Describe what the worn depths count from."""
+    if reference.kind == "valleys":
         return (
-            f"Depths are measured from the valleys between the worn tops. These valleys ({100 * by.share:.0f} % of "
+            "Depths are measured from the valleys between the worn tops. These valleys "
+            f"({100 * reference.unworn:.0f} % of "
             "the heights) agree in both traces and are taken as unworn; if the valleys also wore uniformly, the "
             "true depths are larger by the wear of the valleys."
         )
-    spans = ", ".join(f"{say(a, 4)} to {say(b, 4)}" for a, b in by.parts[:4])
-    more = f" and {len(by.parts) - 4} more" if len(by.parts) > 4 else ""
+    shown = reference.parts[:4]
+    spans = ", ".join(f"{say(start, 4)} to {say(end, 4)}" for start, end in shown)
+    n_more = len(reference.parts) - len(shown)
+    more = f" and {n_more} more" if n_more else ""
     return (
         f"Depths are measured from the parts in which the traces agree: x = {spans}{more} of the second trace "
         "(after wear). These parts are taken as unworn; if these parts also wore, uniformly or as a wedge, the "
@@ -168,18 +202,20 @@ def describe_reference(by: Reference) -> str:
     )
 
 
-def describe_hidden_wear(found: Alignment, hidden: Quantity) -> str:
-    """What may hide where nothing carries the registration, and what would settle it, as a sentence."""
-    bow = (
-        (
-            f" A curvature (bow) of {say(abs(found.bend), 3)} was subtracted; this bow may come from a bent datum of "
-            f"the instrument or from wear{area_of_bow(found)}."
+def describe_hidden_wear(alignment: Alignment, hidden: Quantity) -> str:
+    """Describe which wear may hide where there is no reference, and which measurement would show it."""
+    bow = ""
+    if alignment.bend:
+        bow = (
+            f" A curvature (bow) of {say(abs(alignment.bend), 3)} was subtracted; this bow may come from a bent datum "
+            f"of the instrument or from wear{describe_bow_area(alignment)}."
         )
-        if found.bend
-        else ""
+    length = float(alignment.x[-1] - alignment.x[0])
+    tilt = plain(1e6 * abs(alignment.slope), 3)
+    max_tilt = plain(1e6 * (2 * hidden.value / length), 3)
+    within = (
+        "" if max_tilt == tilt else f" (up to {max_tilt} urad at the upper end of its interval)"
     )
-    tilt, most = (plain(1e6 * one, 3) for one in (abs(found.slope), 2 * hidden.value / float(found.x[-1] - found.x[0])))
-    within = "" if most == tilt else f" (up to {most} urad at the upper end of its interval)"
     return (
         "Uniform wear of any depth would give the same two traces. Wedge-shaped wear would also give the same two "
         f"traces if the worn part was mounted level for the second trace. The tilt of {tilt} urad between the "
@@ -189,7 +225,7 @@ def describe_hidden_wear(found: Alignment, hidden: Quantity) -> str:
     )
 
 
-def area_of_bow(found: Alignment) -> str:
-    """The area under a bow that sags, as words: two thirds of the sag times the length."""
-    area = found.bend * float(found.x[-1] - found.x[0]) * 2 / 3
+def describe_bow_area(alignment: Alignment) -> str:
+    """Describe the area under a bow that sags: two thirds of the sag times the length."""
+    area = alignment.bend * float(alignment.x[-1] - alignment.x[0]) * 2 / 3
     return f" that took {plain(1e12 * area, 3)} um^2 between both ends" if area > 0 else ""

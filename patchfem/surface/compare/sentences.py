@@ -8,9 +8,9 @@ from ..areal import Areal
 from ..profile import Profile
 from ..quantity import SIDE, Quantity
 from ..scans import change as scans
-from .compare import Comparison, identical
+from .compare import Comparison, are_identical
 from .readings import describe_other
-from .reference import area_of_bow, describe_hidden_wear, describe_reference
+from .reference import describe_bow_area, describe_hidden_wear, describe_reference
 
 MIN_DEPOSITED = 0.05  # of the worn area, from which material above the first trace is named
 ROUNDING = 1e-6  # distance of a ratio from 1 that is rounding
@@ -24,12 +24,12 @@ def describe_comparisons(parts: list, directions: list) -> list:
     ----------
     parts : list of Comparison
     directions : list
-        As `directions_of` returns it.
+        As `compare_directions` returns it.
     """
     out = []
     change = parts[0].change
     if change is not None:
-        if identical(parts[0].before, parts[0].after):
+        if are_identical(parts[0].before, parts[0].after):
             out.append("The heights of both scans are the same; was the same file given twice?")
         out += scans.sentences(change)
     for part in parts:
@@ -73,47 +73,47 @@ def is_sure(mean: Quantity) -> bool:
 
 def is_elsewhere(part: Comparison) -> bool:
     """Whether two traces have no place in common."""
-    return isinstance(part.before, Profile) and part.registration is None
+    return isinstance(part.before, Profile) and part.alignment is None
 
 
 def is_gain(part: Comparison) -> bool:
     """Whether all heights changed by one factor, and waves or slopes with them."""
-    changes = {describe_ratio_change(part.amplitude_ratio), describe_ratio_change(part.slope_ratio)}
+    changes = {describe_ratio_change(part.ratios.amplitude), describe_ratio_change(part.ratios.slope)}
     return part.gain is not None and bool(changes & {"reduced", "increased"})
 
 
 def _wear_of_traces(part: Comparison, name: str) -> list:
     """Return what two traces show of wear; name: their direction in words."""
     out = []
-    if part.mirrored:
+    if part.is_mirrored:
         out.append(
             f"The second trace{name} was measured in the opposite direction; the trace was mirrored here, so "
             "its x counts from the other end."
         )
     out.append(_describe_wear(part, name))
     if is_elsewhere(part) and part.worn.mean.value is not None:
-        out.append(f"Comparison place by place{name}: not available; {part.shift.reason}.")
+        out.append(f"Comparison place by place{name}: not available; {part.motion.shift.reason}.")
     out += _describe_datum(part)
     out += _describe_other_tracks(part)
-    return out if part.open else out + describe_other(part.registration)
+    return out if part.ambiguity else out + describe_other(part.alignment)
 
 
 def _describe_wear(part: Comparison, name: str) -> str:
     """Return how deep the second trace is worn, or why that is not known."""
-    if identical(part.before, part.after):
+    if are_identical(part.before, part.after):
         return f"Worn depth{name}: none; the heights before and after wear are the same."
     mean = part.worn.mean
     above = _describe_deposits(part)
-    if part.reference == "place" and not part.reference_by.by and not part.open:
-        seen = "" if part.visible is None else f" {describe_visible_depth(part.visible)}"
-        hidden = describe_hidden_wear(part.registration, part.hidden)
+    if part.basis == "place" and not part.reference.kind and not part.ambiguity:
+        seen = "" if part.detection_limit is None else f" {describe_visible_depth(part.detection_limit)}"
+        hidden = describe_hidden_wear(part.alignment, part.hidden)
         return f"Worn depth{name}: no wear detected.{above}{seen} {hidden}"
     if mean.value is None:
         return f"Worn depth{name}: not available; {mean.reason}."
     if not is_sure(mean):
         return f"Worn depth{name}: no wear detected; at most {say(mean.high)} on average.{above}"
     over = "over the common length"
-    if part.reference == "flanks":
+    if part.basis == "flanks":
         over = "over the track, measured from its unworn flanks"
     text = (
         f"Worn{name}: {_describe_track(part)}{_interval(mean)} on average {over}, "
@@ -129,7 +129,7 @@ def _describe_deposits(part: Comparison) -> str:
         return ""
     cause = (
         "deposits, or the two files are in the wrong order"
-        if part.exchanged
+        if part.is_exchanged
         else "deposits or pile-up"
     )
     return f" {SQUARE_UM * deposited:.3g} um^2 of material lie above the first trace (before wear): there are {cause}."
@@ -147,14 +147,14 @@ def _describe_extent(part: Comparison) -> str:
 
 def _describe_datum(part: Comparison) -> list:
     """Return what the depth counts from, and a bow that was taken out."""
-    if part.registration is None or not part.reference_by.by:
+    if part.alignment is None or not part.reference.kind:
         return []
-    out = [describe_reference(part.reference_by)]
-    bend = part.registration.bend
+    out = [describe_reference(part.reference)]
+    bend = part.alignment.bend
     if bend:
         out.append(
             f"A curvature (bow) of {say(abs(bend), 3)} over the common length was subtracted, because a bent "
-            f"datum and wear of that shape{area_of_bow(part.registration)} look alike."
+            f"datum and wear of that shape{describe_bow_area(part.alignment)} look alike."
         )
     return out
 
@@ -215,9 +215,9 @@ def _beside_wear(part: Comparison) -> list:
 
 def _waves(part: Comparison, name: str) -> list:
     """Return how waves and slopes changed."""
-    if isinstance(part.before, Areal) and not part.sizes:
-        return [f"Waves{name}: not available; {part.amplitude_ratio.reason}."]
-    out = [_describe_amplitude(part.amplitude_ratio, name), _describe_slope(part.slope_ratio, name)]
+    if isinstance(part.before, Areal) and not part.ratios.sizes:
+        return [f"Waves{name}: not available; {part.ratios.amplitude.reason}."]
+    out = [_describe_amplitude(part.ratios.amplitude, name), _describe_slope(part.ratios.slope, name)]
     if is_gain(part):
         out.append(
             f"All heights{name} after wear are {part.gain:.4g} times the heights before; a difference in the gain of "

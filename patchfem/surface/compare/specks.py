@@ -1,4 +1,4 @@
-"""Dust and dropouts that only the other trace shows: narrow places with walls that no surface has."""
+"""Dust and dropouts that only one trace shows: narrow places with walls that are too steep for a surface."""
 
 from dataclasses import replace
 
@@ -9,74 +9,104 @@ from ..profile import Profile, runs_of
 from .alignment import Alignment
 from .section import sure_of
 
-N_AROUND = 101  # samples whose jumps tell the roughness around a speck
-MEDIAN, WIDEST = 41, 12  # samples of the running median, and of the widest speck at half of its height
-STEEP, SOME = 5.0, 1.5  # robust deviations of the steps of the surface, and of noise, that both walls are steeper than
-GROWN, FALLEN = 9.0, 2.0  # such parts of the height is a step of the walls of what stands above, or of a hollow
+N_AROUND = 101  # samples whose jumps show the roughness around a speck
+N_MEDIAN = 41  # samples of the running median that specks are compared with
+MAX_WIDTH = 12  # samples of a speck at half of its height; wider places are features of the surface
+MIN_WALL = 5.0  # step of both walls in robust deviations of the steps of the surface
+MIN_OUTSIDE_WALL = 1.5  # same ratio where a speck lies outside of all heights that wear explains
+MAX_DUST_STEPS = 9.0  # height of dust / step of its walls; wear never stands above the first trace
+MAX_DROPOUT_STEPS = 2.0  # depth of a dropout / step of its walls
 
 
-def without_specks(found: Alignment, before: Profile, after: Profile) -> tuple:
-    """Both traces without what stands out of their registered difference as no surface does; the same where nothing.
+def remove_specks(alignment: Alignment, before: Profile, after: Profile) -> tuple:
+    """Remove dust and dropouts from two aligned traces; returns the same traces where there are none.
 
-    A speck is 12 samples wide or less at half of its height, and the difference climbs and falls at it by steps
-    larger than four deviations of those of the first trace: tops that wore off have the slopes of the surface.
-    Nothing that wears stands above the first trace, nor below all of it nearby: there less will do, a ninth of the
-    height of what grew, half of a hollow. None is so low that noise alone would bring it (`edges.sure_of`). It is
-    left out of the trace that has the larger steps there.
+    A speck is at most 12 samples wide at half of its height, and the difference of the traces climbs and
+    falls at it by steps larger than five deviations of the steps of the first trace: tops that wore off
+    have the slopes of the surface. Wear does not stand above the first trace, nor below all of it nearby;
+    smaller steps are enough there. Noise alone brings no such height (`section.sure_of`). The speck is
+    removed from the trace that has the larger steps.
+
+    Parameters
+    ----------
+    alignment : Alignment
+    before, after : Profile
+        The traces that were aligned.
     """
     from scipy.ndimage import median_filter
 
-    rest, first = np.asarray(found.depth), np.asarray(found.first)
-    if rest.size < 2 * MEDIAN:
+    depth = np.asarray(alignment.depth)
+    first = np.asarray(alignment.first)
+    if depth.size < 2 * N_MEDIAN:
         return before, after
-    off, sure = rest - _median(rest), sure_of(2 * rest.size, 1)  # above or below
-    steps = 1.4826 * float(np.median(np.abs(np.diff(first)))) + 1.5 * found.noise
-    # where most neighbours jump, as on a rough floor, a jump is roughness
-    jumps = np.abs(np.diff(rest, append=rest[-1]))
-    steps = np.maximum(steps, 1.4826 * median_filter(jumps, N_AROUND, mode="nearest"))
-    sides = first, first - rest
-    marked = [np.zeros(before.x.size, bool), np.zeros(after.x.size, bool)]
-    for low, high in runs_of(np.abs(off) > 3 * found.noise):
-        here, size = slice(max(low - 1, 0), high + 2), np.abs(off[low:high + 1])
-        walls, height, at = np.diff(rest[here]), float(size.max()), low + int(np.argmax(size))
-        is_wide = (size > height / 2).sum() > WIDEST or size.size > 3 * WIDEST
-        if height < sure * float(found.noise_at[at]) or is_wide or \
-                min(walls.max(), -walls.min()) < _least(found, at, off[at] > 0, height, float(steps[at])):
+    deviation = depth - _running_median(depth)
+    sure = sure_of(2 * depth.size, 1)  # each height may be above or below
+    step = 1.4826 * float(np.median(np.abs(np.diff(first)))) + 1.5 * alignment.noise
+    # a jump is roughness where most neighbours jump, as on a rough floor
+    jumps = np.abs(np.diff(depth, append=depth[-1]))
+    steps = np.maximum(step, 1.4826 * median_filter(jumps, N_AROUND, mode="nearest"))
+    surfaces = (first, first - depth)
+    profiles = (before, after)
+    is_speck = [np.zeros(profile.x.size, bool) for profile in profiles]
+    for low, high in runs_of(np.abs(deviation) > 3 * alignment.noise):
+        around = slice(max(low - 1, 0), high + 2)
+        sizes = np.abs(deviation[low : high + 1])
+        height = float(sizes.max())
+        at = low + int(np.argmax(sizes))
+        is_wide = (sizes > height / 2).sum() > MAX_WIDTH or sizes.size > 3 * MAX_WIDTH
+        if is_wide or height < sure * float(alignment.noise_at[at]):
             continue
-        which = int(np.argmax([np.abs(np.diff(side[here])).max() for side in sides]))
-        ends = found.x[max(low - 1, 0)], found.x[min(high + 1, rest.size - 1)]
-        if not which:
-            ends = [found.back(end) for end in ends]
-        x = (before, after)[which].x
-        slack = 0.5 * float(x[1] - x[0])
-        marked[which] |= (x >= ends[0] - slack) & (x <= ends[1] + slack)
-    return tuple(_left_out(*one) for one in zip((before, after), marked))
+        walls = np.diff(depth[around])
+        is_deep = bool(deviation[at] > 0)
+        min_step = _min_wall_step(alignment, at, height, float(steps[at]), is_deep=is_deep)
+        if min(walls.max(), -walls.min()) < min_step:
+            continue
+        side = int(np.argmax([np.abs(np.diff(z[around])).max() for z in surfaces]))
+        ends = [alignment.x[max(low - 1, 0)], alignment.x[min(high + 1, depth.size - 1)]]
+        if side == 0:
+            ends = [alignment.back(end) for end in ends]
+        x = profiles[side].x
+        margin = 0.5 * float(x[1] - x[0])
+        is_speck[side] |= (x >= ends[0] - margin) & (x <= ends[1] + margin)
+    return tuple(_mark_missing(profile, marked) for profile, marked in zip(profiles, is_speck))
 
 
-def _least(found: Alignment, at: int, missing: bool, height: float, steps: float) -> float:
-    """The least step [m] of both walls of a speck of a height [m]; missing: less is there than beside it."""
-    if not missing:  # unworn heights between worn tops are none
-        return max(SOME * steps, height / GROWN) if found.depth[at] < -height / 2 else float("inf")
-    near = found.first[max(at - MEDIAN, 0):at + MEDIAN + 1]
-    stands = found.first[at] - float(np.median(near)) > height / 2  # in the first trace itself, over a track
-    if found.first[at] - found.depth[at] < near.min() - 3 * found.noise and not stands:
-        return max(SOME * steps, height / FALLEN)
-    return STEEP * steps
+def _min_wall_step(
+    alignment: Alignment, at: int, height: float, step: float, *, is_deep: bool
+) -> float:
+    """Return the smallest step [m] of both walls that makes a place of a height [m] a speck.
+
+    step [m]: robust deviation of the steps of the surface there.
+    """
+    depth = alignment.depth[at]
+    first = alignment.first[at]
+    if not is_deep:  # unworn heights between worn tops are no dust
+        is_dust = depth < -height / 2
+        return max(MIN_OUTSIDE_WALL * step, height / MAX_DUST_STEPS) if is_dust else float("inf")
+    near = alignment.first[max(at - N_MEDIAN, 0) : at + N_MEDIAN + 1]
+    is_top_of_first = first - float(np.median(near)) > height / 2
+    if first - depth < near.min() - 3 * alignment.noise and not is_top_of_first:
+        return max(MIN_OUTSIDE_WALL * step, height / MAX_DROPOUT_STEPS)
+    return MIN_WALL * step
 
 
-def _median(z) -> np.ndarray:
-    windows = np.lib.stride_tricks.sliding_window_view(np.pad(z, MEDIAN // 2, "reflect"), MEDIAN)
-    return np.median(windows, axis=1)
+def _running_median(z) -> np.ndarray:
+    padded = np.pad(z, N_MEDIAN // 2, "reflect")
+    return np.median(np.lib.stride_tricks.sliding_window_view(padded, N_MEDIAN), axis=1)
 
 
-def _left_out(profile: Profile, marked) -> Profile:
+def _mark_missing(profile: Profile, marked) -> Profile:
+    """Mark heights (n,) bool of a trace as missing, with a note."""
     marked &= ~profile.missing
     if not marked.any():
         return profile
-    z = np.where(marked, np.nan, profile.z)
     count = len(runs_of(marked))
-    note = (f"{profile.source}: {count} place{'s' * (count > 1)} with walls much steeper than the rest of the trace "
-            f"(the first at x = {say(profile.x[np.argmax(marked)])}) {'are' if count > 1 else 'is'} taken as dust or "
-            f"dropouts and left out, {marked.sum()} of {z.size} heights with their neighbours; use --keep-spikes to "
-            "keep them")
-    return replace(profile, z=frozen_array(z), notes=(*profile.notes, note))
+    places = f"{count} place" if count == 1 else f"{count} places"
+    note = (
+        f"{profile.source}: {places} with walls much steeper than the rest of the trace "
+        f"(the first at x = {say(profile.x[np.argmax(marked)])}) {'is' if count == 1 else 'are'} taken as dust or "
+        f"dropouts and left out, {marked.sum()} of {marked.size} heights with their neighbours; use --keep-spikes to "
+        "keep them"
+    )
+    z = frozen_array(np.where(marked, np.nan, profile.z))
+    return replace(profile, z=z, notes=(*profile.notes, note))

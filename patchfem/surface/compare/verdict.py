@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from ..scans import change as scans
-from .compare import Comparison, compared_files, directions_of
+from .compare import Comparison, compare_directions, compare_files
 from .sentences import describe_comparisons, describe_ratio_change, is_elsewhere, is_gain, is_sure
 
 GREW, ELSEWHERE = scans.GREW, scans.ELSEWHERE
@@ -15,7 +15,7 @@ class Judgement(NamedTuple):
     """What two or four files show.
 
     parts: `Comparison` of each direction; verdict: headline and sentences; directions: ratios along x
-    over those along y before and after (`directions_of`).
+    over those along y before and after (`compare_directions`).
     """
 
     parts: list
@@ -31,9 +31,11 @@ def judge_files(
     keep_spikes: bool = False,
     datum: str = "",
 ) -> Judgement:
-    """Compare the files before and after wear and judge them; parameters as in `compared_files`."""
-    parts = compared_files(paths, direction, units, shift, keep_spikes, datum)
-    directions = directions_of(parts)
+    """Compare the files before and after wear and judge them; parameters as in `compare_files`."""
+    parts = compare_files(
+        paths, direction, units, shift, keep_spikes=keep_spikes, datum=datum
+    )
+    directions = compare_directions(parts)
     return Judgement(parts, verdicts(parts, directions), directions)
 
 
@@ -46,7 +48,7 @@ def verdicts(parts: list, directions: list = ()) -> tuple:
     ----------
     parts : list of Comparison
     directions : list
-        As `directions_of` returns it.
+        As `compare_directions` returns it.
     """
     return _find_headline(parts), describe_comparisons(parts, directions)
 
@@ -77,7 +79,7 @@ class _Facts(NamedTuple):
 
 
 def _facts_of(parts: list) -> _Facts:
-    words = [describe_ratio_change(part.amplitude_ratio) for part in parts]
+    words = [describe_ratio_change(part.ratios.amplitude) for part in parts]
     if len(set(words)) == 1:
         waves = words[0]
     else:
@@ -86,13 +88,13 @@ def _facts_of(parts: list) -> _Facts:
     change = parts[0].change
     scan_headline = "" if change is None else scans.headline(change)
     is_worn = scan_headline == scans.WORN or any(is_sure(part.worn.mean) for part in parts)
-    is_flatter = any(describe_ratio_change(part.slope_ratio) == "reduced" for part in parts)
+    is_flatter = any(describe_ratio_change(part.ratios.slope) == "reduced" for part in parts)
     return _Facts(parts, waves, scan_headline, is_worn, is_flatter)
 
 
 def _has_grown(facts: _Facts) -> bool:
     """Whether material stands above the first surface and no worn depth is shown."""
-    grew = facts.scan_headline == GREW or any(part.exchanged for part in facts.parts)
+    grew = facts.scan_headline == GREW or any(part.is_exchanged for part in facts.parts)
     return grew and not facts.is_worn
 
 
@@ -120,12 +122,12 @@ def _find_headline(parts: list) -> str:
         if condition(facts):
             headline = words(facts, headline)
             break
-    readings = [part.open for part in parts if part.open]
+    readings = [part.ambiguity for part in parts if part.ambiguity]
     if readings:
         headline = "no change detected in the waves" if headline == NO_CHANGE else headline
         headline = f"{readings[0]}; {headline}"
     if any(
-        is_gain(part) and describe_ratio_change(part.amplitude_ratio) != NO_CHANGE for part in parts
+        is_gain(part) and describe_ratio_change(part.ratios.amplitude) != NO_CHANGE for part in parts
     ):
         headline += (
             ", all heights by the same factor, as an error in the instrument's gain would do"
@@ -140,6 +142,6 @@ def _describe_variant(parts: list[Comparison]) -> str:
         return scans.describe_variant(parts[0].change)
     return (
         "one trace is mirrored relative to the other"
-        if any(part.mirrored for part in parts)
+        if any(part.is_mirrored for part in parts)
         else ""
     )

@@ -1,4 +1,4 @@
-"""Worn depth of a trace: means and areas over its common part, the largest depth, where it is worn, its tracks."""
+"""Worn depth of a trace: its mean, area and maximum, the part that is worn, and the tracks in it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,6 +16,7 @@ from .alignment import Alignment
 from .flanks import PARTS, Flanks
 from .largest import measure_largest
 from .model import Parameter
+from .search import MIN_SAMPLES
 from .section import (
     CUT,
     LONGEST_WAVES,
@@ -29,43 +30,58 @@ from .section import (
     worn_heights,
 )
 
-MAX = "largest worn depth, corrected for noise"
-MEAN = "mean worn depth over the common length"
-AREA = "worn area of the section, which is the worn volume per unit of width"
-WITHIN = "mean worn depth between the first and the last worn point, including the unworn valleys between these points"
-FROM = "x of the first worn place"
-TO = "x of the last worn place"
-DEPOSIT = 4.0  # standard deviations above the first trace from which a height is a deposit, not noise
+# definitions of the quantities that a user reads
+LARGEST_TEXT = "largest worn depth, corrected for noise"
+MEAN_TEXT = "mean worn depth over the common length"
+AREA_TEXT = "worn area of the section, which is the worn volume per unit of width"
+WITHIN_TEXT = (
+    "mean worn depth between the first and the last worn point, including the unworn valleys between "
+    "these points"
+)
+END_TEXTS = ("x of the first worn place", "x of the last worn place")
+
+MIN_DEPOSIT = (
+    4.0  # standard deviations above the first trace from which a height is a deposit, not noise
+)
 SLIGHT_NOISE = 0.5  # standard deviations of depth that may hide beside worn heights
 NORMAL_TAIL = 0.006  # fraction of normal noise between REACH and twice REACH above zero
-FORM = 2.5  # longest waves, from which the shape of the depth is the form of a track
-MIN_VALLEY = 10.0  # standard deviations that a new valley is deeper than the first trace
-MEDIAN = 5  # samples beside a track that do not count as a new valley
+FORM_WAVES = (
+    2.5  # longest waves of the band, above which a wave of the depth is the form of a track
+)
+MIN_VALLEY = 10.0  # standard deviations by which a new valley is deeper than the first trace
+N_BESIDE = 5  # samples beside a track in which the running median may still show the track
 
 
 class Extent(NamedTuple):
-    """First and last worn place in the x of the trace before and of the trace after, each a `Quantity` [m]; cut:
-    whether either is at the end of the common part, so that the wear may go on."""
+    """First and last worn place as `Quantity` [m], in x of the first and of the second trace.
+
+    is_cut: whether either place is an end of the common part, so that the wear may go on.
+    """
 
     before: tuple
     after: tuple
-    cut: tuple = (False, False)
+    is_cut: tuple = (False, False)
 
     @property
     def known(self) -> "Extent":
-        """The same without the places at which only the common part ends."""
-        why = "the wear reaches the end of the common part of the traces here and may go on"
-        sides = (
-            tuple(refused(one.unit, one.text, why) if cut else one for one, cut in zip(ends, self.cut))
-            for ends in (self.before, self.after)
-        )
-        return Extent(*sides, self.cut)
+        """The extent without the places at which only the common part ends."""
+        reason = "the wear reaches the end of the common part of the traces here and may go on"
+        sides = []
+        for ends in (self.before, self.after):
+            pairs = zip(ends, self.is_cut)
+            sides.append(
+                tuple(refused("m", end.text, reason) if is_cut else end for end, is_cut in pairs)
+            )
+        return Extent(*sides, self.is_cut)
 
 
 @dataclass(frozen=True, eq=False)
 class Worn:
-    """Worn depth of a trace: three `Quantity`, the area [m2] that stands above the first trace (deposits), from where
-    to where it is worn and the mean depth within, both None where that is not known."""
+    """Worn depth of a trace.
+
+    largest, mean, area: `Quantity`; deposited [m2]: area that stands above the first trace; extent,
+    within: worn part and mean depth in it, None where it is not known.
+    """
 
     largest: Quantity
     mean: Quantity
@@ -76,15 +92,18 @@ class Worn:
 
 
 class Valley(NamedTuple):
-    """A valley that the trace after alone has: place [m] in it, and how far it is below the trace before [m]."""
+    """A valley of the second trace alone: place [m] in it, and depth [m] below the first trace."""
 
     place: float
     depth: float
 
 
 class Tracks(NamedTuple):
-    """spans: first and last sample of each track; sizes: `Quantity` of the longest one by name (`_sizes`), all of one
-    span, nothing without one; valley: the deepest new one, None without one; others: sizes of each other track."""
+    """Wear tracks of a trace.
+
+    spans: first and last sample of each; sizes: `Quantity` of the longest one by name (`section.TEXTS`);
+    valley: the deepest new valley or None; others: sizes of each other track.
+    """
 
     spans: tuple
     sizes: Mapping = MappingProxyType({})
@@ -92,225 +111,292 @@ class Tracks(NamedTuple):
     others: tuple = ()
 
 
-def section_of(found: Alignment) -> Section:
-    """Return the section that a trace is."""
-    drawn = found.errors
-    return Section(found.x, np.asarray(found.depth), found.noise_at, drawn.depth, drawn.correlation)
+NO_TRACKS = Tracks(())
 
 
-def measure_worn(found: Alignment, section: Section, tracks: Tracks) -> Worn:
+def make_section(alignment: Alignment) -> Section:
+    """Make the section that an aligned trace is."""
+    errors = alignment.errors
+    depth = np.asarray(alignment.depth)
+    return Section(alignment.x, depth, alignment.noise_at, errors.depth, errors.correlation)
+
+
+def measure_worn(alignment: Alignment, section: Section, tracks: Tracks) -> Worn:
     """Measure the worn depth over the common part of two aligned traces.
 
     All depths are added up, so that noise of both signs cancels on the unworn heights, but not what
-    stands clearly above the first trace: that is deposited. The ends of the longest track are the
-    ends of the worn part where there is a track.
+    stands clearly above the first trace: that is deposited.
+
+    Parameters
+    ----------
+    alignment : Alignment
+    section : Section
+    tracks : Tracks
+        The ends of the longest track are those of the worn part.
     """
-    deposit = section.depth < -DEPOSIT * section.noise
-    area, error = section.total(~deposit)
+    is_deposit = section.depth < -MIN_DEPOSIT * section.noise
+    area, error = section.total(~is_deposit)
     width = section.widths
     length = float(width.sum())
-    floor = 0.1 * found.noise * float(np.sqrt((width**2).sum()))  # digits, where no height is worn
-    error = float(np.hypot(max(error, floor), _slight(found, section, length)))
-    area = area if abs(area) > 1e-6 * found.noise * length else 0.0
+    # the error is not smaller than the last digits where no height is worn
+    rounding = 0.1 * alignment.noise * float(np.sqrt((width**2).sum()))
+    error = float(np.hypot(max(error, rounding), _limit_slight_wear(alignment, section, length)))
+    area = area if abs(area) > 1e-6 * alignment.noise * length else 0.0
     mean_error = float(np.hypot(error, area / section.x.size / SIDE)) / length
-    mean = around(area / length, mean_error, "m", MEAN, 0.0)
-    largest = measure_largest(section, MAX)
-    least = [mean] if "depth_floor" not in tracks.sizes else [mean, tracks.sizes["depth_floor"]]
-    for one in least:
-        if one.value > largest.value:
-            high = max(largest.high, one.high)
-            largest = largest._replace(value=one.value, low=min(largest.low, one.value), high=high)
-    extent = find_extent(found, section, tracks)
-    within = None if extent is None else measure_within(section, *extent.after)
-    deposited = float(-(width[deposit] @ section.depth[deposit]))
-    return Worn(largest, mean, around(area, error, "m2", AREA, 0.0), deposited, extent, within)
+    mean = around(area / length, mean_error, "m", MEAN_TEXT, 0.0)
+    largest = measure_largest(section, LARGEST_TEXT)
+    for smaller in (mean, tracks.sizes.get("depth_floor")):
+        if smaller is not None and smaller.value > largest.value:
+            low = min(largest.low, smaller.value)
+            high = max(largest.high, smaller.high)
+            largest = largest._replace(value=smaller.value, low=low, high=high)
+    extent = find_extent(alignment, section, tracks)
+    within = None if extent is None else _measure_within(section, *extent.after)
+    deposited = float(-(width[is_deposit] @ section.depth[is_deposit]))
+    worn_area = around(area, error, "m2", AREA_TEXT, 0.0)
+    return Worn(largest, mean, worn_area, deposited, extent, within)
 
 
-def _slight(found: Alignment, section: Section, length: float) -> float:
-    """Standard deviation [m2] of the area of wear that the noise beside worn heights may hide."""
+def _limit_slight_wear(alignment: Alignment, section: Section, length: float) -> float:
+    """Return the standard deviation [m2] of the area of wear that the noise beside worn heights may hide."""
     relative = section.depth / section.noise
-    slight = float(((relative > 2.5) & (relative < 5.0)).sum()) / max(found.unworn.sum(), 1)
-    return SLIGHT_NOISE * max(slight - NORMAL_TAIL * float(found.unworn.mean()), 0.0) * found.noise * length
+    n_slight = ((relative > 2.5) & (relative < 5.0)).sum()
+    fraction = float(n_slight) / max(alignment.unworn.sum(), 1)
+    excess = max(fraction - NORMAL_TAIL * float(alignment.unworn.mean()), 0.0)
+    return SLIGHT_NOISE * excess * alignment.noise * length
 
 
-def measure_within(section: Section, start: Quantity, end: Quantity) -> Quantity | None:
-    """Measure the mean worn depth between two places of the second trace; None where they are the same place."""
-    inside = (section.x >= start.value) & (section.x <= end.value)
-    width = float(section.widths[inside].sum())
+def _measure_within(section: Section, start: Quantity, end: Quantity) -> Quantity | None:
+    """Measure the mean worn depth between two places of the second trace; None if they coincide."""
+    is_inside = (section.x >= start.value) & (section.x <= end.value)
+    width = float(section.widths[is_inside].sum())
     if width == 0:
         return None
-    area, error = section.total(inside)
-    loose = float(np.hypot(start.high - start.low, end.high - end.low)) / (2 * SIDE)
-    return around(area / width, float(np.hypot(error, area / width * loose)) / width, "m", WITHIN, 0.0)
+    area, error = section.total(is_inside)
+    width_error = float(np.hypot(start.high - start.low, end.high - end.low)) / (2 * SIDE)
+    error = float(np.hypot(error, area / width * width_error)) / width
+    return around(area / width, error, "m", WITHIN_TEXT, 0.0)
 
 
-def find_extent(found: Alignment, section: Section, tracks: Tracks) -> Extent | None:
-    """Find where the wear begins and ends, None where nothing is worn for sure."""
+def find_extent(alignment: Alignment, section: Section, tracks: Tracks) -> Extent | None:
+    """Find where the wear begins and ends; None where nothing is worn for sure.
+
+    Parameters
+    ----------
+    alignment : Alignment
+    section : Section
+    tracks : Tracks
+        The ends of the longest track count, otherwise those of the outermost worn runs.
+    """
     if tracks.sizes:
-        ends = tracks.sizes["from"], tracks.sizes["to"]
-        cut = tuple(one.value is None for one in ends)
+        ends = [tracks.sizes["from"], tracks.sizes["to"]]
+        is_cut = tuple(end.value is None for end in ends)
         edges = (float(section.x[0]), float(section.x[-1]))
-        ends = tuple(one if one.value is not None else Quantity(at, at, at, "m", "") for one, at in zip(ends, edges))
+        limits = [Quantity(edge, edge, edge, "m", "") for edge in edges]
+        ends = [edge if cut else end for end, edge, cut in zip(ends, limits, is_cut)]
     else:
-        runs = _main_runs(section)
+        runs = _find_main_runs(section)
         if not runs:
             return None
-        ends, cut = _outermost(section, runs)
-    ends = tuple(one._replace(text=f"{text} in the second trace (after wear)") for one, text in zip(ends, (FROM, TO)))
-    moved = SIDE * found.error_of(Parameter.SHIFT)
-    before = tuple(
-        Quantity(
-            found.back(one.value),
-            found.back(one.low) - moved,
-            found.back(one.high) + moved,
-            "m",
-            f"{text} in the first trace (before wear)",
+        ends, is_cut = _find_outermost(section, runs)
+    error = SIDE * alignment.error_of(Parameter.SHIFT)
+    before = []
+    after = []
+    for end, text in zip(ends, END_TEXTS):
+        value, low, high = (alignment.back(place) for place in (end.value, end.low, end.high))
+        before.append(
+            Quantity(
+                value, low - error, high + error, "m", f"{text} in the first trace (before wear)"
+            )
         )
-        for one, text in zip(ends, (FROM, TO))
+        after.append(end._replace(text=f"{text} in the second trace (after wear)"))
+    return Extent(tuple(before), tuple(after), is_cut)
+
+
+def _find_outermost(section: Section, runs: list) -> tuple:
+    """Find both ends of the worn runs as `Quantity`, and whether each is at an end of the trace."""
+    last = section.x.size - 1
+    sides = (
+        (1, runs[0][0], runs[0][1]),
+        (-1, last - runs[-1][1], last - runs[-1][0]),
     )
-    return Extent(before, ends, cut)
+    ends = []
+    is_cut = []
+    for direction, outer, inner in sides:
+        depth, noise, x = (
+            values[::direction][: inner + 1] for values in (section.depth, section.noise, section.x)
+        )
+        end = find_end(depth, noise, section.correlation, outer)
+        places = [float(x[sample]) for sample in (end.first, end.low, end.high)]
+        ends.append(Quantity(places[0], min(places), max(places), "m", ""))
+        is_cut.append(end.first < CUT)
+    return ends, tuple(is_cut)
 
 
-def _outermost(section: Section, runs: list) -> tuple:
-    """Find the ends of the outermost worn runs as `Quantity`, and whether each is at an end of the trace."""
-    out, cut, last = [], [], section.x.size - 1
-    for side, outer, inner in ((1, runs[0][0], runs[0][1]), (-1, last - runs[-1][1], last - runs[-1][0])):
-        depth, noise, x = (one[::side][: inner + 1] for one in (section.depth, section.noise, section.x))
-        at = find_end(depth, noise, section.correlation, outer)
-        places = [float(x[k]) for k in at[:3]]
-        out.append(Quantity(places[0], min(places), max(places), "m", ""))
-        cut.append(at[0] < CUT)
-    return tuple(out), tuple(cut)
-
-
-def _main_runs(section: Section) -> list:
-    """Runs of worn heights that hold at least a hundredth of the lost area each."""
+def _find_main_runs(section: Section) -> list:
+    """Find the runs of worn heights that hold at least a hundredth of the lost area each."""
     runs = runs_of(worn_heights(section))
-    areas = [float((section.widths[a : b + 1] * section.depth[a : b + 1]).sum()) for a, b in runs]
+    lost = section.widths * section.depth
+    areas = [float(lost[first : last + 1].sum()) for first, last in runs]
     total = sum(area for area in areas if area > 0)
     return [run for run, area in zip(runs, areas) if area >= MIN_SHARE * total]
 
 
-def measure_tracks(found: Alignment, section: Section, longest: float) -> Tracks:
-    """Measure all tracks of an alignment; the longest first, the others beside it."""
+def measure_tracks(alignment: Alignment, section: Section, longest: float) -> Tracks:
+    """Measure all tracks of an aligned trace.
+
+    Parameters
+    ----------
+    alignment : Alignment
+    section : Section
+    longest : float
+        Longest wave [m] of the band; a track is wider.
+    """
     spans = tuple(find_tracks(section, worn_heights(section), longest))
-    valley = _find_valley(found, section, spans, longest)
+    valley = _find_valley(alignment, section, spans, longest)
     if not spans:
         return Tracks((), valley=valley)
-    sizes = []
-    for at, span in enumerate(spans):
-        low = spans[at - 1][1] + 1 if at else 0
-        high = spans[at + 1][0] if at + 1 < len(spans) else section.x.size
-        sizes.append(measure_track(section, span, (low, high)))
+    starts = [0, *(last + 1 for _, last in spans[:-1])]
+    stops = [*(first for first, _ in spans[1:]), section.x.size]
+    sizes = [measure_track(section, span, free) for span, free in zip(spans, zip(starts, stops))]
     widest = max(range(len(spans)), key=lambda at: sizes[at]["width"].value)
-    others = tuple(
-        {name: one._replace(text=one.text.replace(" the longest track", " this track")) for name, one in each.items()}
-        for at, each in enumerate(sizes)
-        if at != widest
-    )
+    others = tuple(_name_other(track) for at, track in enumerate(sizes) if at != widest)
     return Tracks(spans, sizes[widest], valley, others)
 
 
-def _find_valley(found: Alignment, section: Section, spans: tuple, longest: float) -> Valley | None:
-    """The deepest valley that the trace before has not, outside of tracks."""
-    rest, noise = np.array(section.depth), found.noise
-    near = max(MEDIAN, int(np.ceil(longest / max(float(np.diff(found.x).mean()), 1e-300))))
+def _name_other(track: dict) -> dict:
+    """Change the texts of a track that is not the longest one."""
+    return {
+        name: size._replace(text=size.text.replace(" the longest track", " this track"))
+        for name, size in track.items()
+    }
+
+
+def _find_valley(
+    alignment: Alignment, section: Section, spans: tuple, longest: float
+) -> Valley | None:
+    """Find the deepest valley outside of tracks that the first trace does not have."""
+    depth = np.array(section.depth)
+    noise = alignment.noise
     for first, last in spans:
-        rest[max(first - MEDIAN, 0) : last + MEDIAN + 1] = 0.0
-    at = int(np.argmax(rest))
-    if not rest[at] > MIN_VALLEY * noise or (rest[max(at - 1, 0) : at + 2] > 2.5 * noise).sum() < 2:
+        depth[max(first - N_BESIDE, 0) : last + N_BESIDE + 1] = 0.0
+    at = int(np.argmax(depth))
+    n_deep = (depth[max(at - 1, 0) : at + 2] > 2.5 * noise).sum()
+    if not depth[at] > MIN_VALLEY * noise or n_deep < 2:
         return None
-    floor = found.first[max(at - near, 0) : at + near + 1].min()
-    if not found.first[at] - rest[at] < floor - 3 * noise:
+    step = max(float(np.diff(alignment.x).mean()), 1e-300)
+    n_near = max(N_BESIDE, int(np.ceil(longest / step)))
+    floor = alignment.first[max(at - n_near, 0) : at + n_near + 1].min()
+    if not alignment.first[at] - depth[at] < floor - 3 * noise:
         return None
-    return Valley(float(found.x[at]), float(rest[at]))
+    return Valley(float(alignment.x[at]), float(depth[at]))
 
 
-def pieces_of(found: Alignment, tracks: Tracks, longest: float, flat: bool = False) -> list:
-    """Pairs of traces, the second laid on the first, between and within the tracks: without the edges of these.
+def split_at_tracks(
+    alignment: Alignment, tracks: Tracks, longest: float, *, is_flat: bool = False
+) -> list:
+    """Split aligned traces into pairs of pieces between and within the tracks, without the track edges.
 
-    An edge is a step, which has waves of every length; half of the longest wave [m] to either side, or three samples,
-    stays out. The whole common part where no piece is three waves long. flat: the form of the tracks, that is the mean
-    line of the depth at two and a half of the longest waves, is put back.
+    An edge is a step, which has waves of every length; half of the longest wave to either side, or three
+    samples, is left out. The whole common part is returned where no piece is three waves long.
+
+    Parameters
+    ----------
+    alignment : Alignment
+    tracks : Tracks
+    longest : float
+        Longest wave [m] of the band.
+    is_flat : bool
+        Whether the form of the tracks is added back: the mean line of the depth at 2.5 longest waves.
     """
-    x, second = np.asarray(found.x), found.first - found.depth
+    x = np.asarray(alignment.x)
     step = float(np.diff(x).mean())
-    reach = max(longest / 2, 3 * step)
-    cuts = _between(x, [x[k] for span in tracks.spans for k in span], reach, longest)
-    out = []
-    for one in cuts:
-        form = mean_line(found.depth[one], FORM * longest / step, tilted=True) if flat and tracks.spans else 0.0
-        out.append(
+    edges = [x[sample] for span in tracks.spans for sample in span]
+    pairs = []
+    for piece in _split(x, edges, max(longest / 2, 3 * step), longest):
+        first = alignment.first[piece]
+        second = first - alignment.depth[piece]
+        if is_flat and tracks.spans:
+            second = second + mean_line(
+                alignment.depth[piece], FORM_WAVES * longest / step, tilted=True
+            )
+        pairs.append(
             tuple(
-                Profile(frozen_array(x[one]), frozen_array(z), "the common part of both traces")
-                for z in (found.first[one], second[one] + form)
+                Profile(frozen_array(x[piece]), frozen_array(z), "the common part of both traces")
+                for z in (first, second)
             )
         )
-    return out
+    return pairs
 
 
-def tracks_of_flanks(found: Flanks) -> Tracks:
-    """The track below the unworn flanks of a trace: its ends are known to a part (`flanks.PARTS`), its pile-up not."""
-    part = float(found.x[-1] - found.x[0]) / PARTS
-    ends = [
-        Quantity(one, one - part, one + part, "m", text)
-        for one, text in ((found.start, TEXTS["from"]), (found.end, TEXTS["to"]))
-    ]
-    inside = np.asarray(found.depth)[(found.x >= found.start) & (found.x <= found.end)]
-    many = max(inside.size // N_FIFTHS, 1)
-    floor = float(np.convolve(inside, np.full(many, 1 / many), "valid").max())
-    off = found.largest[2] - found.largest[0]
-    why = "the height of the first trace (before wear) beside the track is not known"
-    width = Quantity(found.width, max(found.width - 2 * part, 0.0), found.width + 2 * part, "m", TEXTS["width"])
-    return Tracks(
-        (),
-        {
-            "from": ends[0],
-            "to": ends[1],
-            "width": width,
-            "depth_mean": Quantity(*(one / found.width for one in found.area), "m", TEXTS["depth_mean"]),
-            "depth_floor": Quantity(floor, max(floor - off, 0.0), floor + off, "m", TEXTS["depth_floor"]),
-            "step": refused("m", TEXTS["step"], "the roughness that wore away is not known at each point"),
-            "area_net": refused("m2", TEXTS["area_net"], why),
-            "area_gross": Quantity(*found.area, "m2", TEXTS["area_gross"]),
-            **{name: refused("m2", TEXTS[name], why) for name in ("pile_up", "pile_up_left", "pile_up_right")},
-        },
-    )
+def measure_flank_track(flanks: Flanks) -> Tracks:
+    """Measure the track below unworn flanks, whose ends are known to a part of the trace."""
+    part = float(flanks.x[-1] - flanks.x[0]) / PARTS
+    inside = np.asarray(flanks.depth)[(flanks.x >= flanks.start) & (flanks.x <= flanks.end)]
+    fifth = max(inside.size // N_FIFTHS, 1)
+    floor = float(np.convolve(inside, np.full(fifth, 1 / fifth), "valid").max())
+    error = flanks.largest.high - flanks.largest.value
+    width = flanks.width
+    intervals = {
+        "from": (flanks.start, flanks.start - part, flanks.start + part),
+        "to": (flanks.end, flanks.end - part, flanks.end + part),
+        "width": (width, max(width - 2 * part, 0.0), width + 2 * part),
+        "depth_mean": tuple(area / width for area in flanks.area),
+        "depth_floor": (floor, max(floor - error, 0.0), floor + error),
+    }
+    sizes = {name: Quantity(*interval, "m", TEXTS[name]) for name, interval in intervals.items()}
+    reason = "the roughness that wore away is not known at each point"
+    sizes["step"] = refused("m", TEXTS["step"], reason)
+    reason = "the height of the first trace (before wear) beside the track is not known"
+    sizes["area_net"] = refused("m2", TEXTS["area_net"], reason)
+    sizes["area_gross"] = Quantity(*flanks.area, "m2", TEXTS["area_gross"])
+    for name in ("pile_up", "pile_up_left", "pile_up_right"):
+        sizes[name] = refused("m2", TEXTS[name], reason)
+    return Tracks((), sizes)
 
 
-def beside_flanks(after: Profile, found: Flanks, longest: float) -> list:
-    """The trace after in pieces, without the edges of its track, which are known to about a part (`flanks.PARTS`)."""
+def split_at_flanks(after: Profile, flanks: Flanks, longest: float) -> list:
+    """Split the second trace into pieces without the edges of its track.
+
+    longest [m]: longest wave of the band; half of it, or a part of the trace, is left out on either side.
+    """
     reach = max(longest / 2, after.length / PARTS)
     return [
-        Profile(frozen_array(after.x[one]), frozen_array(after.z[one]), after.source)
-        for one in _between(after.x, [found.start, found.end], reach, longest)
+        Profile(frozen_array(after.x[piece]), frozen_array(after.z[piece]), after.source)
+        for piece in _split(after.x, [flanks.start, flanks.end], reach, longest)
     ]
 
 
-def _between(x, cuts: list, reach: float, longest: float) -> list:
-    """Samples (bool) of each piece between cuts [m] that is long enough; all of them where none is."""
-    pieces = [(x > low + reach) & (x < high - reach) for low, high in pairwise([-np.inf, *cuts, np.inf])]
-    out = [one for one in pieces if one.sum() > 16 and np.ptp(x[one]) > LONGEST_WAVES * longest]
-    return out or [np.ones(x.size, bool)]
+def _split(x, cuts: list, reach: float, longest: float) -> list:
+    """Return the samples (n,) bool of each long piece away from the cuts [m]; all samples where none is."""
+    pieces = []
+    for low, high in pairwise([-np.inf, *cuts, np.inf]):
+        is_inside = (x > low + reach) & (x < high - reach)
+        if is_inside.sum() > MIN_SAMPLES and np.ptp(x[is_inside]) > LONGEST_WAVES * longest:
+            pieces.append(is_inside)
+    return pieces or [np.ones(x.size, bool)]
 
 
-def worn_of_flanks(found: Flanks) -> Worn:
-    """Worn depth below the unworn flanks of a trace, over the width of the track."""
-    mean = "mean worn depth over the track"
+def measure_flank_wear(flanks: Flanks) -> Worn:
+    """Measure the worn depth below the unworn flanks of a trace, over the width of the track."""
+    depths = (area / flanks.width for area in flanks.area)
     return Worn(
-        Quantity(*found.largest, "m", MAX),
-        Quantity(*(one / found.width for one in found.area), "m", mean),
-        Quantity(*found.area, "m2", AREA),
+        Quantity(*flanks.largest, "m", LARGEST_TEXT),
+        Quantity(*depths, "m", "mean worn depth over the track"),
+        Quantity(*flanks.area, "m2", AREA_TEXT),
     )
 
 
-def unknown_worn(reason: str, deposited: float = 0.0) -> Worn:
-    """No worn depth, and why; deposited [m2]: what stands above the first trace nevertheless."""
-    return Worn(refused("m", MAX, reason), refused("m", MEAN, reason), refused("m2", AREA, reason), deposited)
+def refuse_worn(reason: str, deposited: float = 0.0) -> Worn:
+    """Refuse the worn depth for a reason; deposited [m2]: area above the first trace."""
+    largest = refused("m", LARGEST_TEXT, reason)
+    mean = refused("m", MEAN_TEXT, reason)
+    return Worn(largest, mean, refused("m2", AREA_TEXT, reason), deposited)
 
 
-def balance(found: Alignment) -> float:
-    """Return (missing less grown area) / (both), by heights beyond 4 deviations: 1 for wear alone."""
-    far = np.where(np.abs(found.depth) > DEPOSIT * found.noise_at, found.depth, 0.0)
-    both = float(np.abs(far).sum())
-    return float(far.sum()) / both if both > 0 else 0.0
+def wear_balance(alignment: Alignment) -> float:
+    """Return (missing - grown) / (missing + grown) area by clear heights: 1 for wear alone."""
+    is_clear = np.abs(alignment.depth) > MIN_DEPOSIT * alignment.noise_at
+    clear = np.where(is_clear, alignment.depth, 0.0)
+    total = float(np.abs(clear).sum())
+    return float(clear.sum()) / total if total > 0 else 0.0

@@ -23,7 +23,7 @@ def filter_trace(profile: Profile, cutoff: float) -> tuple[Profile, Profile]:
     Raises PatchfemError if the cut-off is shorter than four steps or as long as the trace.
     """
     flat = level(even(profile))
-    step = flat.length / (flat.x.size - 1)
+    step = flat.step
     kept = _trim(profile.source, cutoff, flat.x, "trace")
     line = mean_line(flat.z, cutoff / step)
     x = frozen_array(flat.x[kept])

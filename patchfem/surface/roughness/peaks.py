@@ -150,7 +150,7 @@ def _describe_dust(trace: Profile) -> tuple:
     power = float(bend[sharpest].sum()) / max(float(bend.sum()), 1e-300)
     if power < MAX_SHARPEST_POWER:
         return ()
-    step = trace.length / (trace.z.size - 1)
+    step = trace.step
     kept = np.ones(trace.z.size, bool)
     kept[sharpest + 1] = False
     slope = np.diff(trace.z)[kept[1:] & kept[:-1]] / step

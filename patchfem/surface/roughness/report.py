@@ -147,7 +147,7 @@ def _report_trace(
         primary = subtract_form(filter_trace(primary, short)[0], form)[0]
     if np.ptp(primary.z) <= ROUND_OFF * np.abs(trace.z).max():
         primary = replace(primary, z=frozen_array(np.zeros(primary.z.size)))
-    heights = Heights(primary.z, trace.length / (trace.x.size - 1))
+    heights = Heights(primary.z, trace.step)
     intervals = Intervals(heights, form_degree(form))
     values = [_quantity(row, row.compute(heights), intervals) for row in rows.PRIMARY]
     dominant, band = rows.WAVES

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pairs import KINDS, pair, track
 
-from patchfem.surface.compare.compare import compared
+from patchfem.surface.compare.compare import compare_traces
 from patchfem.surface.compare.sentences import _span
 from patchfem.surface.compare.verdict import GREW as EXCHANGED
 from patchfem.surface.compare.verdict import verdicts
@@ -27,7 +27,8 @@ def made(count: int):
 
 def called(count: int) -> tuple:
     """Shares of the traces that are called exchanged: in their order, and exchanged."""
-    pairs = [(compared(p.before, p.after).exchanged, compared(p.after, p.before).exchanged) for p in made(count)]
+    pairs = [(compare_traces(p.before, p.after).is_exchanged, compare_traces(p.after, p.before).is_exchanged)
+             for p in made(count)]
     return tuple(np.mean(pairs, axis=0))
 
 
@@ -50,9 +51,9 @@ def test_always_the_order_of_150_made_traces_is_known():
 def test_exact_the_headline_names_the_order_first(share):
     """Unworn traces have no order: nothing is said about it either way."""
     p = pair(30077, share=share)
-    there, back = compared(p.before, p.after), compared(p.after, p.before)
-    assert not there.exchanged and EXCHANGED not in verdicts([there])[0]
-    assert back.exchanged == (share > 0) and verdicts([back])[0].startswith(EXCHANGED) == (share > 0)
+    there, back = compare_traces(p.before, p.after), compare_traces(p.after, p.before)
+    assert not there.is_exchanged and EXCHANGED not in verdicts([there])[0]
+    assert back.is_exchanged == (share > 0) and verdicts([back])[0].startswith(EXCHANGED) == (share > 0)
     if share:
         assert verdicts([back])[0] == f"{EXCHANGED}; as given: increased" and back.worn.mean.value is None
 
@@ -60,11 +61,11 @@ def test_exact_the_headline_names_the_order_first(share):
 def test_always_a_flat_floor_is_no_reason_to_exchange():
     """The worn floor alone agrees when exchanged, with less noise: 21 of 100 heights against 76."""
     p = track("band", 95000, 2001)
-    found = compared(p.before, p.after)
-    assert found.reference == "place" and not found.exchanged
-    assert found.shift.low <= p.shift <= found.shift.high
+    found = compare_traces(p.before, p.after)
+    assert found.basis == "place" and not found.is_exchanged
+    assert found.motion.shift.low <= p.shift <= found.motion.shift.high
     assert not any("wrong order" in text for text in found.notes)
-    assert compared(p.after, p.before).exchanged
+    assert compare_traces(p.after, p.before).is_exchanged
 
 
 @pytest.mark.parametrize("first, last, says", [
@@ -77,7 +78,7 @@ def test_exact_two_places_have_their_digits_in_common(first, last, says):
 
 def test_exact_a_place_near_zero_has_no_digits_that_the_far_one_lacks():
     """The sentence once said "from x = 76.58 nm to 7.94 mm"."""
-    one = compared(*pair(90301)[:2])
+    one = compare_traces(*pair(90301)[:2])
     places = tuple(end._replace(value=value) for end, value in zip(one.worn.extent.before, (76.58e-9, 7.9404e-3)))
     worn = replace(one.worn, extent=one.worn.extent._replace(before=places))
     text = next(text for text in verdicts([replace(one, worn=worn)])[1] if "Worn from x = " in text)

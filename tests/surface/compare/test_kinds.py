@@ -12,7 +12,7 @@ from pairs import UM
 from worn_kinds import made
 
 from patchfem.core import frozen_array
-from patchfem.surface.compare.compare import compared
+from patchfem.surface.compare.compare import compare_traces
 from patchfem.surface.compare.section import widths_of
 from patchfem.surface.compare.verdict import GREW as EXCHANGED
 from patchfem.surface.compare.verdict import verdicts
@@ -40,7 +40,7 @@ def made_pair(kind: str, seed: int) -> tuple:
 def faults(kind: str, seed: int) -> tuple:
     """Sentences that are false of a pair, and whether each interval of mean and largest depth holds the truth."""
     before, after, worn = made_pair(kind, seed)
-    one = compared(before, after)
+    one = compare_traces(before, after)
     headline, sentences = verdicts([one])
     text, held = " ".join((headline, *sentences)), []
     false = [kind not in RUBBED and headline.replace("; ", "").startswith("worn"),
@@ -48,10 +48,10 @@ def faults(kind: str, seed: int) -> tuple:
              kind in known_pairs.SAME and any(word in headline for word in ("reduced", "increased", "flatter")),
              kind == "scale" and ("reduced" in headline or "increased" in headline) and "calibrate z" not in text,
              kind not in GROWN and headline.startswith(EXCHANGED),
-             one.mirrored != (kind == "mirrored" and one.registration is not None),
-             (one.registration is None) != headline.startswith("not comparable") and not one.exchanged]
-    if one.registration is not None and one.worn.mean.value is not None:
-        x = one.registration.x
+             one.is_mirrored != (kind == "mirrored" and one.alignment is not None),
+             (one.alignment is None) != headline.startswith("not comparable") and not one.is_exchanged]
+    if one.alignment is not None and one.worn.mean.value is not None:
+        x = one.alignment.x
         there, width = np.interp(x, after.x, worn), widths_of(x)
         held = [q.low <= true <= q.high for q, true in ((one.worn.mean, width @ there / width.sum()),
                                                         (one.worn.largest, there.max()))]
@@ -81,11 +81,11 @@ def test_exact_even_wear_has_no_limit_and_the_tilt_is_half_its_length_of_wear():
     pair = made("unworn", HELD_OUT + 50)
     x = pair.after.x
     after = Profile(x, frozen_array(pair.after.z - 3 * UM - 2e-3 * x), "after")
-    one = compared(pair.before, after)
-    length = float(np.ptp(one.registration.x))
+    one = compare_traces(pair.before, after)
+    length = float(np.ptp(one.alignment.x))
     assert one.worn.mean.value is None and one.hidden.high is None and one.hidden.low == 0.0
-    tilt = abs(one.tilt.value)
-    assert one.hidden.value == pytest.approx((tilt + (one.tilt.high - one.tilt.low) / 2) * length / 2, rel=1e-9)
+    tilt = one.motion.tilt
+    assert one.hidden.value == pytest.approx((abs(tilt.value) + (tilt.high - tilt.low) / 2) * length / 2, rel=1e-9)
     text = verdicts([one])[1][0]
     assert "at most" not in text and "Uniform wear of any depth" in text and "reference mark" in text
     found = re.search(r"([\d.]+) urad(?: at the upper end of its interval\)| between the traces) may hide a mean "
@@ -101,7 +101,7 @@ def test_exact_a_spike_is_found_with_its_feet_and_a_groove_stays():
     z[50] += 200 * UM
     left = despiked(Profile(pair.before.x, frozen_array(z), "before"))
     assert left.missing[50] and left.missing.sum() <= 3 and "--keep-spikes" in left.notes[-1]
-    one, kept = (compared(Profile(pair.before.x, frozen_array(z), "before"), pair.after, keep_spikes=keep)
+    one, kept = (compare_traces(Profile(pair.before.x, frozen_array(z), "before"), pair.after, keep_spikes=keep)
                  for keep in (False, True))
     assert one.removed == (int(left.missing.sum()), 0) and kept.removed == (0, 0)
     assert one.worn.largest.value == pytest.approx(pair.worn.max(), rel=0.02) and kept.worn.largest.value > 100 * UM
@@ -120,7 +120,8 @@ def test_exact_dust_and_dropouts_of_many_samples_are_no_wear(shape):
         after += 9 * UM * np.exp(-0.5 * ((k - 120) / 3.8) ** 2)
     else:
         after[115:125] -= 60 * UM
-    one = compared(Profile(pair.before.x, frozen_array(before), "b"), Profile(pair.after.x, frozen_array(after), "a"))
+    one = compare_traces(Profile(pair.before.x, frozen_array(before), "b"),
+                         Profile(pair.after.x, frozen_array(after), "a"))
     assert one.removed[shape != "speck"] >= 8
     assert one.worn.largest.low <= pair.worn.max() <= one.worn.largest.high
 
@@ -128,12 +129,12 @@ def test_exact_dust_and_dropouts_of_many_samples_are_no_wear(shape):
 @pytest.mark.parametrize("kind, seed", [("edge", 60), ("edge", 61), ("groove", 60)])
 def test_always_sizes_of_a_track_are_of_one_span(kind, seed):
     pair = made(kind, HELD_OUT + seed)
-    one = compared(pair.before, pair.after)
+    one = compare_traces(pair.before, pair.after)
     track = one.tracks.sizes
     first, last = (track[name].value for name in ("from", "to"))
     if kind == "edge":  # it reaches one end of the traces
         assert (first is None) != (last is None)
-        first, last = (first, one.registration.x[-1]) if last is None else (one.registration.x[0], last)
+        first, last = (first, one.alignment.x[-1]) if last is None else (one.alignment.x[0], last)
     inside = (pair.after.x >= first) & (pair.after.x <= last)
     true = np.trapezoid(pair.worn[inside], pair.after.x[inside])
     width = track["width"].value

@@ -9,8 +9,8 @@ import pytest
 from pairs import UM, pair
 
 from patchfem.core import PatchfemError, frozen_array
-from patchfem.surface.compare.compare import compared, compared_files
-from patchfem.surface.compare.same import placed
+from patchfem.surface.compare.compare import compare_files, compare_traces
+from patchfem.surface.compare.place import find_place_as_given
 from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile
 
@@ -40,11 +40,12 @@ def scored(count: int, **kinds) -> tuple:
     held = []
     for seed in range(HELD_OUT, HELD_OUT + count):
         before, after, worn, shift = milled(seed, **kinds)
-        found = compared(before, after)
-        assert not found.exchanged
-        if found.reference == "place":
-            mean = np.interp(found.registration.x, after.x, worn).mean()
-            held.append([one.low <= true <= one.high for one, true in ((found.worn.mean, mean), (found.shift, shift))])
+        found = compare_traces(before, after)
+        assert not found.is_exchanged
+        if found.basis == "place":
+            mean = np.interp(found.alignment.x, after.x, worn).mean()
+            held.append([one.low <= true <= one.high
+                         for one, true in ((found.worn.mean, mean), (found.motion.shift, shift))])
     return len(held) / count, np.mean(held, axis=0)
 
 
@@ -62,24 +63,24 @@ def test_always_a_deep_track_is_laid_on_its_place(count, kinds):
 def test_always_noise_alone_is_no_reason_against_the_place():
     """Unworn traces that were alike by 0.97 were refused: "chance brings their valleys the likeness of 0.97 too"."""
     before, after, *_ = milled(HELD_OUT, depth=0.0)
-    found = compared(before, after)
-    assert found.reference == "place" and found.worn.mean.value is None and found.hidden.high is None
+    found = compare_traces(before, after)
+    assert found.basis == "place" and found.worn.mean.value is None and found.hidden.high is None
 
 
 @pytest.mark.parametrize("count", [2, pytest.param(6, marks=pytest.mark.slow)])
 def test_always_shallow_wear_is_no_exchange(count):
     """Wear of 3.5 noises: a fit that runs between floor and surface, the files exchanged, has more heights near it."""
     for seed in range(HELD_OUT, HELD_OUT + count):
-        assert not compared(*milled(seed, depth=0.5)[:2]).exchanged
+        assert not compare_traces(*milled(seed, depth=0.5)[:2]).is_exchanged
 
 
 @pytest.mark.parametrize("count", [2, pytest.param(60, marks=pytest.mark.slow)])
 def test_refuses_traces_of_two_places_also_at_a_told_shift(count):
     for seed in range(HELD_OUT, HELD_OUT + count):
         before, after = milled(seed)[0], milled(seed + 1000)[1]
-        assert placed(before, after).found is None
-        told = placed(before, after, 0.0)
-        assert told.found is None and told.why.startswith("at the given shift of 0")
+        assert find_place_as_given(before, after).alignment is None
+        told = find_place_as_given(before, after, 0.0)
+        assert told.alignment is None and told.reason.startswith("at the given shift of 0")
 
 
 def turned() -> tuple:
@@ -93,9 +94,10 @@ def turned() -> tuple:
 
 def test_exact_a_told_shift_places_a_surface_that_repeats_itself():
     before, after, worn = turned()
-    blind, found = compared(before, after), compared(before, after, shift=1 * UM)
-    assert "periodic, with a period of 80 um" in blind.shift.reason and "--shift '0 mm'" in blind.shift.reason
-    assert found.reference == "place" and found.shift.low <= 0 <= found.shift.high < 0.1 * UM
+    blind, found = compare_traces(before, after), compare_traces(before, after, shift=1 * UM)
+    reason = blind.motion.shift.reason
+    assert "periodic, with a period of 80 um" in reason and "--shift '0 mm'" in reason
+    assert found.basis == "place" and found.motion.shift.low <= 0 <= found.motion.shift.high < 0.1 * UM
     assert found.worn.mean.low <= worn.mean() <= found.worn.mean.high
 
 
@@ -103,7 +105,7 @@ def test_refuses_a_shift_of_four_files(tmp_path):
     path = tmp_path / "one.csv"
     path.write_text("x [um],z [um]\n" + "".join(f"{k},{k % 7}\n" for k in range(40)))
     with pytest.raises(PatchfemError, match="compare each direction separately"):
-        compared_files((path,) * 4, shift=0.0)
+        compare_files((path,) * 4, shift=0.0)
 
 
 def span(worn) -> tuple:
@@ -118,8 +120,8 @@ def test_always_the_track_is_told_from_its_edges_to_its_depth(count):
     held = []
     for seed in range(HELD_OUT + 100, HELD_OUT + 100 + count):
         before, after, worn, _ = milled(seed)
-        found = compared(before, after)
-        if found.reference == "place":
+        found = compare_traces(before, after)
+        if found.basis == "place":
             values = found.values
             ends = [after.x[k] for k in span(worn)]
             held.append([one.low <= true <= one.high for one, true in zip(
@@ -132,25 +134,25 @@ def test_always_the_track_is_told_from_its_edges_to_its_depth(count):
 @pytest.mark.parametrize("count", [1, pytest.param(4, marks=pytest.mark.slow)])
 def test_always_a_track_at_the_end_of_the_traces_has_its_inner_edge(count):
     """A track that runs out of the trace once ended in a fault of the program; where it ends outside is not known."""
-    placed = 0
+    n_aligned = 0
     for seed in range(HELD_OUT + 110, HELD_OUT + 110 + count):
         before, after, worn, _ = milled(seed)
         first, last = span(worn)
         kept = last - 20
         sides = [Profile(one.x[:kept], one.z[:kept], one.source) for one in (before, after)]
-        there, back = compared(*sides), compared(*map(_mirrored, sides))
+        there, back = compare_traces(*sides), compare_traces(*map(_mirrored, sides))
         for found, inner, outer, true in ((there, "track_from", "track_to", after.x[first]),
                                           (back, "track_to", "track_from", after.x[kept - 1] - after.x[first])):
-            if found.reference == "place":
-                placed += 1
+            if found.basis == "place":
+                n_aligned += 1
                 assert found.values[inner].low - 1e-12 <= true <= found.values[inner].high + 1e-12
-                seen = abs(true - found.registration.x[-1 if found is there else 0])
+                seen = abs(true - found.alignment.x[-1 if found is there else 0])
                 assert found.values[outer].value is None and "may be longer" in found.values[outer].reason
                 width = found.values["track_width"]
                 assert width.low <= seen and width.high is None and width.value == pytest.approx(seen, rel=0.02)
                 assert found.values["track_step"].value is None and found.values["track_area_gross"].high is None
                 assert any("may be longer" in text for text in verdicts([found])[1])
-    assert placed > count
+    assert n_aligned > count
 
 
 def _mirrored(one: Profile) -> Profile:
@@ -162,7 +164,7 @@ def test_always_sharp_edges_of_a_track_are_no_roughness(count):
     """The verdict was "increased" at above 99.9 % for walls one sample wide on a surface of unchanged roughness."""
     words = []
     for seed in range(HELD_OUT + 200, HELD_OUT + 200 + count):
-        found = compared(*milled(seed)[:2])
+        found = compare_traces(*milled(seed)[:2])
         words.append(verdicts([found])[0])
         assert any("edges of the track" in one for one in verdicts([found])[1])
     assert words.count("worn, no change detected in the amplitude of the waves") > 0.7 * count, words
@@ -172,8 +174,8 @@ def test_always_sharp_edges_of_a_track_are_no_roughness(count):
 def test_always_walls_between_unworn_flanks_are_no_roughness(count):
     """Traces of two places: the track is found between its flanks, and its walls do not count either."""
     for seed in range(HELD_OUT + 230, HELD_OUT + 230 + count):
-        found = compared(milled(seed, waves=0.0)[0], milled(seed + 1000, waves=0.0)[1])
-        assert found.reference == "flanks"
+        found = compare_traces(milled(seed, waves=0.0)[0], milled(seed + 1000, waves=0.0)[1])
+        assert found.basis == "flanks"
         assert verdicts([found])[0] == "not comparable point by point; worn, " \
             "no change detected in the amplitude of the waves"
         assert verdicts([found])[1][0].startswith("Worn: a track from about x = ")
@@ -183,7 +185,7 @@ def test_always_a_rougher_floor_is_still_increased():
     """What the edges hid must not be lost: a floor with waves of the band of 0.5 um."""
     before, after, worn, _ = milled(HELD_OUT + 210)
     rough = np.where(worn > 0, 0.5 * UM * np.sin(2 * np.pi * after.x / (85 * UM)), 0.0)
-    found = compared(before, Profile(after.x, frozen_array(after.z + rough), "after"))
+    found = compare_traces(before, Profile(after.x, frozen_array(after.z + rough), "after"))
     assert found.tracks.spans and verdicts([found])[0] == "worn, waves increased"
 
 
@@ -192,16 +194,16 @@ def test_exact_a_valley_of_the_trace_after_alone_is_named():
     first, last = span(worn)
     at = (last + COUNT) // 2 if COUNT - last > first else first // 2
     cut = 6 * UM * np.exp(-0.5 * ((after.x - after.x[at]) / 50e-6) ** 2)
-    assert compared(before, after).tracks.valley is None
-    found = compared(before, Profile(after.x, frozen_array(after.z - cut), "after"))
+    assert compare_traces(before, after).tracks.valley is None
+    found = compare_traces(before, Profile(after.x, frozen_array(after.z - cut), "after"))
     assert found.tracks.valley.place == pytest.approx(after.x[at], abs=25e-6)
     assert found.tracks.valley.depth == pytest.approx(6 * UM, abs=0.5 * UM)
     assert any(" is only in the second trace (after wear)" in one for one in verdicts([found])[1])
     both = Profile(before.x, frozen_array(before.z - cut), "before")
-    assert compared(both, Profile(after.x, frozen_array(after.z - cut), "after")).tracks.valley is None
+    assert compare_traces(both, Profile(after.x, frozen_array(after.z - cut), "after")).tracks.valley is None
 
 
 def test_always_worn_tops_are_no_track():
     p = pair(30077, share=0.6)
-    found = compared(p.before, p.after)
+    found = compare_traces(p.before, p.after)
     assert found.tracks.spans == () and found.tracks.valley is None and "track_from" not in found.values

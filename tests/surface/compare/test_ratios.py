@@ -7,8 +7,8 @@ from synthetic import report_area
 
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.surface.areal import Areal
-from patchfem.surface.compare.compare import _waves, bridged, compared, directions_of
-from patchfem.surface.compare.ratios import Size, ratio, size_of
+from patchfem.surface.compare.compare import _compare_waves, compare_directions, compare_traces, fill_scan
+from patchfem.surface.compare.ratios import Size, divide_sizes, measure_size
 from patchfem.surface.compare.sentences import confidence_of, describe_ratio_change
 from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile
@@ -21,8 +21,8 @@ MANY = pytest.param(40, marks=pytest.mark.slow)
 def test_always_unchanged_surfaces_are_called_reduced_in_5_of_100_cases_at_most(count):
     """Of 2 count ratios at 5 %, so 2.5 % each way; of 8 ratios two or more one way have a chance of 1.6 %."""
     seeds = range(70000, 70000 + count)
-    sizes = [[size_of(pair(seed + part, share=0.0).before, UM) for part in (0, 5000)] for seed in seeds]
-    found = [ratio("amplitude", "", *two) for one in sizes for two in (one, one[::-1])]
+    sizes = [[measure_size(pair(seed + part, share=0.0).before, UM) for part in (0, 5000)] for seed in seeds]
+    found = [divide_sizes("amplitude", "", *two) for one in sizes for two in (one, one[::-1])]
     words = [describe_ratio_change(one) for one in found]
     most = max(count // 10, 1)
     assert words.count("reduced") <= most and words.count("increased") <= most
@@ -40,9 +40,9 @@ def test_always_unchanged_surfaces_in_one_place_are_called_reduced_in_5_of_100_c
     words, widths = [], []
     for seed in range(30100, 30100 + count):
         p = pair(seed, share=0.0)
-        one = compared(p.before, p.after)
-        words.append(describe_ratio_change(one.amplitude_ratio))
-        widths.append(one.amplitude_ratio.high / one.amplitude_ratio.low)
+        one = compare_traces(p.before, p.after)
+        words.append(describe_ratio_change(one.ratios.amplitude))
+        widths.append(one.ratios.amplitude.high / one.ratios.amplitude.low)
     most = 4 if count == 40 else 1  # 5 or more of 40 at 2.5 %: one in 300; 2 or more of 5: one in 160
     assert words.count("reduced") <= most and np.median(widths) < 1.01
 
@@ -50,12 +50,12 @@ def test_always_unchanged_surfaces_in_one_place_are_called_reduced_in_5_of_100_c
 def test_exact_intervals_of_fisher_and_of_pitman():
     """Both by other functions: quantiles of F by drawing chi-squares; Pitman's bounds as roots of his statistic."""
     one, other = Size(2.0, 0.4, (14.0, 60.0), None), Size(1.0, 0.4, (9.0, 60.0), None)
-    found = ratio("amplitude", "", one, other)
+    found = divide_sizes("amplitude", "", one, other)
     random = np.random.default_rng(0)
     drawn = np.sqrt(random.chisquare(14, 400000) / 14 / (random.chisquare(9, 400000) / 9))
     low, high = 2 / np.quantile(drawn, (0.975, 0.025))
     assert (found.low, found.high) == pytest.approx((low, high), rel=0.01)
-    found = ratio("amplitude", "", one, other, 0.8)
+    found = divide_sizes("amplitude", "", one, other, 0.8)
     for bound in (found.low, found.high):  # at the bound, sums and differences of scaled traces just correlate
         f = (found.value / bound) ** 2
         r = (f - 1) / np.sqrt((f + 1) ** 2 - 4 * 0.8**2 * f)
@@ -70,7 +70,7 @@ def test_exact_confidence_of_an_interval_that_just_reaches_one():
 
 def test_always_wear_of_peaks_is_called_reduced():
     p = pair(30077, share=0.5)
-    headline, sentences = verdicts([compared(p.before, p.after, "x")])
+    headline, sentences = verdicts([compare_traces(p.before, p.after, "x")])
     assert headline == "worn, waves reduced" and sentences[0].startswith("Worn along x: ")
     assert sentences[1].startswith("Depths are measured from the ")
     assert "along x" in sentences[2] and "confidence" in sentences[2]
@@ -84,9 +84,9 @@ def scan(seed: int, squeeze: int = 1) -> Areal:
 
 def test_always_an_areal_scan_shows_which_direction_is_smoother():
     before, after = scan(3), scan(3, 4)
-    flat = tuple(map(bridged, (before, after)))  # no search for a place, which they do not share
-    parts = [_waves(before, after, flat, name) for name in ("x", "y")]
-    found = directions_of(parts)
+    filled = tuple(map(fill_scan, (before, after)))  # no search for a place, which they do not share
+    parts = [_compare_waves((before, after), filled, name) for name in ("x", "y")]
+    found = compare_directions(parts)
     assert [describe_ratio_change(one[1]) for one in found] == ["no change shown", "increased"]
     text = verdicts(parts, found)[1]
     assert text[-2].startswith("Before: no anisotropy shown") and text[-1].startswith("After: anisotropic")
@@ -94,18 +94,18 @@ def test_always_an_areal_scan_shows_which_direction_is_smoother():
 
 
 def test_always_two_pairs_are_compared_across():
-    parts = [compared(pair(seed).before, pair(seed).after, name) for seed, name in ((30001, "x"), (30002, "y"))]
-    found = directions_of(parts)
+    parts = [compare_traces(pair(seed).before, pair(seed).after, name) for seed, name in ((30001, "x"), (30002, "y"))]
+    found = compare_directions(parts)
     assert [one[0] for one in found] == ["before", "after"]
     assert found[0][1].low < 1 < found[0][1].high
 
 
 def test_always_a_coarser_trace_is_compared_at_its_own_step():
     p = pair(30003)
-    fine = compared(p.before, p.after)
-    coarse = compared(p.before, Profile(frozen_array(p.after.x[::2]), frozen_array(p.after.z[::2]), "coarse"))
+    fine = compare_traces(p.before, p.after)
+    coarse = compare_traces(p.before, Profile(frozen_array(p.after.x[::2]), frozen_array(p.after.z[::2]), "coarse"))
     assert any("at a step of 2 um" in text for text in coarse.notes)
-    assert coarse.amplitude_ratio.value == pytest.approx(fine.amplitude_ratio.value, rel=0.01)
+    assert coarse.ratios.amplitude.value == pytest.approx(fine.ratios.amplitude.value, rel=0.01)
     assert coarse.worn.mean.value == pytest.approx(fine.worn.mean.value, abs=0.01 * UM)
 
 
@@ -113,4 +113,4 @@ def test_refuses_a_trace_too_short_for_the_band():
     p = pair(1)
     short = Profile(p.before.x[:150], p.before.z[:150], "short")
     with pytest.raises(PatchfemError, match="not the whole band"):
-        compared(short, short)
+        compare_traces(short, short)

@@ -11,9 +11,9 @@ from synthetic import report_area
 
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.surface.compare.alignment import align
-from patchfem.surface.compare.compare import compared
+from patchfem.surface.compare.compare import compare_traces
 from patchfem.surface.compare.model import Parameter
-from patchfem.surface.compare.place import matched
+from patchfem.surface.compare.search import search_shift
 from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile, level
 
@@ -23,11 +23,11 @@ HELD_OUT = 80000
 def scored(seed: int) -> tuple:
     """Errors of shift, mean and largest depth [m] of a pair, whether their intervals hold the truth, the reference."""
     p = pair(seed)
-    found = compared(p.before, p.after)
-    worn = np.interp(found.registration.x, p.after.x, p.worn)
-    truths = (found.shift, p.shift), (found.worn.mean, worn.mean()), (found.worn.largest, worn.max())
+    found = compare_traces(p.before, p.after)
+    worn = np.interp(found.alignment.x, p.after.x, p.worn)
+    truths = (found.motion.shift, p.shift), (found.worn.mean, worn.mean()), (found.worn.largest, worn.max())
     return ([one.value - truth for one, truth in truths], [one.low <= truth <= one.high for one, truth in truths],
-            found.reference)
+            found.basis)
 
 
 def scores(count: int) -> tuple:
@@ -55,7 +55,7 @@ def test_always_200_pairs_hold_the_truth_in_95_of_100_intervals():
 @pytest.mark.parametrize("seed", range(4))
 def test_exact_without_noise(seed):
     p = pair(seed, noise=0.0)
-    found = align(p.before, p.after, matched(p.before, p.after).shift)
+    found = align(p.before, p.after, search_shift(p.before, p.after).shift)
     worn = np.interp(found.x, p.after.x, p.worn)
     assert abs(found.shift - p.shift) < 5e-11
     assert abs(found.depth.mean() - worn.mean()) < 2e-11
@@ -67,13 +67,14 @@ def test_exact_without_noise(seed):
 
 def test_exact_a_trace_on_itself_shows_no_change():
     p = pair(1)
-    found = compared(p.before, p.before)
-    assert found.shift.value == pytest.approx(0.0, abs=1e-15) and found.tilt.value == pytest.approx(0.0, abs=1e-12)
+    found = compare_traces(p.before, p.before)
+    assert found.motion.shift.value == pytest.approx(0.0, abs=1e-15)
+    assert found.motion.tilt.value == pytest.approx(0.0, abs=1e-12)
     assert found.worn.mean.value is found.worn.largest.value is found.worn.area.value is None
     assert found.hidden.value < 1e-9 and found.hidden.high is None
-    assert (found.amplitude_ratio.value, found.slope_ratio.value) == pytest.approx((1.0, 1.0), rel=1e-14)
+    assert (found.ratios.amplitude.value, found.ratios.slope.value) == pytest.approx((1.0, 1.0), rel=1e-14)
     assert verdicts([found])[0] == "no change shown"
-    assert found.shift.value == found.tilt.value == 0
+    assert found.motion.shift.value == found.motion.tilt.value == 0
     assert verdicts([found])[1][0] == "Worn depth: none; the heights before and after wear are the same."
 
 
@@ -82,7 +83,7 @@ def test_always_levelling_both_traces_takes_the_wear_away():
     the one-sided registration of the same traces finds the depth."""
     p = pair(30001, shift=0.0)
     levelled = float((level(p.before).z - level(p.after).z).mean())
-    found = compared(p.before, p.after).worn.mean.value
+    found = compare_traces(p.before, p.after).worn.mean.value
     assert p.worn.mean() > 1 * UM
     assert abs(levelled) < 1e-12
     assert found == pytest.approx(p.worn.mean(), abs=0.005 * UM)
@@ -91,8 +92,8 @@ def test_always_levelling_both_traces_takes_the_wear_away():
 @pytest.mark.parametrize("count", [2, pytest.param(24, marks=pytest.mark.slow)])
 def test_always_traces_of_two_places_have_no_depth(count):
     for seed in range(count):
-        found = compared(pair(seed + 40000, share=0.0).before, pair(seed + 50000, share=0.0).after)
-        assert found.reference == "" and found.worn.mean.value is found.shift.value is None
+        found = compare_traces(pair(seed + 40000, share=0.0).before, pair(seed + 50000, share=0.0).after)
+        assert found.basis == "" and found.worn.mean.value is found.motion.shift.value is None
         assert "no common part" in found.worn.mean.reason and "unworn flanks" in found.worn.mean.reason
 
 
@@ -100,9 +101,9 @@ def test_always_traces_of_two_places_have_no_depth(count):
 def test_always_unworn_traces_of_one_place_show_no_wear(count):
     for seed in range(30050, 30050 + count):
         p = pair(seed, share=0.0)
-        found = compared(p.before, p.after)
-        assert found.reference == "place"
-        assert found.worn.mean.value is None and abs(found.registration.depth.mean()) < 0.004 * UM
+        found = compare_traces(p.before, p.after)
+        assert found.basis == "place"
+        assert found.worn.mean.value is None and abs(found.alignment.depth.mean()) < 0.004 * UM
         assert "no wear detected" in verdicts([found])[1][0] and "at most" not in verdicts([found])[1][0]
 
 
@@ -118,9 +119,9 @@ def test_always_surfaces_that_wear_each_other_have_their_depth_or_none(high, row
         errors = []
         for k in range(0, high, high // rows):
             noise = 0.02 * UM * random.standard_normal((2, count))
-            found = compared(Profile(x, frozen_array(pieces[0][k] + noise[0] - 0.003 * x), "before"),
+            found = compare_traces(Profile(x, frozen_array(pieces[0][k] + noise[0] - 0.003 * x), "before"),
                              Profile(x, frozen_array(lower[k] + noise[1] + 0.004 * x), "after"))
-            if found.reference == "place":
+            if found.basis == "place":
                 errors.append(found.worn.mean.value - float((pieces[0][k] - lower[k]).mean()))
         assert (len(errors) >= 0.75 * rows and max(map(abs, errors)) < 0.02 * UM) if registered else not errors
 
@@ -129,18 +130,18 @@ def test_always_a_turned_surface_has_no_place():
     x = np.arange(1001) * UM
     noise = 0.02 * UM * np.random.default_rng(0).standard_normal((2, x.size))
     z = 5 * UM * np.sin(2 * np.pi * x / (80 * UM))
-    found = compared(Profile(x, frozen_array(z + noise[0]), "turned"),
+    found = compare_traces(Profile(x, frozen_array(z + noise[0]), "turned"),
                      Profile(x, frozen_array(np.minimum(z, UM) + noise[1]), "worn"))
-    assert found.reference != "place" and "surface is periodic" in found.shift.reason
+    assert found.basis != "place" and "surface is periodic" in found.motion.shift.reason
 
 
 def test_always_a_stretched_x_is_found_and_taken_out():
     p = pair(5)
     long = Profile(frozen_array(p.after.x * 1.004), p.after.z, "after")
-    found = compared(p.before, long)
-    assert found.stretch.value == pytest.approx(1.004, abs=3e-5)
-    assert found.stretch.low < 1.004 < found.stretch.high
-    assert found.worn.mean.value == pytest.approx(compared(p.before, p.after).worn.mean.value, abs=0.005 * UM)
+    found = compare_traces(p.before, long)
+    assert found.motion.stretch.value == pytest.approx(1.004, abs=3e-5)
+    assert found.motion.stretch.low < 1.004 < found.motion.stretch.high
+    assert found.worn.mean.value == pytest.approx(compare_traces(p.before, p.after).worn.mean.value, abs=0.005 * UM)
     assert any("this difference in length is corrected" in text for text in found.notes)
 
 
@@ -150,9 +151,9 @@ def test_always_deposits_do_not_count_as_less_wear():
     bare = np.interp(p.after.x, p.after.x, p.worn) == 0
     place = np.flatnonzero(bare)[100:140]
     z[place] += 3 * UM
-    found = compared(p.before, Profile(p.after.x, frozen_array(z), "after")).worn
+    found = compare_traces(p.before, Profile(p.after.x, frozen_array(z), "after")).worn
     assert found.deposited == pytest.approx(3 * UM * place.size * UM, rel=0.01)
-    assert found.mean.value == pytest.approx(compared(p.before, p.after).worn.mean.value, abs=0.005 * UM)
+    assert found.mean.value == pytest.approx(compare_traces(p.before, p.after).worn.mean.value, abs=0.005 * UM)
 
 
 def test_always_gaps_in_both_traces_do_no_harm():
@@ -160,8 +161,9 @@ def test_always_gaps_in_both_traces_do_no_harm():
     before, after = np.array(p.before.z), np.array(p.after.z)
     before[700:720] = np.nan
     after[300:340] = np.nan
-    found = compared(Profile(p.before.x, frozen_array(before), "before"), Profile(p.after.x, frozen_array(after), "a"))
-    assert found.reference == "place" and found.shift.value == pytest.approx(p.shift, abs=0.02 * UM)
+    found = compare_traces(Profile(p.before.x, frozen_array(before), "before"),
+                           Profile(p.after.x, frozen_array(after), "a"))
+    assert found.basis == "place" and found.motion.shift.value == pytest.approx(p.shift, abs=0.02 * UM)
 
 
 def groove(seed: int, depth: float, rough: float) -> tuple:
@@ -182,8 +184,8 @@ def test_always_a_groove_between_unworn_flanks_has_its_area(depth, rough, rms, c
     held, errors = [], []
     for seed in range(count):
         before, after, area = groove(60000 + seed, depth, rough)
-        found = compared(before, after)
-        assert found.reference == "flanks" and found.shift.value is None
+        found = compare_traces(before, after)
+        assert found.basis == "flanks" and found.motion.shift.value is None
         held.append(found.worn.area.low <= area <= found.worn.area.high)
         errors.append(found.worn.area.value / area - 1)
         assert found.worn.largest.low <= depth <= found.worn.largest.high
@@ -196,9 +198,9 @@ def test_exact_a_groove_in_a_straight_line():
     x = np.arange(4001) * 0.5 * UM
     t = (x - 0.9e-3) / 0.3e-3
     cut = np.where(abs(t) < 1, 10 * UM * (1 - t**2), 0.0)
-    found = compared(Profile(x, frozen_array(-0.002 * x + 1e-9 * np.sin(x / UM)), "before"),
+    found = compare_traces(Profile(x, frozen_array(-0.002 * x + 1e-9 * np.sin(x / UM)), "before"),
                      Profile(x, frozen_array(0.004 * x - cut), "after"))
-    assert found.reference == "flanks"
+    assert found.basis == "flanks"
     assert found.worn.area.value == pytest.approx(4e-9, rel=1e-5)
     assert found.worn.largest.value == pytest.approx(10 * UM, rel=1e-5)
     assert found.flanks.start == pytest.approx(0.6e-3, abs=25 * UM)
@@ -207,4 +209,4 @@ def test_exact_a_groove_in_a_straight_line():
 def test_refuses_a_few_samples():
     short = Profile(np.arange(5.0), np.zeros(5), "short")
     with pytest.raises(PatchfemError, match="16 samples"):
-        matched(short, short)
+        search_shift(short, short)

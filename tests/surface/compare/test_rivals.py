@@ -11,7 +11,7 @@ from pairs import UM
 from scipy.ndimage import gaussian_filter1d
 
 from patchfem.core import frozen_array
-from patchfem.surface.compare.compare import compared
+from patchfem.surface.compare.compare import compare_traces
 from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile
 
@@ -29,7 +29,7 @@ def worn_pair(seed: int, depth, bow: float = 0.0) -> tuple:
     after = z - lost + bow * ((x - 2 * MM) / (2 * MM)) ** 2
     traces = [Profile(frozen_array(x[100:4100]), frozen_array(one + 20e-9 * random.standard_normal(4000)), name)
               for one, name in ((z[100:4100], "before"), (after[80:4080], "after"))]
-    return compared(*traces), float(lost[(x >= 0) & (x < 3.98 * MM)].sum() * UM)
+    return compare_traces(*traces), float(lost[(x >= 0) & (x < 3.98 * MM)].sum() * UM)
 
 
 def scar(width: float, power: int, depth: float = 0.6 * UM):
@@ -50,10 +50,10 @@ def test_always_flanks_too_short_to_tell_leave_both_readings_with_their_numbers(
     assert found.worn.area.value is None and found.worn.extent is None and not found.tracks.sizes
     headline, said = verdicts([found])
     assert headline.startswith("a scar or a bent datum, both are possible")
-    line = found.registration.rival
+    line = found.alignment.rival
     assert line.depth.mean() * np.ptp(line.x) == pytest.approx(true, rel=0.05)
     told = re.search(r"datum bent by ([\d.]+) nm .* trace ([\d.]+) um\^2 wore off, ([\d.]+) nm on average", said[0])
-    assert float(told[1]) == pytest.approx(found.registration.bend * 1e9, rel=0.01)
+    assert float(told[1]) == pytest.approx(found.alignment.bend * 1e9, rel=0.01)
     assert float(told[2]) == pytest.approx(true * 1e12, rel=0.05)
 
 
@@ -61,7 +61,7 @@ def test_always_flanks_too_short_to_tell_leave_both_readings_with_their_numbers(
 def test_always_a_scar_beside_flanks_of_a_bent_datum_is_not_given_as_wear_of_its_ends(bow):
     """The bow of both together left 33 (17 to 49) um^2 at the ends, of 1400 um^2 that wore off."""
     found, _ = worn_pair(HELD_OUT + 2, scar(3.5 * MM, 2), bow)
-    assert found.worn.area.value is None and found.registration.rival is not None
+    assert found.worn.area.value is None and found.alignment.rival is not None
     assert "two readings" in verdicts([found])[1][0]
 
 
@@ -71,7 +71,7 @@ def test_always_a_flat_floor_beside_short_flanks_has_both_readings_told():
     headline, said = verdicts([found])
     assert headline.startswith("a scar or material that grew at the ends") and found.worn.area.value is None
     assert "of material grew at the ends" in said[0] and "or the ends are unworn and in a scar" in said[0]
-    line = found.registration.rival
+    line = found.alignment.rival
     assert line.depth.mean() * np.ptp(line.x) == pytest.approx(true, rel=0.05)
 
 
@@ -79,7 +79,7 @@ def test_always_a_flat_floor_beside_short_flanks_has_both_readings_told():
                                         (scar(0.7 * MM, 2), 0.5 * UM), (lambda x: -scar(0.7 * MM, 2)(x), 0.0),
                                         (lambda x: scar(0.7 * MM, 2)(x + 1.9 * MM), 0.5 * UM)])
 def test_exact_a_bow_a_narrow_track_an_edge_and_a_deposit_have_no_rival(depth, bow):
-    assert worn_pair(HELD_OUT + 1, depth, bow)[0].registration.rival is None
+    assert worn_pair(HELD_OUT + 1, depth, bow)[0].alignment.rival is None
 
 
 def test_always_each_of_two_tracks_is_told_with_its_area():

@@ -5,8 +5,8 @@ import pytest
 from scars import HELD_OUT, KINDS, UM, pair, rough, score
 
 from patchfem.core import frozen_array
-from patchfem.surface.compare.compare import compared
-from patchfem.surface.compare.same import found_place
+from patchfem.surface.compare.compare import compare_traces
+from patchfem.surface.compare.place import find_place
 from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile, despiked
 
@@ -45,7 +45,7 @@ def test_always_a_wide_scar_has_both_readings_or_an_interval_near_the_truth(coun
 
 def test_always_a_reading_never_has_a_largest_depth_below_its_mean():
     for kind in KINDS:
-        worn = compared(*pair(kind, HELD_OUT)[0]).worn
+        worn = compare_traces(*pair(kind, HELD_OUT)[0]).worn
         assert worn.mean.value is None or worn.largest.value >= worn.mean.value
 
 
@@ -57,7 +57,7 @@ def test_always_a_floor_of_another_roughness_has_one_track():
     readings = first, np.where(inside, other - 1.5, first)
     traces = [Profile(frozen_array(x * UM), frozen_array((z + random.normal(0, 0.01, x.size)) * UM), name)
               for z, name in zip(readings, ("before", "after"))]
-    found = compared(*traces)
+    found = compare_traces(*traces)
     assert found.worn.mean.value == pytest.approx(np.mean(first - readings[1]) * UM, rel=0.01)
     assert len(found.tracks.spans) == 1
 
@@ -74,17 +74,17 @@ def parabola(width: float) -> tuple:
 def test_always_a_straight_datum_that_is_declared_takes_no_bow_out():
     """A parabola of 5.5 mm on 6 mm: a scar or a bow, unless the datum is known to be straight."""
     traces, deep = parabola(5500)
-    assert verdicts([compared(*traces)])[0].startswith("a scar or a bent datum")
-    found = compared(*traces, straight=True)
-    assert found.registration.bend == 0 and found.worn.mean.value == pytest.approx(deep.mean() * UM, rel=0.01)
+    assert verdicts([compare_traces(*traces)])[0].startswith("a scar or a bent datum")
+    found = compare_traces(*traces, is_straight=True)
+    assert found.alignment.bend == 0 and found.worn.mean.value == pytest.approx(deep.mean() * UM, rel=0.01)
 
 
 def test_always_a_told_shift_does_not_make_worn_flanks_unworn():
     """A scar of 5.8 mm on 6 mm was given as one of 4.7 mm, with an interval without the truth."""
     traces, _ = parabola(5800)
-    found = compared(*traces, straight=True, shift=0.0)
+    found = compare_traces(*traces, is_straight=True, shift=0.0)
     assert found.worn.mean.low <= 2 / 3 * 1.5 * UM * 5800 / 6000 <= found.worn.mean.high  # a parabola, 1.5 um deep
-    found = compared(*traces, shift=0.0)
+    found = compare_traces(*traces, shift=0.0)
     assert found.worn.mean.value is None and "the datum" in found.worn.mean.reason
 
 
@@ -95,9 +95,9 @@ def test_always_a_told_shift_is_believed_where_nearly_all_heights_agree():
     deep = 0.02 * np.clip(1 - ((x - 3000) / 1000) ** 2, 0, None)
     before, after = (Profile(frozen_array(x * UM), frozen_array((z + random.normal(0, 0.022, x.size)) * UM), name)
                      for z, name in ((first, "before"), (first - deep, "after")))
-    assert found_place(before, after, 0.0).found is not None
+    assert find_place(before, after, 0.0).alignment is not None
     other = Profile(before.x, frozen_array(rough(HELD_OUT + 5)(x) * UM), "other")
-    assert found_place(before, other, 0.0).found is None
+    assert find_place(before, other, 0.0).alignment is None
 
 
 def test_exact_spikes_are_counted_as_places():

@@ -9,7 +9,7 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 
 from patchfem.core import frozen_array
-from patchfem.surface.compare.compare import compared
+from patchfem.surface.compare.compare import compare_traces
 from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile
 
@@ -30,7 +30,7 @@ def pair(seed: int, depth: float) -> tuple:
 
 @pytest.mark.parametrize("seed", [2000, 2001])
 def test_a_track_of_four_noises_is_measured(seed):
-    found = compared(*pair(seed, 30e-9))
+    found = compare_traces(*pair(seed, 30e-9))
     assert verdicts([found])[0].startswith("worn")
     sizes = found.tracks.sizes
     assert sizes["depth_mean"].low < 30e-9 < sizes["depth_mean"].high
@@ -44,12 +44,12 @@ def test_one_and_a_half_times_the_stated_depth_is_found(count):
     """19 of 20 at least; what the unworn pair states is itself below the noise of one height."""
     hits = 0
     for seed in range(2100, 2100 + count):
-        found = compared(*pair(seed, 0.0))
-        assert found.worn.mean.value is None and 1e-9 < found.visible < NOISE
+        found = compare_traces(*pair(seed, 0.0))
+        assert found.worn.mean.value is None and 1e-9 < found.detection_limit < NOISE
         said = verdicts([found])[1][0]
         assert re.search(r"would have been found from a mean depth of [0-9.]+ nm on", said)
-        again = compared(*pair(seed, 1.5 * found.visible))
-        hits += again.worn.mean.value is not None and again.worn.mean.low > 0 and again.visible is None
+        again = compare_traces(*pair(seed, 1.5 * found.detection_limit))
+        hits += again.worn.mean.value is not None and again.worn.mean.low > 0 and again.detection_limit is None
     assert hits >= count - count // 20
 
 
@@ -59,6 +59,6 @@ def test_pairs_without_a_track_show_none(count):
     alarms = 0
     for seed in range(93000, 93000 + count):
         for kind in ("unworn", "scale", "even", "wedge"):
-            found = compared(*known_pairs.profiles(known_pairs.pair(kind, seed)))
+            found = compare_traces(*known_pairs.profiles(known_pairs.pair(kind, seed)))
             alarms += found.worn.mean.value is not None
     assert alarms <= 0.05 * 4 * count

@@ -10,8 +10,8 @@ import pytest
 from pairs import KINDS, UM, pair, track
 
 from patchfem.core import frozen_array
-from patchfem.surface.compare.compare import compared
-from patchfem.surface.compare.flanks import flanks_of
+from patchfem.surface.compare.compare import compare_traces
+from patchfem.surface.compare.flanks import find_flanks
 from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile, level
 
@@ -23,7 +23,7 @@ def scored(kind: str, count: int) -> tuple:
     errors, held, ends = [], [], []
     for seed in range(HELD_OUT, HELD_OUT + count):
         p = track(kind, seed)
-        worn = compared(p.before, p.after, shift=p.shift + 0.3 * UM).worn
+        worn = compare_traces(p.before, p.after, shift=p.shift + 0.3 * UM).worn
         errors.append(worn.largest.value - p.worn.max())
         held.append(worn.largest.low <= p.worn.max() <= worn.largest.high)
         on = p.after.x[p.worn > 0]
@@ -52,7 +52,7 @@ def test_always_200_tracks_of_a_kind_hold_the_truth_in_93_of_100_intervals(kind)
 
 def test_exact_without_noise_the_depth_and_the_place():
     p = track("band", 7, noise=0.0)
-    worn = compared(p.before, p.after, shift=p.shift).worn
+    worn = compare_traces(p.before, p.after, shift=p.shift).worn
     on = p.after.x[p.worn > 0]
     assert worn.largest.value == pytest.approx(p.worn.max(), abs=1e-4 * UM)
     ends = [on[0] - UM / 2, on[-1] + UM / 2]  # between the last unworn sample and the first worn one
@@ -69,7 +69,7 @@ def test_exact_digits_of_a_tilted_trace_are_no_wear(seed):
     depth = 3 * np.clip(1 - ((x - 1000) / 200)**2, 0, None)
     traces = [Profile(frozen_array(x * UM), frozen_array(np.array([float(f"{one:.6g}") for one in z]) * UM), "a trace")
               for z in (first, first - depth + 0.002 * x)]
-    worn = compared(*traces, shift=0.0).worn
+    worn = compare_traces(*traces, shift=0.0).worn
     for ends in (worn.extent.before, worn.extent.after):
         assert [one.value for one in ends] == pytest.approx([800 * UM, 1200 * UM], abs=1 * UM)
 
@@ -78,7 +78,7 @@ def test_exact_digits_of_a_tilted_trace_are_no_wear(seed):
 @pytest.mark.parametrize("made", [*(track(kind, 90300) for kind in KINDS), pair(90300)], ids=[*KINDS, "peaks"])
 def test_always_files_in_the_wrong_order_are_told_and_others_are_not(made):
     for one, other, told in ((made.before, made.after, 0), (made.after, made.before, 1)):
-        headline, sentences = verdicts([compared(one, other)])
+        headline, sentences = verdicts([compare_traces(one, other)])
         words = [text for text in (headline, *sentences) if "in the wrong order" in text]
         assert len(words) == 2 * told and all("material grew" in text or "deposits" in text for text in words)
 
@@ -87,14 +87,14 @@ def test_always_flanks_rougher_than_the_trace_before_are_not_unworn():
     """A box of 8 um in a trace of the same spectrum is a track; in one of four times the roughness it is none."""
     before, other = (level(pair(seed).before) for seed in (90304, 90305))
     cut = 8 * UM * (np.abs(other.x - 500 * UM) < 150 * UM)
-    found = flanks_of(before, replace(other, z=frozen_array(other.z - cut)))
+    found = find_flanks(before, replace(other, z=frozen_array(other.z - cut)))
     assert found is not None and found.largest[0] > 8 * UM
-    assert flanks_of(before, replace(other, z=frozen_array(4 * (other.z - cut)))) is None
+    assert find_flanks(before, replace(other, z=frozen_array(4 * (other.z - cut)))) is None
 
 
 def test_always_a_comparison_says_where_and_warns_of_the_wrong_order():
     p = track("band", 90301, 2001)
-    found, back = compared(p.before, p.after), compared(p.after, p.before)
+    found, back = compare_traces(p.before, p.after), compare_traces(p.after, p.before)
     assert not any("wrong order" in text for text in verdicts([found])[1])
     assert any("wrong order" in text for text in verdicts([back])[1])
     on = p.after.x[p.worn > 0]
@@ -106,4 +106,4 @@ def test_always_a_comparison_says_where_and_warns_of_the_wrong_order():
 
 def test_always_no_place_where_nothing_is_worn():
     p = pair(90302, share=0.0)
-    assert compared(p.before, p.after, shift=p.shift).worn.extent is None
+    assert compare_traces(p.before, p.after, shift=p.shift).worn.extent is None

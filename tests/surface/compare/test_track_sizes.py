@@ -6,7 +6,7 @@ from pairs import UM
 from scipy.special import ndtr
 
 from patchfem.core import frozen_array
-from patchfem.surface.compare.compare import compared
+from patchfem.surface.compare.compare import compare_traces
 from patchfem.surface.compare.section import sure_of
 from patchfem.surface.compare.verdict import verdicts
 from patchfem.surface.profile import Profile
@@ -46,7 +46,7 @@ def scored(kind: str, sides: tuple, seeds) -> tuple:
     held, off = [], {}
     for seed in seeds:
         before, after, truth = ridged(kind, seed, *sides)
-        found = compared(before, after).tracks.sizes
+        found = compare_traces(before, after).tracks.sizes
         held += [found[name].low <= one <= found[name].high for name, one in truth.items()]
         for name, one in truth.items():
             off.setdefault(name, []).append(found[name].value / one - 1 if one else found[name].value)
@@ -71,7 +71,7 @@ def test_always_20_tracks_of_a_kind_hold_the_truth_in_9_of_10_intervals(kind, si
 
 def test_always_without_pile_up_none_is_said_and_its_interval_is_not_nothing():
     before, after, _ = ridged("band", HELD_OUT + 2, 0.0, 0.0)
-    found = compared(before, after).tracks.sizes
+    found = compare_traces(before, after).tracks.sizes
     assert found["pile_up"].value == 0.0 < found["pile_up"].high < 0.02 * found["area_gross"].value
     assert found["area_net"].value == found["area_gross"].value
 
@@ -82,7 +82,7 @@ def test_always_tops_worn_between_unworn_valleys_have_a_depth_over_the_worn_exte
     x, z = before.x / UM, before.z / UM
     worn = np.where((x > 700) & (x < 1700), np.maximum(z, 0.0), 0.0)
     noise = 0.02 * np.random.default_rng(5).standard_normal(x.size)
-    found = compared(before, Profile(before.x, frozen_array((z - worn + noise) * UM), "after"))
+    found = compare_traces(before, Profile(before.x, frozen_array((z - worn + noise) * UM), "after"))
     on = np.flatnonzero(worn > 0.1)  # five noises: what is worn less does not show
     truth = worn[on[0]:on[-1] + 1].mean() * UM
     assert not found.tracks.sizes
@@ -119,7 +119,7 @@ def shares(seeds, deep: float) -> dict:
     """Share of 95 % intervals that hold the truth, by name, of rounded tracks."""
     held = {}
     for seed in seeds:
-        found = compared(*rounded(seed, deep)).values
+        found = compare_traces(*rounded(seed, deep)).values
         for name, one in TRUE.items():
             true = one * (deep * UM**2 if "area" in name else deep * UM if "depth" in name else UM)
             held.setdefault(name, []).append(found[name].low <= true <= found[name].high)
@@ -143,7 +143,7 @@ def test_always_60_rounded_tracks_hold_the_truth_in_9_of_10_intervals(deep):
 
 def test_exact_noise_alone_is_neither_dust_nor_far_wear():
     """Of normal noise 12 to 18 of 12000 heights were taken as dust, and one mean of 16 as wear 5 mm behind a track."""
-    removed = [sum(compared(*rounded(HELD_OUT + 400 + seed, 3.0)).removed) for seed in range(3)]
+    removed = [sum(compare_traces(*rounded(HELD_OUT + 400 + seed, 3.0)).removed) for seed in range(3)]
     assert sum(removed) <= 1
     assert 4 * 12000 * ndtr(-sure_of(12000)) == pytest.approx(1e-3, rel=1e-6)
 
@@ -151,15 +151,15 @@ def test_exact_noise_alone_is_neither_dust_nor_far_wear():
 def test_always_the_deepest_place_is_no_less_deep_than_the_floor_and_the_floor_than_the_mean():
     for seed in range(4):
         before, after, _ = ridged("band", HELD_OUT + 500 + seed, 0.0, 0.0)
-        one = compared(before, after)
+        one = compare_traces(before, after)
         found = one.tracks.sizes
         assert one.worn.largest.value >= found["depth_floor"].value >= found["depth_mean"].value
         start, end = one.worn.extent.after
-        assert all(b <= start.value or a >= end.value for a, b in one.reference_by.parts)
+        assert all(b <= start.value or a >= end.value for a, b in one.reference.parts)
 
 
 def test_always_a_ratio_of_slopes_that_noise_makes_is_refused():
     """2.49 (0.00962 to 643) was said of the slope, where the noise of the second trace is steeper than the surface."""
-    one = compared(*rounded(HELD_OUT + 600, 3.0))
-    assert one.slope_ratio.value is None and "noise" in one.slope_ratio.reason
+    one = compare_traces(*rounded(HELD_OUT + 600, 3.0))
+    assert one.ratios.slope.value is None and "noise" in one.ratios.slope.reason
     assert any(text.startswith("Slope: the noise of the measurement") for text in verdicts([one])[1])

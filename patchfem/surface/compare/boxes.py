@@ -1,0 +1,64 @@
+"""Means over parts of a trace, and boxes over these parts that a search for a track tries."""
+
+from functools import cache
+from typing import NamedTuple
+
+import numpy as np
+
+
+class Boxes(NamedTuple):
+    """Boxes over the parts of a trace, less their projection on polynomials.
+
+    shapes: (m, parts) array, each of length one; sizes: (m,) lengths of a box of height one; spans:
+    first part and last part + 1 of each; datum: (parts, degree + 1) orthonormal polynomials.
+    """
+
+    shapes: np.ndarray
+    sizes: np.ndarray
+    spans: list
+    datum: np.ndarray
+
+
+@cache
+def make_boxes(n_parts: int, n_beside: int, n_inside: int, degree: int) -> Boxes:
+    """Make all boxes over the parts of a trace that leave room for a flank on either side.
+
+    Parameters
+    ----------
+    n_parts : int
+        Parts of the trace.
+    n_beside, n_inside : int
+        Smallest number of parts of a flank and of a box.
+    degree : int
+        Degree of the polynomials that are subtracted.
+    """
+    spans = []
+    for first in range(n_beside, n_parts):
+        spans += [(first, last) for last in range(first + n_inside, n_parts - n_beside + 1)]
+    part = np.arange(n_parts)
+    shapes = np.array([(part >= first) & (part < last) for first, last in spans], float)
+    datum = np.linalg.qr(np.vander(np.linspace(-1, 1, n_parts), degree + 1))[0]
+    shapes -= shapes @ datum @ datum.T
+    sizes = np.linalg.norm(shapes, axis=1)
+    return Boxes(shapes / sizes[:, None], sizes, spans, datum)
+
+
+def split_edges(size: int, n_parts: int) -> np.ndarray:
+    """Return the first sample (n_parts + 1,) of each part of a trace, and the number of samples."""
+    return np.linspace(0, size, n_parts + 1).astype(int)
+
+
+def part_means(values, edges) -> np.ndarray:
+    """Return the mean of the values in each part."""
+    return np.add.reduceat(values, edges[:-1]) / np.diff(edges)
+
+
+def running_mean(values, width: int) -> np.ndarray:
+    """Return the running mean (n,) of so many values; the outermost values are repeated outside."""
+    padded = np.pad(values, (width // 2, width - 1 - width // 2), "edge")
+    return np.convolve(padded, np.full(width, 1 / width), "valid")
+
+
+def subtract_line(x, z) -> np.ndarray:
+    """Return the heights (n,) above the least-squares line through them."""
+    return z - np.polyval(np.polyfit(x, z, 1), x)
