@@ -28,7 +28,7 @@ MAX_SIDE = 1000  # pixels along a side of the finest image
 MAX_LOUDER = 1.5  # scale of a floor over that of the quietest one, beyond which it is no floor
 MIN_RIVAL = 0.5  # score of another floor over the heights on the first one, from which it may be the unworn one
 MIN_APART = 3.0  # scales that the planes of two floors lie apart in the median
-MARGIN = 0.05  # of the shorter side that is left out beside what changed to see how far slight wear moves the plane
+MARGIN = 0.1  # of the shorter side that is left out beside what changed to see how far slight wear moves the plane
 MAX_ROUNDS = 4  # fits in which the changed parts settle
 
 
