@@ -4,7 +4,7 @@ import numpy as np
 
 from patchfem.core import BaseSine, ModalBasis, frozen_array
 from patchfem.dynamics.events.elements import coulomb
-from patchfem.dynamics.events.histories import at_times
+from patchfem.dynamics.events.histories import motion_at
 
 
 def basis(omega, zeta, slide, base) -> ModalBasis:
@@ -26,7 +26,7 @@ TWO, TWO_DRIVE, TWO_LIMIT = (basis([0.0, np.sqrt(2.0)], [0.0, 0.0], [HALF, -HALF
 
 def sampled(modes, drive, limit, cycles: float, times, start=None):
     """Response at `times` (k,) of `cycles` by the event engine of any modes."""
-    return at_times(modes, drive, [coulomb(limit, limit)], cycles, times, start)
+    return motion_at(modes, drive, [coulomb(limit, limit)], cycles, times, start)
 
 
 def exact(name: str, times):

@@ -195,9 +195,8 @@ def test_exact_drift_of_less_than_two_cycles():
 
 def dense(done, begin: float, samples: int = 20_000) -> np.ndarray:
     """Slide (k,) [m] at the middles of equal parts of the cycle that begins at `begin` cycles, by the event engine."""
-    from event_run import motion_at
-
     from patchfem.dynamics.events.elements import coulomb
+    from patchfem.dynamics.events.histories import motion_at
 
     model, rig = done.plan.model, done.plan.model.rig
     times = (begin + (np.arange(samples) + 0.5) / samples) * PERIOD

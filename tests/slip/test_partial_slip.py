@@ -11,6 +11,7 @@ from scipy.optimize import lsq_linear
 from slip_paths import elements, histories
 
 from patchfem.contact.gaps import crown, tilt
+from patchfem.contact.stiffness import tangential_stiffness
 from patchfem.contact.unilateral import press
 from patchfem.core import PatchfemError
 from patchfem.slip.shear_modes import (
@@ -26,7 +27,6 @@ from patchfem.slip.shear_modes import (
     largest,
     scaled,
     shear_modes,
-    tangential_stiffness,
 )
 
 MU = 0.3

@@ -21,15 +21,6 @@ def simulate(modes, drive, static, kinetic, cycles, window=10, travel=np.inf, pr
     return histories.simulate(modes, drive, groups, cycles, window, travel, 0, progress, start)
 
 
-def motion_at(modes, drive, groups, cycles, times, start=None):
-    """Return the Response at any times (k,) [s] of `cycles` drive cycles, from the series of the pieces."""
-    run, rows = histories.started(modes, drive, groups, cycles, start=start), []
-    run.until(cycles, run._into(rows))
-    rows = np.concatenate(rows)
-    owner = np.clip(np.searchsorted(rows[:, 0], times, side="right") - 1, 0, len(rows) - 1)
-    return run._rows_as(rows, owner, np.clip(times - rows[owner, 0], 0.0, rows[owner, 1]), times)
-
-
 def steady(modes, drive, static, kinetic, start=None, cycles=30, periods=1):
     """`stick_steady.steady` of Coulomb friction."""
     return stick_steady.steady(modes, drive, groups_of(modes, static, kinetic), start, cycles, periods)

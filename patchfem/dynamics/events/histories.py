@@ -152,6 +152,17 @@ def briefly(cases, cycles: int, window: int) -> list:
     return out
 
 
+def motion_at(modes: ModalBasis, drive, groups, cycles: float, times, start: Start | None = None) -> Response:
+    """Return the motion at times (k,) [s] of `cycles` drive cycles from rest or `start`, by the series of pieces."""
+    times = np.asarray(times, float)
+    rows = []
+    run = started(modes, drive, groups, cycles, start=start)
+    run.until(cycles, run._into(rows))
+    rows = np.concatenate(rows)
+    owner = np.clip(np.searchsorted(rows[:, 0], times, side="right") - 1, 0, len(rows) - 1)
+    return run._rows_as(rows, owner, np.clip(times - rows[owner, 0], 0.0, rows[owner, 1]), times)
+
+
 class _Run:
     """Rows as they come: what is summed is summed, all but turning points and slips is forgotten before the window.
 

@@ -169,15 +169,16 @@ def find_end(depth, noise, correlation: float, worn: int) -> FlankEnd:
     reach = max(int(deep[0]) if deep.size else depth.size - worn, MIN_REACH)
     low, high = max(worn - 2 * reach, 0), min(worn + reach, depth.size)
     part, sigma = depth[low:high], noise[low:high]
-    off = np.minimum((part / sigma) ** 2, MAX_OFF)
-    off = np.where(part < -ABOVE * sigma, 1.0, off) + 2 * np.log(sigma)
-    outside = np.concatenate([[0.0], np.cumsum(off)])
+    off = np.where(part < -ABOVE * sigma, 1.0, (part / sigma) ** 2)
+    logs = 2 * np.log(sigma)
+    outside = np.concatenate([[0.0], np.cumsum(np.minimum(off, MAX_OFF) + logs)])
+    beside = np.concatenate([[0.0], np.maximum(off - MAX_OFF, 0.0)])  # the last height outside is no speck
     sure = np.flatnonzero(part[worn - low :] > sure_of(depth.size) * sigma[worn - low :])
     last = max(min(part.size - 4, worn - low + (int(sure[0]) if sure.size else reach // 2)), 0)
     places = np.unique(np.linspace(0, last, min(last + 1, MAX_PLACES)).astype(int))
     costs = np.empty((len(OFFSETS) + 1, places.size))
     for at, k in enumerate(places):
-        costs[:, at] = outside[k] + _flank_costs(part[k:], sigma[k:])
+        costs[:, at] = outside[k] + beside[k] + _flank_costs(part[k:], sigma[k:])
     costs /= max(correlation, 1.0)
     shape = int(np.argmin(costs[:-1].min(axis=1)))
     is_step = bool(costs[-1].min() < costs[shape].min() - STEP_GAIN)

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 import vibration_forms
 from event_reference import run_reference
-from event_run import groups_of, motion_at, run, simulate
+from event_run import groups_of, run, simulate
 from scipy.integrate import solve_ivp
 from vibration_forms import sliding_amplitude, two_stop_amplitude
 
 from patchfem.core import BaseSine, ModalBasis, Segment, Start
 from patchfem.dynamics.events import histories
+from patchfem.dynamics.events.histories import motion_at
 from patchfem.response.measures import energy_balance
 from patchfem.structure.drives import Piecewise, levels, release
 
