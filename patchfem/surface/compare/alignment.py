@@ -14,8 +14,8 @@ from .robust import MIN_UNWORN, REACH, find_floors, fit_biweight, solve_weighted
 from .section import find_end, sure_of
 
 MAX_LOUDER = 1.5  # scale of a floor over that of the quietest one, beyond which it is no floor
-BEND_GAIN = 0.8  # a bend is taken out where the scale falls to this fraction or lower
-FILLED = 0.7  # fraction of unworn heights in an unworn end
+BEND_GAIN = 0.8  # scale with / without a bend, below which the bend is subtracted
+MIN_FILLED = 0.7  # fraction of unworn heights in an unworn end
 LONG_END = 0.05  # fraction of the length of a flank that tells a scar from a bent datum
 SHORT_END = 0.02  # fraction of the length of a flank that makes a scar possible
 N_PARTS = 60  # parts of a trace whose means show shallow wear and slow errors
@@ -23,11 +23,11 @@ FLANK_PARTS = 6  # parts of the trace on either side of a shallow track
 MIN_PARTS = 3  # parts of a shallow track
 DATUM_DEGREE = 3  # degree of the polynomial that a datum may add to shallow depths
 CLEAR_STEP = 8.0  # standard deviations of the step of a shallow track; 2 of 100 random walks exceed it
-CLIPPED = 4.0  # standard deviations beyond which a height counts no further in a mean
+MAX_COUNTED = 4.0  # standard deviations beyond which a height counts no further in a mean
 N_THINNED = 2000  # samples that the starts of a fit are refined on
 NEIGHBOURS = (4, 16)  # samples of the means that show wear below the noise of a height
 MIN_FOOT = 64  # samples of a worn run whose flanks may leave the floor slowly
-MARGIN = 0.1  # of a worn run that is left out beside it to see how far slight wear moves the floor
+MARGIN = 0.1  # width left out beside a worn run / width of the run, to see how far slight wear moves the floor
 MAX_ROUNDS = 4  # fits in which the worn parts settle
 MARGIN_SAMPLES = 8  # samples of that margin, at least
 
@@ -135,7 +135,7 @@ class Alignment:
     def unworn_ends(self, share: float = LONG_END) -> tuple:
         """Whether the first and the last part of the traces are unworn."""
         count = max(int(share * self.x.size), min(40, self.x.size // 4))
-        return tuple(bool(self.unworn[part].mean() > FILLED) for part in (slice(count), slice(-count, None)))
+        return tuple(bool(self.unworn[part].mean() > MIN_FILLED) for part in (slice(count), slice(-count, None)))
 
 
 def align(before: Profile, after: Profile, shift: float, is_straight: bool = False) -> Alignment:
@@ -190,7 +190,7 @@ def _choose(floors: list, model):
         depth, _ = model.linearize(floor.state)
         count = max(int(LONG_END * depth.size), 4)
         on = np.abs(depth) <= REACH * floor.scale
-        has_end = max(on[:count].mean(), on[-count:].mean()) > FILLED
+        has_end = max(on[:count].mean(), on[-count:].mean()) > MIN_FILLED
         return not has_end, round(floor.grown, 1), -floor.unworn
 
     return min(quiet, key=rank)
@@ -303,7 +303,7 @@ def find_shallow_track(depth, scale: float) -> tuple:
     if depth.size < 8 * N_PARTS:
         return None, np.inf
     edges = split_edges(depth.size, N_PARTS)
-    means = part_means(np.clip(depth, -CLIPPED * scale, CLIPPED * scale), edges)
+    means = part_means(np.clip(depth, -MAX_COUNTED * scale, MAX_COUNTED * scale), edges)
     boxes = make_boxes(N_PARTS, FLANK_PARTS, MIN_PARTS, DATUM_DEGREE)
     means = means - boxes.datum @ (boxes.datum.T @ means)
     heights = boxes.shapes @ means
@@ -345,7 +345,7 @@ def _line_through_ends(model, best: Alignment, state, free: tuple, share: float)
         depth, _ = model.linearize(state)
         worn = with_feet(depth, scale, find_worn(depth, scale))
     found = _record(model, state, STRAIGHT, scale, worn)
-    return found if found.unworn[ends].mean() >= FILLED else None
+    return found if found.unworn[ends].mean() >= MIN_FILLED else None
 
 
 def _are_straight(depth, ends) -> bool:

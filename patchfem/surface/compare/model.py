@@ -16,7 +16,7 @@ from ..profile import Profile, even, level
 
 MIN_HEIGHTS = 12  # fewer common heights are no comparison
 N_BLOCKS = 20  # blocks of a trace whose modes give the starts of a fit
-ROUNDING = 1e-5  # of the height: smaller differences are rounding
+ROUNDING = 1e-5  # difference / height below which a difference is rounding
 MAX_PARABOLA = 51  # samples of the longest parabola that gives a slope
 SLOPE_NOISE = 0.05  # share of noise that a slope may have
 MAX_STEP = 4.0  # samples that a step of the fit may move a place

@@ -17,10 +17,11 @@ from .errors import correlation_length
 from .flanks import Flanks
 from .section import median_of_five
 
-BENT, GREW, NOISE, DRIFT = (
-    f"a scar or {what}, both are possible"
-    for what in ("a bent datum", "material that grew at the ends", "noise", "a datum that drifts")
-)
+# headlines of traces that two readings explain
+BENT = "a scar or a bent datum, both are possible"
+GREW = "a scar or material that grew at the ends, both are possible"
+NOISE = "a scar or noise, both are possible"
+DRIFT = "a scar or a datum that drifts, both are possible"
 MIN_DEPTH_OVER_DRIFT = 12.0  # depth of a scar over the standard deviation of slow errors: 3 of their widths
 SLOW_SHARE = 0.5  # share of the variance of unworn parts that neighbouring parts have in common, in a drift
 MAX_FLANK_ERROR = 0.1  # slow differences beside a track over its depth, from which its flanks are worn

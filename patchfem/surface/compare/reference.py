@@ -8,7 +8,7 @@ from ...core import say
 from ...scales import plain
 from ..profile import runs_of
 from ..quantity import SIDE, Quantity, refused
-from .alignment import FILLED, LONG_END, SHORT_END, Alignment
+from .alignment import LONG_END, MIN_FILLED, SHORT_END, Alignment
 from .boxes import subtract_line
 from .model import Parameter
 from .robust import REACH
@@ -131,7 +131,7 @@ def _is_flank(alignment: Alignment, first: int, last: int) -> bool:
     start = first + margin if first else 0
     stop = last + 1 - margin if last < x.size - 1 else last + 1
     unworn = alignment.unworn[start:stop]
-    if unworn.mean() < FILLED:
+    if unworn.mean() < MIN_FILLED:
         return False
     along = np.linspace(-1, 1, unworn.size)[unworn]
     depth = alignment.depth[start:stop][unworn]

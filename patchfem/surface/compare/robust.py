@@ -20,7 +20,7 @@ REACH = 2.5  # scales within which a height counts as unworn
 MODE = 0.3  # fraction of a block that the shortest interval about its mode holds
 MAX_SUBSETS = 1200  # elemental subsets of blocks that are tried
 MAX_FLOORS = 3  # floors that are sought, each in the blocks that lie on none before it
-MIN_DETERMINANT = 1e-3  # of the forms at an elemental subset: smaller ones lie too close together
+MIN_DETERMINANT = 1e-3  # determinant of an elemental subset, below which its blocks lie too close together
 N_TRIED = 1000  # heights that a start is judged by
 SEED = 1985
 

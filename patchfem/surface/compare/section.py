@@ -30,7 +30,7 @@ OFFSETS = (
 )  # samples before the first worn depth at which a smooth flank leaves zero
 STEP_GAIN = 12.0  # fall of twice the log-likelihood from which a flank begins with a step
 N_FIFTHS = 5  # parts of a track, the deepest of which is its floor
-MIN_SHARE = 0.01  # of the lost area that a run of worn heights holds, to be an end of the worn part
+MIN_SHARE = 0.01  # lost area of a run / whole lost area, from which the run may be an end of the worn part
 CUT = 5  # samples from the end of the common part within which a track may go on outside
 MIN_WORN = 0.85  # fraction of worn heights in a track; tops between unworn valleys are none
 MAX_GAP = (

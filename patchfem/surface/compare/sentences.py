@@ -12,7 +12,7 @@ from .compare import Comparison, are_identical
 from .readings import describe_other
 from .reference import describe_bow_area, describe_hidden_wear, describe_reference
 
-MIN_DEPOSITED = 0.05  # of the worn area, from which material above the first trace is named
+MIN_DEPOSITED = 0.05  # deposited / worn area from which material above the first trace is reported
 ROUNDING = 1e-6  # distance of a ratio from 1 that is rounding
 SQUARE_UM = 1e12  # um^2 in a m^2
 

@@ -6,7 +6,8 @@ from ..scans import change as scans
 from .compare import Comparison, compare_directions, compare_files
 from .sentences import describe_comparisons, describe_ratio_change, is_elsewhere, is_gain, is_sure
 
-GREW, ELSEWHERE = scans.GREW, scans.ELSEWHERE
+GREW = scans.GREW
+ELSEWHERE = scans.ELSEWHERE
 NO_CHANGE = "no change shown"
 NO_WAVE_CHANGE = "no change detected in the amplitude of the waves"
 

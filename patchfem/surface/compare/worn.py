@@ -313,7 +313,7 @@ def split_at_tracks(
     step = float(np.diff(x).mean())
     edges = [x[sample] for span in tracks.spans for sample in span]
     pairs = []
-    for piece in _split(x, edges, max(longest / 2, 3 * step), longest):
+    for piece in _split_at_cuts(x, edges, max(longest / 2, 3 * step), longest):
         first = alignment.first[piece]
         second = first - alignment.depth[piece]
         if is_flat and tracks.spans:
@@ -363,11 +363,11 @@ def split_at_flanks(after: Profile, flanks: Flanks, longest: float) -> list:
     reach = max(longest / 2, after.length / PARTS)
     return [
         Profile(frozen_array(after.x[piece]), frozen_array(after.z[piece]), after.source)
-        for piece in _split(after.x, [flanks.start, flanks.end], reach, longest)
+        for piece in _split_at_cuts(after.x, [flanks.start, flanks.end], reach, longest)
     ]
 
 
-def _split(x, cuts: list, reach: float, longest: float) -> list:
+def _split_at_cuts(x, cuts: list, reach: float, longest: float) -> list:
     """Return the samples (n,) bool of each long piece away from the cuts [m]; all samples where none is."""
     pieces = []
     for low, high in pairwise([-np.inf, *cuts, np.inf]):
