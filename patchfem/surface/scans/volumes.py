@@ -6,10 +6,13 @@ import numpy as np
 
 from ..compare.errors import N_DRAWS
 from ..quantity import SIDE, Quantity, around, refused
-from .alignment import ScanAlignment
-from .wear import mean_of_square, widen
+from .alignment import MARGIN, ScanAlignment
+from .wear import hidden_depth, mean_of_square, widen
 
 FEET = 3  # heights beside what changed whose depths belong to it, as its feet are lower than noise
+HIDDEN = (
+    0.5  # of the depth that noise hides, the mean depth of wear that runs out beside the worn part
+)
 WALL = 0.5  # of the depth beside it, by which a missing wall may be deeper or less deep, all walls alike
 BLUNT = 4.0  # standard deviations below the deepest height within which a height may be the deepest
 SEED = 1991
@@ -82,6 +85,7 @@ def _measure(found: ScanAlignment, x, y) -> Volumes:
     worn, grown = found.worn[nearest] & inside, found.grown[nearest] & inside
     depth = np.where(inside, filled, 0.0)
     walls = _doubt_of_walls(found, worn), _doubt_of_walls(found, grown)
+    hidden = hidden_depth(found.depth, found.used)
     values = {}
     parts = (
         ("worn_volume", worn, grown, 1.0, walls[0]),
@@ -89,7 +93,9 @@ def _measure(found: ScanAlignment, x, y) -> Volumes:
     )
     for name, mask, other, sign, doubt in parts:
         weight = sign * cell * (widen(mask, FEET) & ~other)
-        values[name] = _volume(found, weight, depth, float((cell * doubt).sum()), name)
+        beside = widen(mask, int(MARGIN * min(mask.shape))) & (weight == 0.0) & ~other
+        unseen = HIDDEN * hidden * float(cell[beside].sum())
+        values[name] = _volume(found, weight, depth, float((cell * doubt).sum()), unseen, name)
     values["worn_share"] = _share(found, cell, worn, walls[0] > 0)
     mean = (one / area for one in values["worn_volume"][:3])
     values["worn_depth_mean"] = Quantity(*mean, "m", TEXTS["worn_depth_mean"])
@@ -111,8 +117,13 @@ def _nearest_known(depth) -> tuple:
     )
 
 
-def _volume(found: ScanAlignment, weight, depth, doubt: float, name: str) -> Quantity:
-    """Sum weight (m, n) [m2] times depth [m], with its interval; doubt [m3]: of missing walls."""
+def _volume(
+    found: ScanAlignment, weight, depth, doubt: float, unseen: float, name: str
+) -> Quantity:
+    """Sum weight (m, n) [m2] times depth [m], with its interval.
+
+    doubt [m3]: of missing walls; unseen [m3]: what noise may hide beside the weighted heights.
+    """
     volume = float((weight * depth).sum())
     deviation = float(np.std(found.errors.of_sum(weight, found.noise)))
     if not weight.any():
@@ -121,7 +132,11 @@ def _volume(found: ScanAlignment, weight, depth, doubt: float, name: str) -> Qua
         )
     reach = SIDE * deviation + doubt
     return Quantity(
-        max(volume, 0.0), max(volume - reach, 0.0), max(volume + reach, 0.0), "m3", TEXTS[name]
+        max(volume, 0.0),
+        max(volume - reach, 0.0),
+        max(volume + reach + unseen, 0.0),
+        "m3",
+        TEXTS[name],
     )
 
 

@@ -4,11 +4,8 @@ import numpy as np
 
 from ..compare.section import sure_of
 
-SIDES = (
-    3,
-    9,
-    27,
-)  # heights along the sides of the squares: deep and narrow changes show in small ones
+# heights along the sides of the squares: deep and narrow changes show in small ones
+SIDES = (3, 9, 25, 63)
 CLIPPED = (
     8.0  # standard deviations that a height counts with at most, so that a single one is no change
 )
@@ -47,7 +44,7 @@ def _find_beyond(relative, used, sign: float) -> np.ndarray:
     sure = sure_of(relative.size)
     changed = np.zeros(relative.shape, bool)
     for side in SIDES:
-        if side > min(relative.shape) // 4:
+        if side > min(relative.shape) // 3:
             break
         mean, known = mean_of_square(np.where(changed, np.nan, relative), side)
         quiet = (mean_of_square(np.where(used & ~changed, 1.0, 0.0), side)[0] > 0.5) & (
@@ -59,6 +56,14 @@ def _find_beyond(relative, used, sign: float) -> np.ndarray:
         scatter = max(1.4826 * float(np.median(np.abs(even[quiet]))), 1 / side)
         changed |= widen((known > MIN_KNOWN) & (sign * even > sure * scatter), side // 4)
     return changed
+
+
+def hidden_depth(depth, used) -> float:
+    """Return the mean depth [m] of wear over wide squares that noise and slow errors hide."""
+    sides = [side for side in SIDES if side <= min(depth.shape) // 3]
+    mean, known = mean_of_square(np.where(used, depth, np.nan), sides[-1])
+    quiet = known > 0.5
+    return sure_of(depth.size) * float(mean[quiet].std()) if quiet.any() else 0.0
 
 
 def mean_of_square(values, side: int) -> tuple:
