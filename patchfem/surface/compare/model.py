@@ -106,7 +106,7 @@ class TraceModel:
         return np.clip(step, -bound, bound)
 
     def tolerances(self, scale: float) -> np.ndarray:
-        """Return the changes (5,) of the parameters that move the depth by the scale [m]."""
+        """Return the changes (5,) of the parameters that change the depth by `scale` [m]."""
         steep = max(float(np.std(np.diff(self.before.z))) / self.step, 1e-12)
         moved = scale / steep
         return np.array([scale, scale, moved, moved / self.half, scale])

@@ -53,7 +53,7 @@ def scale_about_zero(depth) -> float:
 
 
 def solve_weighted(jacobian, depth, weight) -> np.ndarray:
-    """Solve weighted least squares for the step (k,) that takes the depth (n,) off.
+    """Solve weighted least squares for the parameter step (k,) that reduces the depth (n,) to noise.
 
     Columns are scaled; a direction that the surface does not determine stays as it is.
     """

@@ -15,10 +15,10 @@ from ..quantity import SIDE, Quantity, around, refused
 from .errors import block_length, correlation_length, draw_blocks, student_factor
 
 CHANCE = 1e-3  # fraction of traces in which noise alone is taken for worn
-N_LOOKS = 4  # means of 1, 4, 16 and 64 neighbours that each height is looked at by
+N_LOOKS = 4  # averaging windows of 1, 4, 16 and 64 samples in which each height is tested
 LIKELY = (
     1.5 * SIDE**2
-)  # fall of twice the log-likelihood within which an end may lie; SIDE^2 for smooth models
+)  # drop of twice the log-likelihood that bounds the interval of an end; SIDE^2 for smooth models
 MIN_REACH = 12  # samples of a flank to either side
 MAX_PLACES = 160  # places of an end that are tried
 MAX_OFF = 16.0  # squared standard deviations that an unworn height counts with at most: a speck is no wear
@@ -36,7 +36,7 @@ MIN_WORN = 0.85  # fraction of worn heights in a track; tops between unworn vall
 MAX_GAP = (
     0.05  # unworn gap over the width of a track, up to which worn places beside it belong to it
 )
-LONGEST_WAVES = 3.0  # longest waves of the band that a track is longer than
+LONGEST_WAVES = 3.0  # smallest length of a track, in longest waves of the band
 
 _ONE_SIDE = "area above the first trace (before wear) within one track width"
 TEXTS = {

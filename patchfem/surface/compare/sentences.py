@@ -99,7 +99,7 @@ def _wear_of_traces(part: Comparison, name: str) -> list:
 
 
 def _describe_wear(part: Comparison, name: str) -> str:
-    """Return how deep the second trace is worn, or why that is not known."""
+    """Return the worn depth of the second surface, or why it is not known."""
     if are_identical(part.before, part.after):
         return f"Worn depth{name}: none; the heights before and after wear are the same."
     mean = part.worn.mean
@@ -176,7 +176,7 @@ def _describe_other_tracks(part: Comparison) -> list:
 
 
 def _describe_track(part: Comparison) -> str:
-    """Return the longest track as the beginning of a sentence, "" without one."""
+    """Return the beginning of the sentence on the longest track, "" without a track."""
     if part.flanks is not None:
         span = _span(part.flanks.start, part.flanks.end)
         return f"a track from about x = {span} in the second trace (after wear); "
@@ -184,7 +184,7 @@ def _describe_track(part: Comparison) -> str:
 
 
 def _describe_sizes(sizes: dict) -> str:
-    """Return a track by its sizes as the beginning of a sentence, "" without one."""
+    """Return the beginning of a sentence on a track with these sizes, "" without a track."""
     if not sizes:
         return ""
     start, end = sizes["from"].value, sizes["to"].value
@@ -200,7 +200,7 @@ def _describe_sizes(sizes: dict) -> str:
 
 
 def _beside_wear(part: Comparison) -> list:
-    """Return what stands beside the wear: edges that the ratios leave out, and a new valley."""
+    """Return remarks: edges that the ratios exclude, and a valley in the second trace alone."""
     out = []
     if part.tracks.spans or part.flanks is not None:
         out.append("Amplitude and slope are computed without the edges of the track.")

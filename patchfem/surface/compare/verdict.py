@@ -69,7 +69,7 @@ class _Facts(NamedTuple):
 
     @property
     def change(self) -> str:
-        """Headline of wear and waves alone."""
+        """Verdict on wear and waviness, without place and order of the surfaces."""
         if self.scan_headline and self.waves == "not known":
             is_plain = self.scan_headline in (scans.WORN, scans.NONE)
             return self.scan_headline if is_plain else "waves not known"

@@ -20,16 +20,18 @@ from .search import SIZE, Guess, guesses, image, step_of, variant, without_waves
 from .wear import find_change, widen
 
 N_IMAGE_POINTS = 20_000  # heights of a fit to images
-N_THINNED = 8_000  # heights that the starts of the plane are refined on
+N_THINNED = 8_000  # heights of the subsample with which starting planes are refined
 LONG_WAVES = (
     8.0  # pixels: standard deviation of the Gauss filter that takes the long waves off an image
 )
 MAX_SIDE = 1000  # pixels along a side of the finest image
 MAX_LOUDER = 1.5  # scale of a floor over that of the quietest one, beyond which it is no floor
-MIN_RIVAL = 0.5  # score of another floor over the heights on the first one, from which it may be the unworn one
-MIN_APART = 3.0  # scales that the planes of two floors lie apart in the median
-MARGIN = 0.1  # of the shorter side that is left out beside what changed to see how far slight wear moves the plane
-MAX_ROUNDS = 4  # fits in which the changed parts settle
+MIN_RIVAL = (
+    0.5  # score of a second floor over the fraction on the first, above which either may be unworn
+)
+MIN_APART = 3.0  # smallest median distance of two floors, in standard deviations of their noise
+MARGIN = 0.1  # of the shorter side, excluded beside changed parts to estimate how far slight wear moves the plane
+MAX_ROUNDS = 4  # iterations of fit and search for changed parts
 
 
 @dataclass(frozen=True, eq=False)

@@ -27,7 +27,7 @@ SPECK_THRESHOLDS = (
     12.0,
     48.0,
     192.0,
-)  # noises by which a speck of the depths stands off its neighbours
+)  # heights of a speck above its neighbours, in standard deviations of the noise
 MIN_UNSEEN = 0.1  # fraction of the worn part without heights above which a sentence says so
 HALF_TURN = 0.2  # rad from pi within which a scan is called rotated by 180 degrees
 N_DIGITS = 4  # digits of volumes in sentences
@@ -199,7 +199,7 @@ def _why_no_wear(volumes: Volumes) -> str:
 
 
 def headline(change: Change) -> str:
-    """Return what two scans prove about material, in a few words."""
+    """Return the verdict on wear or growth of two scans, in a few words."""
     if change.volumes is None:
         return ELSEWHERE
     worn, grown = (change.volumes.values[name] for name in ("worn_volume", "grown_volume"))
@@ -211,7 +211,7 @@ def headline(change: Change) -> str:
 
 
 def sentences(change: Change) -> list:
-    """Return what two scans prove about material, in sentences."""
+    """Return the verdict on wear or growth of two scans, in sentences."""
     if change.volumes is None:
         return [f"Worn volume: not available; {change.why}."]
     grown = change.volumes.values["grown_volume"]
@@ -267,7 +267,7 @@ def _wear(change: Change) -> list:
 
 
 def _unseen(change: Change) -> list:
-    """Return how much of the worn part has no heights, as a sentence."""
+    """Return the fraction of the worn area with missing heights, as a sentence."""
     worn = change.volumes.worn
     share = float((worn & ~np.isfinite(change.found.depth)).sum()) / max(float(worn.sum()), 1.0)
     if share <= MIN_UNSEEN:

@@ -18,7 +18,9 @@ N_TILES = 40  # tiles along the shorter side of a map
 MIN_TILE = 4  # heights along a side of a tile
 FILLED = 0.3  # fraction of unworn heights of a tile that counts
 MAX_BLOCK = 1 / 3  # of the tiles along the shorter side: nine blocks are few, but show slow errors
-N_PARTS = 6  # parts along each side whose sums give the scatter of the place
+N_PARTS = (
+    6  # parts along each side; the scatter of their scores gives the errors of rotation and shift
+)
 N_LINES = 200  # lines of the map whose correlation is that of neighbouring heights
 UNKNOWN = 1e-5  # smallest eigenvalue over the largest below which a direction of the place is not determined
 SEED = 1989
@@ -94,7 +96,7 @@ def _tile_sums(values, tile: int) -> np.ndarray:
 
 
 def _correlation_along(values, present) -> float:
-    """Return how many neighbours along the rows of values (m, n) err alike."""
+    """Return the correlation length of values (m, n) along their rows, in samples."""
     gap = ((0, 0), (0, values.shape[1]))
     return correlation_length(
         np.pad(values, gap).ravel(), np.pad(present, gap).ravel(), values.shape[1] // 2
@@ -102,7 +104,7 @@ def _correlation_along(values, present) -> float:
 
 
 def _alike(depth, used) -> float:
-    """Return how many neighbouring heights of a map err alike."""
+    """Return the correlation area of the errors of a map of depths, in heights."""
     lengths = []
     for values, present in ((depth, used), (depth.T, used.T)):
         lines = np.unique(np.linspace(0, len(values) - 1, min(len(values), N_LINES)).astype(int))

@@ -29,7 +29,7 @@ LONG_WAVES = (
     0.05  # of the shorter side: standard deviation of the Gauss filter whose mean gives no slope
 )
 MAX_STEP = 4.0  # pixels that a step of the fit may move a place
-RIM = 2  # pixels at the rim of a scan that a cubic spline reads less well
+RIM = 2  # pixels at the border of a scan where cubic interpolation is inaccurate
 CHUNK = 1 << 20  # heights of a map that are read at a time
 SEED = 2
 
@@ -191,7 +191,7 @@ class ScanModel:
         return np.clip(step, -bound, bound)
 
     def tolerances(self, scale: float) -> np.ndarray:
-        """Return the changes (6,) of the parameters that move the depth by the scale [m]."""
+        """Return the changes (6,) of the parameters that change the depth by `scale` [m]."""
         moved = scale / max(float(np.sqrt((self.slopes**2).mean())), 1e-12)
         return np.array([scale, scale, scale, moved / self.reach, moved, moved])
 

@@ -29,13 +29,13 @@ LONG_WAVES = (
 DEEP = 3.0  # standard deviations of a valley beyond which its depth counts no more: a groove marks no place
 WHITENING_FLOOR = 0.3  # of the root mean square of a spectrum, added to what it is divided by
 WHITENING_WIDTH = 1.5  # pixels of the spectrum over which its power is averaged
-TAPER = 0.25  # power of the Hann window that takes the edges of an image off
+TAPER = 0.25  # exponent of the Hann window that tapers the edges of an image
 CLEAR = 10.0  # standard deviations above the likeness at other shifts; wrong places of a periodic lay reach 9
 SURE = 14.0  # the same, beyond which no other variant is tried
 MAX_GUESSES = 8  # places that are returned
 MAX_OF_VARIANT = 3  # places of a variant
-ANGLE_APART = 0.02  # rad from which two rotations at a shift are two places
-PIXELS_APART = 4  # pixels from which two shifts are two places
+ANGLE_APART = 0.02  # rad: smallest difference of two rotations that count as two candidates
+PIXELS_APART = 4  # pixels: smallest difference of two shifts that count as two candidates
 
 
 class Guess(NamedTuple):
@@ -56,7 +56,7 @@ class Guess(NamedTuple):
 
 
 def variant(scan: Areal, mirrored: str, turned: bool) -> Areal:
-    """Return a scan with x or y mirrored about its own middle, and with inverted heights."""
+    """Return a scan mirrored in x or y about its centre, and with inverted heights if `turned`."""
     x = scan.x[0] + scan.x[-1] - scan.x[::-1] if mirrored == "x" else scan.x
     y = scan.y[0] + scan.y[-1] - scan.y[::-1] if mirrored == "y" else scan.y
     z = {"": scan.z, "x": scan.z[:, ::-1], "y": scan.z[::-1]}[mirrored]
@@ -84,7 +84,7 @@ def guesses(before: Areal, after: Areal) -> list:
 
 
 def step_of(*scans: Areal) -> float:
-    """Return the step [m] of the images of a search."""
+    """Return the pixel size [m] of the images of a search."""
     return max(max(np.ptp(scan.x), np.ptp(scan.y)) for scan in scans) / SIZE
 
 

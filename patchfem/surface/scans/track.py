@@ -258,7 +258,7 @@ def _deep_span(section, noise: float):
 
 
 def _measure_length(turned: _TurnedMap, span: tuple, whole) -> _Length:
-    """Measure how far the track reaches: to where the lost area is half of its median.
+    """Measure the length of the track between the points where the lost area is half of its median.
 
     The ends of its interval are those of three quarters and of a quarter of the median.
     """

@@ -9,7 +9,7 @@ from ..quantity import SIDE, Quantity, around, refused
 from .alignment import MARGIN, ScanAlignment
 from .wear import hidden_depth, mean_of_square, widen
 
-FEET = 3  # heights beside what changed whose depths belong to it, as its feet are lower than noise
+FEET = 3  # heights by which a changed part is widened, because its edges are below the noise
 HIDDEN = (
     0.5  # of the depth that noise hides, the mean depth of wear that runs out beside the worn part
 )
@@ -109,7 +109,7 @@ def _measure(found: ScanAlignment, x, y) -> Volumes:
 
 
 def _nearest_known(depth) -> tuple:
-    """Return rows and columns (m, n) of the known depth nearest to each place."""
+    """Return the row and column indices (m, n) of the valid depth nearest to each point."""
     from scipy.ndimage import distance_transform_edt
 
     return tuple(
@@ -141,7 +141,7 @@ def _volume(
 
 
 def _doubt_of_walls(found: ScanAlignment, changed) -> np.ndarray:
-    """Return by how much the depths (m, n) [m] of missing walls may differ from those of the nearest heights.
+    """Return the uncertainty (m, n) [m] of the depth where the heights of a steep wall are missing.
 
     A wall is missing where a height that is unknown lies about as far from a deep height, or a high
     one, as from one that did not change. It may be as deep as the deep one, or not deep at all.

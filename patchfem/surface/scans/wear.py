@@ -6,15 +6,13 @@ from ..compare.section import sure_of
 
 # heights along the sides of the squares: deep and narrow changes show in small ones
 SIDES = (3, 9, 25, 63)
-CLIPPED = (
-    8.0  # standard deviations that a height counts with at most, so that a single one is no change
-)
-MIN_KNOWN = 0.25  # fraction of a square that is known, at least
-MIN_QUIET = 50  # unworn squares from which a scatter is known
+CLIPPED = 8.0  # limit of a height in standard deviations, so that a single outlier is no change
+MIN_KNOWN = 0.25  # smallest fraction of valid heights in a square
+MIN_QUIET = 50  # smallest number of unworn squares for an estimate of their scatter
 
 
 def find_change(depth, used, noise: float) -> tuple:
-    """Find the heights that are worn and those that grew.
+    """Find the heights of a map of depths with material loss and those with material gain.
 
     Parameters
     ----------
