@@ -89,7 +89,7 @@ class ScanModel:
     shifts = ()  # the fit to images knows the place; least trimmed squares move the plane alone
 
     def __init__(self, before: Raster, after: Raster, n_points: int = N_POINTS):
-        from scipy.ndimage import binary_erosion, spline_filter
+        from scipy.ndimage import binary_erosion, gaussian_filter, spline_filter
 
         self.before = before
         self.after = after
@@ -103,6 +103,8 @@ class ScanModel:
         rows, columns = np.nonzero(binary_erosion(~np.isnan(before.z)))
         chosen = np.random.default_rng(SEED).permutation(rows.size)[:n_points]
         self.rows, self.columns = rows[chosen], columns[chosen]
+        z = filled(before.z, np.isnan(before.z))
+        self.short_waves = z - gaussian_filter(z, LONG_WAVES * min(z.shape), truncate=3.0)
         self._take_slopes(MIN_SMOOTHING)
 
     @property
@@ -123,8 +125,7 @@ class ScanModel:
         """
         from scipy.ndimage import gaussian_filter
 
-        z = filled(self.before.z, np.isnan(self.before.z))
-        z = z - gaussian_filter(z, LONG_WAVES * min(z.shape), truncate=3.0)
+        z = self.short_waves
         parts = [
             gaussian_filter(z, sigma, order)[self.rows, self.columns] for order in ((0, 1), (1, 0))
         ]
