@@ -1,24 +1,15 @@
 """Backbones of scenes: three ways beside each other and beside closed forms."""
 
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from scene_texts import IWAN, JOINT_SHAKEN, shaken
+from scene_texts import IWAN, shaken
 from scipy.integrate import solve_ivp
-from scipy.interpolate import CubicSpline
 
 import patchfem as pf
-from patchfem.campaigns.backbone import balance as balance_module
-from patchfem.campaigns.backbone.balance import half_range
 from patchfem.campaigns.backbone.bench_loops import run_loop, settle_loop
 from patchfem.campaigns.backbone.curves import backbone
 from patchfem.campaigns.backbone.joint import build_joint
-from patchfem.campaigns.backbone.notes import note_differences
-from patchfem.campaigns.backbone.records import Curve
-from patchfem.core import ModalBasis, NotConverged
-from patchfem.dynamics.harmonic.backbone import FreeBalance
-from patchfem.runs.rig.engines import ENGINES
 
 PLASTIC = 'law = "elastic-plastic"\nbond_length = "1 mm"'
 OMEGA = 200 * np.pi
@@ -33,16 +24,6 @@ def segalman(u):
     r, scale = u / 2.7e-3, 30 / (0.5 + 1 / 3)
     force = scale * (1.5 * r - r**1.5 / 1.5)
     return force, 8 * scale * 2.7e-3 * (0.75 * r**2 - r**2.5 / 3.75) - 4 * u * force
-
-
-def test_exact_methods_that_differ_by_more_than_their_value_differ_by_a_factor():
-    """"by 9.6e+03 %" stood there for a damping ratio that was 97 times as large."""
-    a, f, z, none = np.array([1e-6, 1e-5]), np.array([100.0, 90.0]), np.array([1e-3, 2e-3]), np.zeros(2)
-    balance = Curve(a, f, none, z, none, none)
-    decay = balance._replace(frequency=f * [1, 1.5], damping=z * [97, 1])
-    frequency, damping = note_differences({"balance": balance, "decay": decay})
-    assert "frequency by decay and by balance differ most at the amplitude 10 um, by 50 %: a decay" in frequency
-    assert "differ most at the amplitude 1 um, where the value by decay is 97 times the value by" in damping
 
 
 def test_exact_the_static_curve_of_an_iwan_joint_is_segalmans():
@@ -71,12 +52,6 @@ def test_the_balance_of_an_iwan_joint_keeps_its_bars_and_the_decay_follows_it():
     assert np.abs(decay.frequency - balance.frequency[inside]).max() < 0.1
 
 
-def test_exact_an_amplitude_lies_between_samples():
-    for turned in (0.0, 0.3, 0.5):
-        motion = np.array([0.0, 1e-6, 0.0, 1e-9]) * np.exp(2j * np.pi * turned / 4096 * np.arange(4))
-        assert half_range(motion) / 1.001e-6 == pytest.approx(1, rel=1e-11)
-
-
 def test_exact_a_motion_of_the_amplitude_asked_for_comes_back_after_a_cycle():
     """The largest of 4096 samples was taken for the amplitude, 3e-7 of it too small: the motion fell within a cycle."""
     found = backbone(model('law = "tanh"\nreference_speed = "0.5 m/s"'), "", a := [6e-4, 8e-4, 1.2e-3], ("balance",))
@@ -86,24 +61,6 @@ def test_exact_a_motion_of_the_amplitude_asked_for_comes_back_after_a_cycle():
         end = solve_ivp(lambda t, y, c=damping: (y[1], -OMEGA**2 * y[0] - c * y[1] - 60 * np.tanh(y[1] / 0.5)),
                         (0, 1 / f), [start, 0.0], rtol=1e-12, atol=1e-18).y[:, -1]
         assert end[0] / start == pytest.approx(1, abs=1e-9)
-
-
-def test_a_decay_whose_force_turns_between_two_samples_keeps_its_bars():
-    """The coarser run has as many samples, so what they leave open of the frequency was no part of its error."""
-    found = backbone(model('law = "tanh"\nreference_speed = "3 mm/s"'), "", np.geomspace(3e-3, 6e-3, 9), ("decay",))
-    one, damping = found.curves["decay"], 2 * 0.002 * OMEGA
-
-    def turning(t, y):
-        return y[1]
-
-    own = solve_ivp(lambda t, y: (y[1], -OMEGA**2 * y[0] - damping * y[1] - 60 * np.tanh(y[1] / 3e-3)), (0, 0.3),
-                    [8e-3, 0.0], "LSODA", events=turning, rtol=1e-11, atol=1e-14)
-    time, swing = own.t_events[0], np.abs(np.diff(own.y_events[0][:, 0]))
-    middle = (time[1:] + time[:-1]) / 2
-    order = slice(-2, 0, -1)
-    law = CubicSpline(np.log(swing[order] / 2), 1 / (middle[2:] - middle[:-2])[::-1])(np.log(one.amplitude))
-    assert one.amplitude.size == 9 and (np.abs(one.frequency - law) <= one.frequency_error).all()
-    assert np.abs(one.frequency / law - 1).max() > 3e-9 and (one.frequency_error < 2e-5 * law).all()
 
 
 def test_exact_rigid_friction_by_balance_and_by_decay():
@@ -222,21 +179,6 @@ def test_a_decay_behind_a_stiff_contact_lasts_some_swings_in_slip():
     assert found.damping[-1] == pytest.approx(0.002 + lost, rel=0.02)
 
 
-def test_a_long_decay_is_told_before_it_begins(monkeypatch):
-    """50 cycles that take a second tell 40 s of the further ones; nothing is told of a short one."""
-    told, run = [], ENGINES["piecewise"].run
-    backbone(model(PLASTIC, **{"structure.mode.axial.damping": 1e-3}), "", [1e-5, 1e-3], ("decay",), told.append)
-    assert told == ["decay"]
-    monkeypatch.setattr(type(ENGINES["piecewise"]), "run", property(lambda engine: lambda *given: (
-        replace(run(*given), seconds=given[0].rig.cycles / 50))))
-    told.clear()
-    backbone(model(PLASTIC, **{"structure.mode.axial.damping": 1e-3}), "", [1e-5, 1e-3], ("decay",), told.append)
-    assert told[0] == "decay" and len(told) > 1
-    for said in told[1:]:
-        cycles = int(said.split()[2])
-        assert cycles >= 500 and said == f"decay over {cycles} cycles: about {cycles / 25:.2g} s of computing time"
-
-
 def test_amplitudes_stay_within_the_stop():
     stopped = pf.build(shaken(IWAN).replace("moving_mass", 'travel = "0.2 mm"\nmoving_mass'))
     found = backbone(stopped, methods=("decay", "quasi-static"))
@@ -244,17 +186,6 @@ def test_amplitudes_stay_within_the_stop():
     assert 1.5e-4 < found.curves["decay"].amplitude[-1] < 0.2e-3
     with pytest.raises(pf.PatchfemError, match=r"structure\.travel: the largest amplitude, 300 um, is larger than"):
         backbone(stopped, "", [1e-4, 3e-4])
-
-
-def test_exact_flutter_under_rigid_friction_from_both_sides():
-    """A damping of -.01 leaves the motions of .002 as they are; the ratio that is balanced falls by .012 * 100 Hz/f."""
-    scene = shaken('law = "coulomb"').replace("damping = 0.002", "damping = -0.01")
-    a = np.geomspace(1e-3, 5e-2, 15)
-    one = backbone(pf.build(scene), "", a, ("balance",)).curves["balance"]
-    beside = backbone(model('law = "coulomb"'), "", a, ("balance",)).curves["balance"]
-    assert one.amplitude.size == 15 and one.damping[0] > 0 > one.damping[-1]
-    assert one.frequency == pytest.approx(beside.frequency, rel=1e-9)
-    assert one.damping + 1.2 / one.frequency == pytest.approx(beside.damping, rel=1e-8)
 
 
 def test_a_curve_that_bends_back_is_kept_as_far_as_it_goes():
@@ -306,46 +237,6 @@ def test_beyond_a_fold_the_curve_goes_on():
     assert not any("left out" in note for note in found.notes) and (np.diff(whole.frequency) < 0).all()
     assert whole.frequency[1:] == pytest.approx(beyond.frequency, rel=1e-6)
     assert whole.damping[1:] == pytest.approx(beyond.damping, rel=1e-5)
-
-
-def test_what_lies_below_the_first_motion_is_found_from_it(monkeypatch):
-    """Where nothing is found upwards until an amplitude, those before it are found downwards from it."""
-    a, plain = np.geomspace(1e-3, 3e-3, 3), balance_module._solve_from_stuck
-    straight = backbone(model(PLASTIC), "", a, ("balance",)).curves["balance"]
-
-    def far(equations, first, small, here):
-        if here < 0.9 * a[-1]:
-            raise NotConverged("too far")
-        return plain(equations, first, small, here)
-
-    monkeypatch.setattr(balance_module, "_solve_from_stuck", far)
-    found = backbone(model(PLASTIC), "", a, ("balance",)).curves["balance"]
-    assert found.frequency == pytest.approx(straight.frequency, rel=1e-9)
-
-
-def test_exact_no_held_mode_is_slower_than_the_free_one():
-    """A mass of .3 kg on one of .5 kg that slides on the ground: 0 and 116 Hz free, 92 Hz and more with it held."""
-    k = np.array([[1e5, -1e5], [-1e5, 1e5]])
-    root = np.sqrt([0.5, 0.3])
-    values, vectors = np.linalg.eigh(k / np.outer(root, root))
-    omega, row = np.sqrt(np.maximum(values, 0)), (vectors / root[:, None])[0]
-    modes = ModalBasis(("1", "2"), omega, np.zeros(2), row, row, row, 1.0)
-    held = [modes.held(row[None], np.array([3e6]), k)[0] for k in range(2)]
-    exact = np.linalg.eigvalsh((k + np.diag([3e6, 0])) / np.outer(root, root))
-    assert np.square(held) == pytest.approx(exact, rel=1e-9) and held[1] > omega[1]
-    assert modes.held(row[None], np.array([np.inf]), 1)[0] is None
-
-
-def test_held_modes_of_pairs_that_do_not_touch_stay_with_their_pair():
-    rng = np.random.default_rng(5)
-    for _ in range(200):
-        omega, rows = rng.uniform(100, 1000, 4), np.zeros((2, 4))
-        rows[0, :2], rows[1, 2:] = rng.normal(size=(2, 2))
-        modes = ModalBasis(tuple("abcd"), omega, np.zeros(4), rows[0], rows[0], rows[0], 1.0, None, rows)
-        for k in range(4):
-            w, shape = modes.held(rows, 10 ** rng.uniform(3, 7, 2), k)
-            assert np.isfinite(shape).all() and w >= omega[k] * (1 - 1e-9)
-            assert not np.abs(shape[2:] if k < 2 else shape[:2]).any()
 
 
 TWO = shaken(PLASTIC.replace("1 mm", "1 um")).replace("[drive]", """[[structure.mode]]
@@ -418,22 +309,6 @@ def test_a_decay_in_which_another_mode_rings_is_not_given_as_that_of_this_mode()
     assert any("is not known at 5 of 5 amplitudes" in one for one in found.notes)
 
 
-def test_a_damped_decay_begins_above_the_largest_amplitude_asked_for():
-    """Of a damping of 0.1 the first reading lies at 0.62 of the release, more than 1.15 below it."""
-    a = np.geomspace(1e-6, 2e-4, 5)
-    text = shaken(PLASTIC).replace("damping = 0.002", "damping = 0.1")
-    one = backbone(pf.build(text), "", a, ("decay",)).curves["decay"]
-    assert one.amplitude == pytest.approx(a) and one.damping == pytest.approx(
-        0.1 * OMEGA / np.sqrt(OMEGA**2 + 3e4 / 0.5), rel=1e-5)
-
-
-def test_exponents_only_where_both_points_lie_in_a_regime_and_the_loss_is_no_round_off():
-    sparse = backbone(model(IWAN), "", [1e-8, 1e-2], ("quasi-static",))
-    assert sparse.exponents.micro is None and sparse.exponents.gross is None
-    held = backbone(model(PLASTIC.replace("1 mm", "1 um")), "", [1e-9, 2e-9], ("balance",))
-    assert held.exponents.micro is None
-
-
 CROWNED = """\
 [contact]
 length = "20 mm"
@@ -466,26 +341,6 @@ def test_always_the_mesh_is_in_the_bars_of_micro_slip():
     assert any("higher than the frequencies by balance" in note for note in fine.notes)
 
 
-BEHIND_BONDS = JOINT_SHAKEN.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "100 um"').replace(
-    "kinetic = 0.2\n", "").replace("damping = 0.01", "damping = 0.05")
-FEW = "[contact.shear]", 'element_size = "6 mm"\n[contact.shear]'
-
-
-def test_errors_say_what_they_leave_out_of_the_mesh():
-    """Bonds behind pieces that give way have no steady loop: their errors hold the change on a coarser mesh, and where
-    there is none, no error of the mesh."""
-    a = [1e-6, 2e-6]
-    found, few = (backbone(pf.build(one), "", a, ("decay",)) for one in (BEHIND_BONDS, BEHIND_BONDS.replace(*FEW)))
-    (said,), (unmeshed, bare) = ([note for note in one.notes if "the errors of" in note] for one in (found, few))
-    assert said.startswith("the errors of method decay include the change on a coarser mesh, but not the energy that")
-    assert said.endswith("because the hysteresis loop of this friction law is not known without a computation in time")
-    assert unmeshed.endswith("too few elements for a coarser mesh; leave out contact.element_size")
-    assert bare.startswith("the errors of method decay include no error of the mesh, because the hysteresis loop of")
-    assert (found.curves["decay"].frequency_error > few.curves["decay"].frequency_error).all()
-    plain = backbone(pf.build(JOINT_SHAKEN.replace("kinetic = 0.2\n", "")), "", a, ("balance",))
-    assert plain.curves and not any("the errors of" in note for note in plain.notes)
-
-
 def test_the_held_frequency_is_that_of_the_stiffness_which_a_run_prints():
     found = backbone(pf.build(CROWNED), "", [1e-6], ("quasi-static",))
     told = pf.run(CROWNED[:CROWNED.index("[structure]")] + '[slide]\nkind = "sine"\namplitude = "1 um"\n'
@@ -508,26 +363,6 @@ def test_amplitudes_unless_given_end_where_the_mode_is_nearly_free(slide):
     assert found.curves["quasi-static"].frequency[-1] < 1.05 * found.frequencies.free
 
 
-def test_the_balance_finds_its_first_motion_by_way_of_a_small_one(monkeypatch):
-    """Where the held mode is too far a start, the motion is followed from where nothing slips."""
-    a, plain = np.array([2e-3]), FreeBalance.solve
-    straight = backbone(model(PLASTIC), "", a, ("balance",)).curves["balance"]
-    refused = []  # the objects themselves: the id of one that is gone may be given to another
-
-    def near(self, x, amplitude):
-        if not any(one is self for one in refused):
-            refused.append(self)
-            raise NotConverged("too far")
-        return plain(self, x, amplitude)
-
-    monkeypatch.setattr(FreeBalance, "solve", near)
-    found = backbone(model(PLASTIC), "", a, ("balance",)).curves["balance"]
-    assert len(refused) > 1 and found.frequency == pytest.approx(straight.frequency, rel=1e-6)
-    monkeypatch.setattr(balance_module, "_solve_from_stuck", lambda one, first, small, here: one.solve(first, here)[0])
-    lost = backbone(model(PLASTIC), "", a, ("balance",))
-    assert lost.missing == {"balance": "no free motion of these amplitudes was found"}
-
-
 def test_a_loop_that_remembers_is_read_when_it_has_settled():
     """Three cycles of bonds of order 2 are not their loop yet: the curve is that of thirty, within both bars."""
     bonds = 'law = "nonlocal"\nreading = "stretch"\norder = 2\nbond_length = "1 um"'
@@ -539,13 +374,6 @@ def test_a_loop_that_remembers_is_read_when_it_has_settled():
     assert abs(found.run.values[name] / many[name] - 1) < 2e-3
 
 
-def test_bonds_without_a_closed_loop_name_the_method_that_works():
-    bonds = model('law = "nonlocal"\nreading = "stretch"\norder = 2\nbond_length = "1 um"')
-    (said,) = backbone(bonds, "", [3e-7], ("balance",)).missing.values()
-    assert said.endswith("; use --method quasi-static")
-    assert not backbone(bonds, "", [3e-7], ("quasi-static",)).missing
-
-
 def test_a_static_curve_ends_where_its_force_falls():
     """An interlock gives way at a quarter of its wave: 20 um of 80."""
     bonded = '[structure.bonded]\nstiffness = "4.6e6 N/m"\nwavelength = "80 um"\n[[structure.mode]]'
@@ -553,12 +381,6 @@ def test_a_static_curve_ends_where_its_force_falls():
     found = backbone(pf.build(scene), "", np.array([5e-6, 1e-5, 1.5e-5, 5e-5]), ("quasi-static",))
     assert found.curves["quasi-static"].amplitude.size == 3 and "curve does not reach these" in found.notes[0]
     assert found.frequencies.free == pytest.approx(np.sqrt(OMEGA**2 + 9.2e6) / (2 * np.pi))
-
-
-def test_a_linear_mode_that_does_not_swing_has_no_curve():
-    scene = shaken(PLASTIC)[shaken(PLASTIC).index("[structure]"):].replace("0.002", "1.5")
-    found = backbone(pf.build(scene))
-    assert not found.curves and "ratio is 1 or more" in found.missing["decay"]
 
 
 def test_python_gives_a_dataset():

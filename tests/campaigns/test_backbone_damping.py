@@ -5,7 +5,6 @@ import pytest
 
 import patchfem as pf
 from patchfem.campaigns.backbone.curves import backbone
-from patchfem.campaigns.backbone.records import METHODS
 from patchfem.export import backbone as backbone_files
 from patchfem.export.drawing import pictures
 from patchfem.runs import joint
@@ -22,13 +21,6 @@ LAWS = {
 }
 FAST_LAWS = ("coulomb", "elastic-plastic")
 DAMPING = (-0.011, 0.0, 0.005)
-OTHER_MODE = """[[structure.mode]]
-name = "yaw"
-frequency = "170 Hz"
-damping = -0.004
-slide = 0.4
-output = 0.5
-"""
 AMPLITUDES = np.geomspace(1e-5, 8e-3, 5)
 
 
@@ -78,15 +70,6 @@ def check_ends_well(law: str, damping: float, way: str, other_mode: str) -> None
 @pytest.mark.parametrize("law", FAST_LAWS)
 def test_every_sign_of_damping_ends_well(law, damping):
     check_ends_well(law, damping, "balance", "")
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("other_mode", ("", OTHER_MODE))
-@pytest.mark.parametrize("way", METHODS)
-@pytest.mark.parametrize("damping", DAMPING)
-@pytest.mark.parametrize("law", LAWS)
-def test_every_law_sign_of_damping_and_method_ends_well(law, damping, way, other_mode):
-    check_ends_well(law, damping, way, other_mode)
 
 
 @pytest.mark.parametrize("law", FAST_LAWS)

@@ -3,22 +3,16 @@
 import csv
 import json
 import re
-import subprocess
-import sys
 from dataclasses import replace
-from time import perf_counter, process_time, sleep
-from types import SimpleNamespace
 
-import numpy as np
 import pytest
 from command_line import cli
 from scene_texts import BENCH, PIECE
 
 import patchfem as pf
-from patchfem.campaigns import cost, knobs
+from patchfem.campaigns import knobs
 from patchfem.campaigns.cost import TOLERANCE, Cost, cheapest, curve, quickest, sentence
-from patchfem.export.cost import cost_chart, lines_of, shown, write
-from patchfem.export.drawing import pictures
+from patchfem.export.cost import lines_of
 from patchfem.model.model import build
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
@@ -109,50 +103,6 @@ def test_exact_of_settings_that_cost_the_same_the_smallest_is_named_and_one_with
     assert sentence(slow, 5e-3).endswith("within the tolerance 0.005")
 
 
-def test_exact_the_table_has_the_measure_that_the_sentence_judges_by():
-    """Stored energy decided on the cheapest run and stood in no column."""
-    share = {"pressure_peak": 1 / 9, "energy_stored": 1.0, "moment": 1 / 3}
-    runs = [replace(made(str(k), 1.0 + k, error), values=dict.fromkeys(share, 1.0), floors=dict.fromkeys(share, 0.0),
-                    **{key: {name: error * one for name, one in share.items()} for key in ("errors", "distances")})
-            for k, error in enumerate((4e-2, 2e-2, 1e-3))]
-    assert shown(runs, 1e-2) == ["pressure_peak", "energy_stored"]
-
-
-def test_exact_the_table_holds_plain_numbers(tmp_path):
-    """Numbers of NumPy stood in it as np.float64(0.25)."""
-    kinds = (np.float64(0.25), np.float32(0.5), 0.125)
-    runs = [made(str(k), 1.0 + k, error, error, value=error) for k, error in enumerate(kinds)]
-    with open(write(tmp_path, {"jumps": runs}), encoding="utf-8") as file:
-        found = list(csv.DictReader(file))
-    numbers = [{name: float(text) for name, text in row.items() if name not in ("knob", "setting") and text}
-               for row in found]
-    assert [(row["error_a"], row["error_b"], row["distance_a"]) for row in numbers] == [(e, e, e) for e in kinds]
-
-
-def test_exact_the_picture_has_one_curve_and_hollow_points_where_the_tolerance_is_missed():
-    runs = [made("2", 0.43, 4e-2, 3e-2), made("4", 0.36, 8e-3, 7e-3), made("8", 5, 2e-3, 1e-3), made("16", 9, 1e-3)]
-    (axis,) = pictures.draw.figure([cost_chart("jumps", runs, 1e-2)]).axes
-    line, *marks, limit = axis.lines
-    assert line.get_xdata().tolist() == [0.43, 0.36, 5, 9] and line.get_ydata().tolist() == [4e-2, 8e-3, 2e-3, 1e-3]
-    filled, hollow = (sorted(one.get_xdata()) for one in marks)
-    assert filled == [0.36, 5, 9] and hollow == [0.43] and marks[1].get_markerfacecolor() == "white"
-    assert set(limit.get_ydata()) == {1e-2}
-
-
-@pytest.mark.parametrize("places", [
-    [(0.5, 2.1e-3), (0.5, 2.1e-3), (0.48, 2e-3), (0.49, 1.9e-3), (4.0, 1.8e-3)],
-    [(1.0, 1e-3), (1.0, 9e-4), (1.0, 8e-4), (1.01, 7e-4), (0.99, 6e-4)]])
-def test_exact_labels_of_the_picture_do_not_overlap(places):
-    runs = [replace(made(f"{10.0**-k:g}, {100 * 2**k} steps per cycle", seconds, error), tolerance=1e-2)
-            for k, (seconds, error) in enumerate(places)]
-    figure = pictures.draw.figure([cost_chart(TOLERANCE, runs, 1e-2)], height=4.2)
-    figure.draw_without_rendering()
-    boxes = [one.get_window_extent() for one in figure.axes[0].texts]
-    assert len(boxes) >= 4
-    for k, one in enumerate(boxes):
-        assert not any(one.overlaps(other) for other in boxes[k + 1:])
-
-
 def test_exact_a_line_says_which_tolerance_is_missed_and_with_which_steps_it_is_met():
     """Rows of a tolerance of 1e-4 had errors of 2.7e-4 to 9.5e-3 and did not say that they missed it."""
     def run_at(tolerance, error, steps, remedies=()):
@@ -191,60 +141,6 @@ def test_exact_a_bench_with_few_steps_meets_tight_tolerances_with_the_steps_that
     assert "<svg" in (tmp_path / "out" / "cost.svg").read_text("utf-8")
 
 
-def turning(monkeypatch, answers: dict, work=lambda: None) -> list:
-    """The curve of settings {label: error}, each of which does `work`."""
-    from patchfem.core import Measure
-
-    wanted = [knobs.Setting(f"tolerance {one}", 1.0, f"by tolerance {one}", SimpleNamespace(
-        accuracy=SimpleNamespace(tolerance=1.0))) for one in answers]
-    monkeypatch.setattr(cost, "knobs_of", lambda model: ["element_size"])
-    monkeypatch.setattr(cost, "settings", lambda model, knob: wanted)
-    monkeypatch.setattr(cost, "_tried", lambda setting, *_: work() or ({
-        "a": Measure(1.0, "1", answers[setting.label.removeprefix("tolerance ")], 0.0)}, (), None))
-    return cost.curve(SimpleNamespace(source=None), "element_size")
-
-
-def test_exact_settings_that_gave_the_same_run_bit_for_bit_are_one(monkeypatch):
-    runs = turning(monkeypatch, {"0.1": 1e-2, "0.01": 1e-2, "0.001": 1e-3, "1e-4": 1e-4, "1e-5": 1e-4})
-    assert [(one.label, one.timings) for one in runs] == [
-        ("tolerance 0.1, 0.01", 4), ("tolerance 0.001", 3), ("tolerance 1e-4, 1e-5", 4)]
-    apart = turning(monkeypatch, {"0.1": 1e-2, "0.01": np.nextafter(1e-2, 1), "0.001": 1e-3})
-    assert [one.timings for one in apart] == [3, 3, 3]
-
-
-def test_exact_seconds_are_those_of_the_processor_with_its_children(monkeypatch):
-    """A run that waits costs nothing, one that works in a child process costs what the child does."""
-    def spin(seconds=0.06):
-        begin = process_time()
-        while process_time() - begin < seconds:
-            pass
-
-    def waits():
-        spin(), sleep(0.15)
-
-    monkeypatch.setattr(cost, "TIMINGS", 1)
-    for one in turning(monkeypatch, {"1": 1.0, "2": 2.0, "3": 3.0}, waits):
-        assert one.seconds == pytest.approx(0.06, rel=0.2) and one.wall_seconds > 0.2 and one.waited()
-    burn = "from time import process_time as t\nwhile t() < 0.3: pass"
-    begin = cost._cpu(), perf_counter()
-    subprocess.run([sys.executable, "-S", "-c", burn], check=True)
-    assert cost._cpu() - begin[0] == pytest.approx(0.3, abs=0.12)
-
-
-def test_exact_a_long_run_that_compiled_is_timed_again(monkeypatch):
-    """The first point of a curve once held the seconds of the compiler."""
-    spent, kept = iter([0, 30, 30, 31, 40, 52]), iter([5, 6, 6, 6, 6, 6])
-    monkeypatch.setattr(cost, "_cpu", lambda: next(spent))
-    monkeypatch.setattr(cost, "_compiled", lambda: next(kept))
-    monkeypatch.setattr(cost, "TIMINGS", 2)
-    monkeypatch.setattr(cost, "_tried", lambda *_: ({}, (), None))
-    model = SimpleNamespace(accuracy=SimpleNamespace(tolerance=1.0))
-    one = cost._timed(knobs.Setting("a", 1.0, "a", model), True, None)
-    assert (one.seconds, one.timings) == (1, 2)
-    one = cost._timed(knobs.Setting("b", 1.0, "b", model), True, None)
-    assert (one.seconds, one.timings) == (12, 1)
-
-
 @pytest.mark.parametrize("words, said", [
     (["--over", "colour"], "use one of element_size"), (["--over", "steps_per_cycle"], "possible settings: "
                                                                                        "element_size"),
@@ -254,24 +150,6 @@ def test_refuses_knobs_that_a_scene_does_not_have(tmp_path, words, said):
     scene.write_text(TEXT.format(keys="", tolerance=0.05), "utf-8")
     answer = cli("cost", scene, *words)
     assert answer.code == 2 and said in answer.err
-
-
-@pytest.mark.slow
-def test_exact_python_has_the_answer_and_the_files_of_the_command(tmp_path, monkeypatch, capfd):
-    scene = tmp_path / "a.toml"
-    scene.write_text(TEXT.format(keys='element_size = "0.254 mm"', tolerance=0.05), "utf-8")
-    runs = [made("coarse", 0.1, 0.3, 0.2, 2.0), made("middle", 0.2, 0.03, 0.02), made("fine", 0.9, 0.01, value=0.5)]
-    monkeypatch.setattr("patchfem.campaigns.cost.curve", lambda model, knob, say: say(f"{knob}: 1 s") or runs)
-    monkeypatch.setattr("patchfem.export.cost.MAIN", ("a", "b"))
-    said = cli("cost", scene, "-o", tmp_path / "there", "--json")
-    assert pf.cost(scene, out=tmp_path / "here") == json.loads(said.out)
-    assert capfd.readouterr().err == "tolerance: 1 s\n"
-    for name in ("cost.csv", "cost.svg"):
-        assert (tmp_path / "here" / name).read_bytes() == (tmp_path / "there" / name).read_bytes()
-    assert pf.cost(scene, over="element_size", say=[].append)["element_size"]["cheapest"] == {"a": "middle"}
-    monkeypatch.undo()
-    with pytest.raises(pf.PatchfemError, match="possible settings: element_size"):
-        pf.cost(scene, over="shear_modes")
 
 
 def test_exact_a_bench_without_pieces_has_the_steps_as_its_knob():

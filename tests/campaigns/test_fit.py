@@ -11,16 +11,13 @@ from page_data import unheard
 from scipy.integrate import solve_ivp
 from scipy.stats import t as student
 
-from patchfem.campaigns.fits.loop import LOAD_UNITS, fit_loop
-from patchfem.campaigns.fits.loop_model import BenchModel
+from patchfem.campaigns.fits.loop import fit_loop
 from patchfem.core import PatchfemError
 from patchfem.export.fits.files import fitted_scene_text
 from patchfem.export.fits.text import format_fitted
 from patchfem.inputs.loops import read_loop
 from patchfem.model.model import build
 from patchfem.runs.bench import bench
-from patchfem.runs.patch import store
-from patchfem.scene.ranges import ranges
 from patchfem.scene.scene import SceneError, load, loads
 
 LOAD = 100.0
@@ -140,17 +137,6 @@ def test_exact_known_values_are_found_again(tmp_path, law):
     assert np.ptp(found.keys.fit.intervals, axis=1) == pytest.approx(0, abs=1e-6)
 
 
-@pytest.mark.slow
-def test_exact_growth_is_found_again_from_an_integrated_loop(tmp_path):
-    """All five numbers of the growing bonds, the loop by an independent integration; steps until 1e-7 of the peak."""
-    time, slide = rows(60)
-    loop = table(tmp_path / "loop.csv", time, slide, forces("growth", time, slide, TRUTH["growth"]))
-    scene = scene_of(tmp_path, "growth", "accuracy.tolerance=2e-5")
-    found = fit_loop(scene, loop, free_of(*TRUTH["growth"]))
-    assert found.keys.fit.values == pytest.approx(list(TRUTH["growth"].values()), rel=1e-3)
-    assert found.step_error < 2e-6 * 31
-
-
 def test_exact_growth_is_found_again(tmp_path):
     """The same numbers at the steps of the rows, the loop by the law itself: nothing is left over."""
     time, slide = rows(40)
@@ -198,42 +184,12 @@ def test_exact_a_ratio_column_and_a_patch_fit_alike(tmp_path):
         assert found.keys.fit.values == pytest.approx(list(TRUTH["bonds"].values()), rel=1e-6)
 
 
-def test_exact_a_moved_patch_is_condensed_once_whatever_was_asked_before(tmp_path):
-    """A free tilt moves the contact, not the mesh: pieces are condensed once, and a value has one answer."""
-    time, slide = rows(8, 1)
-    loop = read_loop(table(tmp_path / "loop.csv", time, slide, slide * 1e6), LOAD_UNITS)
-    text = ('[contact]\nlength = "12.7 mm"\nwidth = "12.7 mm"\nheight = "6.35 mm"\nload = "80 N"\nsubstrate = '
-            '"Ti-8Al-1Mo-1V"\n[contact.tilt]\nangle = "10 urad"\n[contact.shear]\n')
-    scene = loads(text + LAWS["elastic-plastic"] + SINE + "[accuracy]\ntolerance = 3e-2\n")
-    wanted, _ = ranges(["contact.tilt.angle=5 urad..200 urad"])
-    store.clear()
-    found, condensed = [], []
-    for values in ((5e-6, 4e-5, 2e-4), (2e-4, 4e-5)):
-        model = BenchModel(scene, loop, wanted)
-        found.append([model(np.array([value])) for value in values])
-        condensed.append([key for key in store._RESULTS if key[0] == "pair"])
-    assert len(condensed[0]) == 3 and set(condensed[0]) == set(condensed[1])  # a level each
-    assert np.array_equal(found[0][1], found[1][1]) and np.array_equal(found[0][2], found[1][0])
-    assert np.abs(found[0][0] - found[0][2]).max() > 1e-3 * np.abs(found[0][0]).max()
-
-
 # ---- noise
 
 def noisy(law, seed, sigma=0.6, count=40):
     time, slide = rows(count)
     force = forces(law, time, slide, TRUTH[law])
     return time, slide, force + sigma * np.random.default_rng(seed).normal(size=force.size)
-
-
-def covered(tmp_path, law, seeds):
-    inside = []
-    scene = scene_of(tmp_path, law)
-    for seed in seeds:
-        loop = table(tmp_path / "loop.csv", *noisy(law, seed))
-        found = fit_loop(scene, loop, free_of(*TRUTH[law]))
-        inside.append([a <= x <= b for (a, b), x in zip(found.keys.fit.intervals, TRUTH[law].values())])
-        assert found.rms == pytest.approx(0.6, rel=0.25)
-    return np.array(inside)
 
 
 @pytest.mark.parametrize("law", ["coulomb", "elastic-plastic"])
@@ -256,32 +212,6 @@ def test_exact_intervals_of_a_noisy_loop_are_those_of_its_normal_equations(tmp_p
         ends[1] = best[1] * np.exp([-half[1], half[1]])
     assert found.keys.fit.methods == ("linear",) * best.size
     assert found.keys.fit.intervals == pytest.approx(ends, rel=2e-4)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("law", ["coulomb", "elastic-plastic", "tanh", "bonds"])
-def test_exact_intervals_cover_the_truth_in_19_of_20(tmp_path, law):
-    """120 loops with noise of 2 % of the peak; the share of a fair interval has a deviation of 0.02 (one value)."""
-    inside = covered(tmp_path, law, range(120))
-    assert inside.mean() == pytest.approx(0.95, abs=0.04) and (inside.mean(axis=0) > 0.9).all()
-
-
-@pytest.mark.slow
-def test_exact_intervals_of_growing_bonds_cover_the_truth_in_19_of_20(tmp_path):
-    """100 loops, three of the five numbers free, the model at the steps of the rows as the truth is."""
-    names = ["friction.static", "friction.kinetic", "friction.slip_growth"]
-    fixed = ["friction.bond_length=2.3 um", "friction.rest_growth=7 m/s^2", "accuracy.steps_per_cycle=80"]
-    scene, (time, slide) = scene_of(tmp_path, "growth", *fixed), rows(40)
-    true = loads(scene.text, sets=[*fixed, "friction.static=0.31", "friction.kinetic=0.22",
-                                   "friction.slip_growth=1.1 um"])
-    force = bench.run(build(true), None, 4, path=(time, slide, 0, 0.0)).force
-    inside = []
-    for seed in range(100):
-        noise = 0.1 * np.random.default_rng(seed).normal(size=force.size)
-        found = fit_loop(scene, table(tmp_path / "loop.csv", time, slide, force + noise), free_of(*names))
-        inside.append([a <= TRUTH["growth"][name] <= b for (a, b), name in zip(found.keys.fit.intervals, names)])
-    inside = np.array(inside)
-    assert inside.mean() == pytest.approx(0.95, abs=0.04) and (inside.mean(axis=0) > 0.88).all()
 
 
 # ---- what the rows do not say
@@ -443,24 +373,6 @@ def test_refuses_a_broken_loop_by_line(asked, text, says, tmp_path):
     (tmp_path / "loop.csv").write_text(text)
     answer = cli(*asked, "--free", "friction.static=0.1..0.7,friction.bond_length=0.3 um..20 um")
     assert answer.code == 2 and "loop.csv" in answer.err and says in answer.err, answer.err
-
-
-@pytest.mark.parametrize("table, says", [
-    ("time [s],displacement [m]\n0,1e-6\n0.1,2e-6\n", "slide.csv:2: displacement starts at 1e-6"),
-    ("time [s],displacement [m],wobble [N]\n0,0,0\n0.1,2e-6,5\n", "slide.csv:1: a header like"),
-])  # fmt: skip
-def test_refuses_a_faulty_slide_file_as_check_does(tmp_path, table, says):
-    """The reason was lost on the way: an internal fault, for the scene itself was right."""
-    (tmp_path / "slide.csv").write_text(table)
-    scene, loop = tmp_path / "bench.toml", tmp_path / "loop.csv"
-    scene.write_text(POINT + LAWS["coulomb"] + '[slide]\nkind = "file"\nfile = "slide.csv"\n')
-    time, slide = rows(8, 1)
-    np.savetxt(loop, np.c_[time, slide, play(slide, 0.3, 1e-6)], delimiter=",", comments="",
-               header="time [s],displacement [m],force [N]")
-    told = [cli("check", scene), cli("run", scene, "-o", tmp_path / "out"),
-            cli("fit", scene, "--to", loop, "--free", "friction.static=0.1..0.5", "-o", tmp_path / "fit")]
-    assert f"{scene}:8: slide.file: " in told[0].err and says in told[0].err
-    assert told[1:] == told[:1] * 2 and told[0].code == 2
 
 
 def test_refuses_other_requests(asked, tmp_path):

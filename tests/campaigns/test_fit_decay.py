@@ -41,7 +41,6 @@ def test_exact_a_made_up_joint_is_found_again(tmp_path):
     assert pf.load(tmp_path / "out/scene.fitted.toml").friction.chi == pytest.approx(-0.35, abs=1e-5)
 
 
-HEAVY = shaken('law = "elastic-plastic"\nbond_length = "1 um"').replace("static = 0.3", "static = 0.02")
 FLUID = shaken('law = "tanh"\nreference_speed = "0.3 m/s"').replace("static = 0.3", "static = 0.6")
 
 
@@ -56,31 +55,6 @@ def test_exact_trials_that_do_not_oscillate_are_passed_over(tmp_path):
     with pytest.raises(PatchfemError, match=r"no curve of frequency and damping.*balance: the mode does not oscillate.*"
                                             r"leave out the rows with the largest damping"):
         pf.fit(FLUID, to=path, free={"friction.static": (10.0, 20.0)}, out=tmp_path / "none")
-
-
-@pytest.mark.slow
-def test_a_row_that_the_balance_lacks_is_corrected_as_its_neighbour(tmp_path, monkeypatch):
-    path, plain = written(tmp_path / "decay.csv", HEAVY, amplitudes=np.geomspace(1e-5, 2e-5, 4)), curves._compute_curve
-
-    def lacking(model, amplitude, method):
-        found = plain(model, amplitude, method)
-        found[:, 1] = np.where(method == "balance", np.nan, found[:, 1])
-        return found
-
-    monkeypatch.setattr(curves, "_compute_curve", lacking)
-    found = pf.fit(HEAVY, to=path, free={"friction.static": (0.005, 0.1)}, out=tmp_path / "out", starts=1)
-    assert found["values"]["friction.static"]["value"] == pytest.approx(0.02, rel=0.02)
-    assert "balance found no oscillation at the amplitudes 12.6 um" in found["warnings"][0]
-
-
-@pytest.mark.slow
-def test_exact_a_share_that_does_not_settle_leaves_the_search_to_the_balance(tmp_path):
-    """The static curve of a heavily damped block is off by half, differently from value to value."""
-    path = written(tmp_path / "decay.csv", HEAVY, amplitudes=np.geomspace(8e-6, 2e-5, 3))
-    free = {"friction.static": (0.005, 1.0), "friction.bond_length": ("0.2 um", "5 um")}
-    found = pf.fit(HEAVY, to=path, free=free, out=tmp_path / "out", **{"friction.static": 0.5})
-    assert found["values"]["friction.static"]["value"] == pytest.approx(0.02, rel=1e-6)
-    assert found["values"]["friction.bond_length"]["value"] == pytest.approx(1e-6, rel=1e-6)
 
 
 def test_the_verb_reads_a_curve_and_refuses_what_is_none(tmp_path, monkeypatch):
@@ -103,20 +77,6 @@ def test_the_verb_reads_a_curve_and_refuses_what_is_none(tmp_path, monkeypatch):
     both.write_text("amplitude [m],frequency [Hz],frequency_error [Hz],damping\n1e-6,100,-1,0.1\n2e-6,100,1,0.1\n")
     with pytest.raises(PatchfemError, match="errors must be 0 or more"):
         read_curve(both)
-
-
-def test_always_a_fit_says_how_long_it_has_run(tmp_path, monkeypatch):
-    """A fit to 41 amplitudes printed nothing for four minutes."""
-    monkeypatch.setattr(curves, "PROGRESS_SECONDS", 0.0)
-    monkeypatch.setattr(curves, "_compute_curve", lambda model, amplitude, method: np.outer(
-        [1e-4 * model.friction.stiffness, 0.01], np.ones(amplitude.size)))
-    path = tmp_path / "decay.csv"
-    path.write_text("amplitude [m],frequency [Hz],damping\n" + "".join(f"{k}e-6,100,0.01\n" for k in range(1, 5)))
-    lines = []
-    found = curves.fit_curve(pf.load(START), path, ["friction.stiffness=3e5 N/m..3e6 N/m"], lines.append)
-    assert found.keys.fit.values[0] == pytest.approx(1e6)
-    said = [line for line in lines if "curves of the model computed in" in line]
-    assert said[0] == "0 curves of the model computed in 0 s" and len(said) > 3
 
 
 def test_too_few_amplitudes_say_how_many_are_needed(tmp_path):
@@ -171,24 +131,6 @@ def test_the_intervals_contain_the_error_of_modes_left_out(tmp_path):
     assert not low + share * value * 1.01 < 100e-6 < high - share * value * 1.01
     assert key in note and not any("modes left out" in one for one in pf.fit(
         tmp_path / "whole.toml", to=path, free={key: ("50 um", "200 um")}, out=tmp_path / "all")["notes"])
-
-
-def test_a_fit_says_what_a_decay_is_compared_with(tmp_path):
-    """With the share of the amplitude that a cycle takes, and a command that shows both curves, which was tried; a
-    curve by balance is compared with its own kind."""
-    path = written(tmp_path / "decay.csv", HEAVY, amplitudes=np.geomspace(1e-5, 2e-5, 3))
-    ask = {"free": {"friction.static": (0.01, 0.04)}}
-    found = pf.fit(HEAVY, to=path, out=tmp_path / "out", **ask)
-    amplitude, damping = np.loadtxt(path, delimiter=",", skiprows=1)[:, [0, 3]].T
-    k = damping.argmax()
-    lost = 100 * (1 - np.exp(-2 * np.pi * damping[k]))
-    share = f"at {amplitude[k] * 1e6:.3g} um one cycle reduces the amplitude by {lost:.2g} %"
-    assert "curve by balance" in found["notes"][0] and share in found["notes"][0], found["notes"]
-    both = pf.backbone(tmp_path / "out/scene.fitted.toml", amplitudes=amplitude)
-    assert {"balance_damping", "decay_damping"} <= set(both)
-    lines = path.read_text().replace("decay_", "").splitlines()
-    path.write_text("\n".join([f"method,{lines[0]}", *(f"balance,{line}" for line in lines[1:])]) + "\n")
-    assert pf.fit(HEAVY, to=path, out=tmp_path / "out", **ask)["notes"] == []
 
 
 @pytest.mark.parametrize("seed", [8025, *(pytest.param(k, marks=pytest.mark.slow) for k in range(8000, 8030)

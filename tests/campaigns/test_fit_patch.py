@@ -9,8 +9,6 @@ from scene_texts import DRIVE, KILOGRAM, PIECE, POINT, friction_of
 
 import patchfem as pf
 from patchfem.campaigns.fits.patch import Curves, fit_law, fit_patch
-from patchfem.friction.laws.elastic_plastic import masing
-from patchfem.friction.laws.iwan import sliders
 from patchfem.friction.record import loop_from
 from patchfem.scales import plain, short
 from patchfem.scene.keys.tables import Friction
@@ -42,23 +40,6 @@ def test_exact_a_law_finds_itself_in_its_own_loops(law, keys):
     found = fit_law(law, 0.3, 100.0, slides, Curves(*loop_from(own, 100.0, slides)), 5e6)
     assert found.values == pytest.approx(keys, rel=1e-6)
     assert np.abs(found.deviations).max() < 1e-6
-
-
-def test_exact_the_cells_of_an_iwan_law_are_that_law():
-    """768 elements side by side, as a patch would hand them over."""
-    slides = np.geomspace(2e-7, 6e-5, 20)
-    own = Curves(*masing(*sliders(30.0, 5e6, -0.5, 0.5), slides))
-    found = fit_law("iwan", 0.3, 100.0, slides, own, 4e6)
-    assert found.values == pytest.approx({"stiffness": 5e6, "chi": -0.5, "beta": 0.5}, rel=1e-4)
-
-
-def test_the_headline_names_an_error_of_a_loss_that_is_small(tmp_path):
-    """Below a thousandth of 4 x force x slide a loss wrong by half was said to be wrong by little."""
-    answer = pf.fit(JOINT + SLIDE, from_patch=True, amplitudes="10 nm..200 nm:9", out=tmp_path / "out")
-    one = answer["laws"]["elastic-plastic"]["dissipation"]
-    assert one["relative"] == pytest.approx(-1.0, abs=1e-6)  # it sticks where the edges of the patch slip
-    best = answer["laws"][answer["law"]]["dissipation"]
-    assert abs(best["relative"]) >= abs(best["largest"])
 
 
 def test_a_mesh_is_refined_until_the_exponent_of_mindlins_contact_is_known():

@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 from scipy.stats import t as student
 
 from patchfem.core import Missing, NotConverged, Outcome, PatchfemError
-from patchfem.identify import least_squares as module
-from patchfem.identify.least_squares import Descent, answered, fit
-from patchfem.identify.space import Counted, space, spread_points
+from patchfem.identify.least_squares import fit
+from patchfem.identify.space import space
 from patchfem.identify.words import remarks
 
 RNG = np.random.default_rng(7)
@@ -158,31 +157,6 @@ def raising(error):
     return residual
 
 
-def test_always_a_descent_cut_short_says_so(monkeypatch):
-    monkeypatch.setattr(module, "MOST", 2)
-    found = fit(lambda v: 10 * np.array([v[1] - v[0]**2, 0.1 * (1 - v[0]), 0.0]), [-2, -1], [2, 3], start=[-1.9, 2.0])
-    assert found.outcome is Outcome.NOT_CONVERGED
-
-
-def test_exact_differences_at_a_bound_and_beside_a_failure_keep_their_order():
-    def residual(v):
-        if v[0] > 0.5:
-            raise PatchfemError("beyond")
-        return np.array([np.sin(3 * v[0]), v[0]**2])
-
-    model = Counted(residual, space([0.0], [1.0]))
-    for u in (0.0, 0.2, 0.5):
-        got = model.jacobian(np.array([u]), [0])[:, 0]
-        assert got == pytest.approx([3 * np.cos(3 * u), 2 * u], abs=1e-8)
-
-
-def test_exact_the_starts_fill_the_cube_and_never_change():
-    one = spread_points(64, 1)[:, 0]
-    assert np.diff(np.sort(one)).max() < 2.7 / 64  # three distances at most, the largest phi^2 of the mean
-    assert np.unique(np.floor(4 * spread_points(64, 2)).astype(int), axis=0).shape[0] == 16
-    assert (spread_points(5, 3) == spread_points(9, 3)[:5]).all()
-
-
 @pytest.mark.slow
 def test_exact_intervals_of_a_decay_cover_its_truth_in_19_of_20():
     """2000 intervals of amplitude and rate; the binomial share of 0.95 has a deviation of 0.005."""
@@ -192,19 +166,3 @@ def test_exact_intervals_of_a_decay_cover_its_truth_in_19_of_20():
         found = fit(lambda v, data=data: v[0] * np.exp(-v[1] * LINE) - data, [0.01, 0.01], [30, 50])
         inside += sum(a <= x <= b for (a, b), x in zip(found.intervals, (1.0, 3.0)))
     assert 0.935 < inside / 2000 < 0.965
-
-
-@pytest.mark.parametrize(("scores", "ended"), [((1.0, 1.009), Outcome.DONE), ((1.0, 1.02), Outcome.NOT_CONVERGED),
-                                               ((1.0,), Outcome.NOT_CONVERGED)])
-def test_always_the_valley_judges_descents_that_ran_out_of_evaluations(scores, ended):
-    """None settled: two that end within 1 % of the least score found one valley; else the remark says why not."""
-    values, _, _, rest = linear(DESIGN, NOISY)
-    model = Counted(lambda v: DESIGN @ v - NOISY, space([-5, -5, -5], [5, 5, 5]))
-    u = model.space.unit(values)
-    assert model(u) is not None
-    ends = [Descent(u, score**2 * rest, False, model.rows) for score in scores]
-    for found in (answered(model, ends), answered(model, ends[:1], starts=ends)):
-        assert found.outcome is ended
-        said = [text for text in remarks(found, "abc") if "not converged" in text]
-        assert bool(said) == (ended is Outcome.NOT_CONVERGED)
-        assert all("100 evaluations, and no search from another start ended within 1 %" in text for text in said)

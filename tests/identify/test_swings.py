@@ -45,12 +45,6 @@ def test_intervals_hold(kind):
     assert len(held) > 30 and held.mean() > 0.9
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", [viscous, rubbed])
-def test_intervals_hold_on_many_seeds(kind):
-    assert (covered(kind, range(9100, 9180)).mean(axis=0) > 0.93).all()
-
-
 @pytest.mark.parametrize("name, power", [("displacement", 0), ("velocity", 1), ("acceleration", 2)])
 def test_exact_any_trace_tells_the_amplitude_of_the_displacement(name, power):
     """Without noise: a displacement A leaves A w in the velocity, A w^2 in the acceleration."""

@@ -1,7 +1,5 @@
 """Frequency and damping of a decay over its amplitude, from half swings without noise."""
 
-import warnings
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,21 +10,12 @@ from scipy.optimize import brentq
 import patchfem as pf
 from patchfem.campaigns.backbone.curves import backbone
 from patchfem.response.decay_curve import (
-    APART,
-    ROUND,
-    SPANS,
-    SURE,
-    DecayCurve,
     curve_of,
-    fit_slopes,
     last_swing,
     of_turns,
     turns,
     turns_from_outside,
 )
-from patchfem.runs.patch.result import solve_all
-from patchfem.runs.rig import decays
-from patchfem.runs.rig.decays import decay_of, left_by_mesh
 
 RELEASED = DRIVE[:DRIVE.index('kind')] + 'kind = "free"\ndisplacement = "2 mm"\ncycles = 30\n'
 
@@ -38,43 +27,6 @@ def test_exact_a_viscous_decay_has_one_frequency_and_one_ratio(zeta):
     assert found.damping == pytest.approx(zeta, rel=1e-9)
     assert found.frequency == pytest.approx(own / (2 * np.pi), rel=1e-12)
     assert found.amplitude.size > 6 and (np.diff(found.amplitude) < 0).all()
-
-
-def slope_at(values, noise, k):
-    """(slope, half-width, span) at one place, one span after the other, as `fit_slopes` has it at all places."""
-    room, found = min(k, values.size - 1 - k), []
-    for m in SPANS:
-        part, x = slice(k - m, k + m + 1), np.arange(-m, m + 1)
-        weight = x / (x @ x)
-        if m > room:
-            break
-        slope, spread = weight @ values[part], np.sqrt(weight**2 @ noise[part]**2)
-        if any(abs(slope - one) > APART * np.sqrt(max(wide**2 - spread**2, 0.0)) + ROUND * abs(one)
-               for one, wide, _ in found):
-            share = (m / found[-1][2])**2 - 1 if found[-1][1] else 1.0
-            bias = abs(slope - found[-1][0]) / share
-            break
-        found.append((slope, spread, m))
-    else:
-        raise AssertionError("a series longer than all spans")
-    slope, spread, m = found[-1]
-    if m == max(one for one in SPANS if one <= room):
-        bend = 0.0 if spread else abs(np.diff(values[k - 1:k + 2], 2)[0]) / 2
-        bias = bend if len(found) == 1 else max(abs(slope - found[-2][0]) - found[-2][1], 0.0)
-    return slope, SURE * spread + bias + ROUND * abs(slope), m
-
-
-@pytest.mark.parametrize("noise", [0.0, 0.03])
-@pytest.mark.parametrize("count", [3, 4, 5, 7, 8, 40, 500])
-def test_exact_slopes_at_all_places_at_once_are_those_of_one_place_after_the_other(count, noise):
-    """Straight at first, then bent, then with noise: spans of all lengths, and both ends."""
-    k, r = np.arange(count), np.random.default_rng(count)
-    for values in (k / 4, np.where(k < count // 2, k / 4, k / 4 + (k - count // 2)**2 / 64), k + 0.1 * r.random(count)):
-        found = fit_slopes(values, np.full(count, noise))
-        one = [slope_at(values, np.full(count, noise), place) for place in range(1, count - 1)]
-        assert found.slope == pytest.approx(np.array([each[0] for each in one]), rel=1e-13)
-        assert found.error == pytest.approx(np.array([each[1] for each in one]), rel=1e-9, abs=1e-13)
-        assert (found.span == [each[2] for each in one]).all()
 
 
 def viscous(zeta: float, omega: float, samples: int):
@@ -122,27 +74,6 @@ def test_order_turns_lie_between_samples_to_the_fourth():
         found = curve_of(of_turns(*turns(*viscous(0.01, 300.0, samples))))
         off.append(np.abs(found.damping - 0.01).max())
     assert off[0] < 1e-4 and 50 < off[0] / off[1] < 500
-
-
-def test_always_between_its_points_a_curve_holds_a_damping_that_rises_with_the_amplitude():
-    """Of half swings 1/(1 + b k) the decrement of half a cycle over a whole one at any size a is artanh(a b), whatever
-    the places of the half swings."""
-    b, k = 0.1, np.arange(41)
-    found = curve_of(of_turns(np.append(np.pi * k, 41 * np.pi), np.cumsum(np.append(0, (-1.0)**k / (1 + b * k)))))
-    a = np.sqrt(found.amplitude[1:] * found.amplitude[:-1])
-    read, fall = found.over(a), np.arctanh(2 * a * b)
-    law, straight = fall / np.hypot(np.pi, fall), (found.damping[1:] + found.damping[:-1]) / 2
-    assert found.damping == pytest.approx(np.arctanh(2 * found.amplitude * b) / np.hypot(
-        np.pi, np.arctanh(2 * found.amplitude * b)), rel=1e-12)
-    assert (np.abs(read.damping - law) <= read.damping_error).all()
-    assert np.abs(read.damping / law - 1)[1:-1].max() < 0.1 * np.abs(straight / law - 1)[1:-1].max()
-
-
-def test_always_a_curve_between_far_points_stays_between_their_values():
-    """Behind a stiff contact a decay jumps from slip to stick: cubics of any slope gave a frequency of -2 kHz there."""
-    a, f = np.array([3e-2, 2e-2, 3e-7, 2e-7, 1e-7]), np.array([100.0, 99.0, 6600.0, 6640.0, 6650.0])
-    found = DecayCurve(np.arange(5.0), a, f, 0 * f, f / 1e5, 0 * f).over(np.geomspace(1e-7, 3e-2, 50))
-    assert found.frequency.min() >= 99 and found.frequency.max() <= 6650 and found.frequency_error.max() > 500
 
 
 def test_exact_at_its_points_a_curve_is_itself_and_outside_there_is_none():
@@ -216,21 +147,6 @@ def test_a_release_of_an_iwan_joint_follows_its_balance():
         other = beside[f"quasi_static_{name}"].values[::-1]
         assert np.isfinite(bar).all() and (
             np.abs(ours - other) < bar + 4 * beside.quasi_static_damping.values[::-1] * other).all()
-
-
-def test_always_runs_that_do_not_reach_leave_no_point_and_no_warning_of_python():
-    """Of a coarser run and of the one beside it, both of which hold at once: their curves have no point."""
-    def run(amplitude: float, *coarser):
-        t, y, v = viscous(0.05, 300.0, 2000)
-        return SimpleNamespace(response=SimpleNamespace(time=t, output=amplitude * y, output_rate=amplitude * v),
-                               coarser=coarser, extra={})
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        found = decay_of(run(1.0, (run(0.0), run(0.0)), (run(1.0), None)))
-    assert found is None
-    same = decay_of(run(1.0, (run(1.0), None)))
-    assert same.damping == pytest.approx(0.05, rel=1e-4) and np.isfinite(same.damping_error).all()
 
 
 TWO_MODES = """[normal]
@@ -362,36 +278,6 @@ def test_a_release_says_what_its_errors_leave_out_of_the_mesh():
     assert not [one for one in pf.run(CROWNED, **{"drive.cycles": 10}).notes if one.startswith("the errors of")]
 
 
-@pytest.mark.parametrize("old, new, why", [
-    ("[contact.shear]", '[contact.shear]\n[contact.grooves]\nwavelength = "80 um"\namplitude = "2 um"',
-     "the contact slides on grooves"),
-    ("slide = 1.0", "slide = 1.0\nnormal = 0.1", "the normal load changes")])
-def test_where_no_static_loop_tells_the_error_of_the_mesh_there_is_a_reason(old, new, why):
-    scene = CROWNED.replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"').replace(old, new, 1)
-    error, said = left_by_mesh(pf.build(scene), None, None, np.array([1e-7, 1e-6]), int)
-    assert said == why and not error.any()
-
-
-def test_exact_errors_of_the_mesh_are_interpolated_where_no_static_motion_is_found(monkeypatch):
-    model, a = pf.build(CROWNED), np.geomspace(1e-8, 1e-6, 5)
-    patch, coarse, *_ = solve_all(model.patch, 1e-2)
-    best, _ = left_by_mesh(model, patch, coarse, a, lambda laws: 0)
-    rows, lost = decays.static_rows, np.array([2])
-
-    def gappy(*given):
-        found = rows(*given)
-        found[:, lost] = np.nan
-        return found
-
-    monkeypatch.setattr(decays, "static_rows", gappy)
-    found, said = left_by_mesh(model, patch, coarse, a, lambda laws: 0)
-    assert found == pytest.approx(np.where(np.arange(5) == 2, best[:, [1]] / 2 + best[:, [3]] / 2, best), rel=1e-9)
-    assert not said and best.all()
-    lost = np.arange(5)
-    found, said = left_by_mesh(model, patch, coarse, a, lambda laws: 0)
-    assert not found.any() and said == "no static curve of the mode was found at these amplitudes"
-
-
 @pytest.mark.parametrize("begin", [0.0, 100.0])
 def test_exact_a_turn_at_which_the_force_jumps_is_told_from_outside(begin):
     """Two parabolas that meet at their crests, of accelerations 1 and 3: the cubic across the jump is bent by it."""
@@ -406,12 +292,3 @@ def test_exact_a_turn_at_which_the_force_jumps_is_told_from_outside(begin):
     inner = np.array([int(np.argmin(np.abs(near - crest))) for crest in crests])
     assert np.abs(near[inner] - crests).min() > 2e-4
     np.testing.assert_allclose(exact[inner], crests, rtol=0, atol=1e-12 + 1e-13 * begin)
-
-
-def test_always_a_turn_that_round_off_lays_at_its_sample_stays_there():
-    """The last turn of samples at large times, whose speed is 0 to round-off: no later turn is taken for it."""
-    time, speed = 100 + 1e-3 * np.arange(6), np.array([1.0, 1.0, 1e-11, -1.0, -1.0, -1.0])
-    place = np.array([0.0, 1e-3, 1.5e-3, 1e-3, 0.0, -1e-3])
-    found, same = turns_from_outside(time, place, speed), turns(time, place, speed)
-    assert found[0].size == same[0].size == 1 and time[2] <= found[0][0] <= time[3]
-    np.testing.assert_array_equal(found[1], same[1])

@@ -82,11 +82,6 @@ def test_always_stated_errors_hold_the_true_error():
     assert coverage(6, 5, 6400) >= 0.95
 
 
-@pytest.mark.slow
-def test_always_stated_errors_of_many_scenes_hold_the_true_error():
-    assert coverage(40, 6) >= 0.95
-
-
 def values_at(*steps, order, size=1e-3):
     """Runs whose value is 1 with an error of size * h**order at each step h."""
     return [{NAME: 1 + size * h**order} for h in steps]
@@ -113,23 +108,6 @@ def test_always_an_irregular_sequence_is_held(seed):
     rng = np.random.default_rng(seed)
     errors = 2.0 ** (rng.uniform(1, 2, 400) * np.arange(3)[:, None]) * rng.uniform(-1, 1, (3, 400))
     assert np.mean(np.abs(errors[0]) <= convergence_error(errors[0] - errors[1], errors[1] - errors[2])) >= 0.95
-
-
-def test_exact_equal_values_of_two_runs_do_not_hide_the_change_before():
-    """The last two runs agree by chance: the earlier change counts, divided by 4, at first order."""
-    assert convergence_errors({NAME: 2.0}, {NAME: 2.0}, {NAME: 2.4})[NAME] == pytest.approx(SAFETY * 0.1)
-
-
-def test_exact_changes_of_either_sign_show_no_order():
-    assert convergence_errors({NAME: 1.0}, {NAME: 1.001}, {NAME: 0.998})[NAME] == pytest.approx(SAFETY * 1e-3)
-
-
-def test_exact_many_runs_at_once_are_judged_as_each_by_itself():
-    rng = np.random.default_rng(3)
-    last, before = rng.normal(size=(2, 200)) * 10 ** rng.uniform(-3, 0, (2, 200))
-    last[:2], before[:1] = 0.0, 0.0
-    assert convergence_error(last, before) == pytest.approx(
-        [convergence_error(*map(float, pair)) for pair in zip(last, before)])
 
 
 @pytest.mark.parametrize(("ratio", "order"), [(2.0, 1.0), (2.0, 2.0), (4.0, 2.0), (30.0, 1.0)])

@@ -1,6 +1,5 @@
 """The table of events: seen in samples, cut at its length, and the stick intervals between events."""
 
-import itertools
 
 import numpy as np
 import pytest
@@ -8,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.response import events
-from patchfem.response.events import Events, detected, states, sticks, table
+from patchfem.response.events import Events, detected, states, sticks
 from patchfem.response.run_events import of_a_cycle
 
 
@@ -59,12 +58,6 @@ def test_exact_borders_of_the_drive_and_two_interfaces_in_order():
     assert np.isnan(found.slide[border]).all() and np.isfinite(found.slide[~border]).all()
 
 
-def test_exact_only_the_last_events_are_kept_and_all_are_counted(monkeypatch):
-    monkeypatch.setattr(events, "MOST", 5)
-    found = table([(float(k), 1, events.STOP, 0.0) for k in range(12)])
-    assert found.time.tolist() == [7, 8, 9, 10, 11] and found.count == 12
-
-
 @given(st.floats(0.05, 0.4), st.floats(0, 1.3), st.floats(1.6, 3))
 def test_always_the_sticks_and_the_time_of_slip_fill_the_window(rest, begin, end):
     time, slip = stick_slip(rest=rest)
@@ -84,37 +77,6 @@ def test_exact_sticks_are_cut_where_another_interface_changes():
             (9, 1, events.RELEASE_DOWN), (9.5, 1, events.STOP)]
     found = Events(*(np.array(column) for column in zip(*rows)), np.zeros(6), 6)
     assert sticks(found, 0.0, 9.2, [True, True]) == [(2.0, 6.0), (7.0, 9.0)]
-
-
-def test_exact_an_interface_without_events_sticks_or_slides_all_the_time():
-    none = table([])
-    assert sticks(none, 1.0, 3.0, [False]) == [(1.0, 3.0)] and sticks(none, 1.0, 3.0, [True]) == []
-
-
-def test_exact_sticks_of_a_window_do_not_hang_on_when_the_list_begins():
-    """The sticks of a random list of events within a window, against a walk along all of the list."""
-    from patchfem.response.events import RELEASE_UP, REVERSAL_UP, STOP, sticks, table
-
-    r = np.random.default_rng(4)
-    for _ in range(30):
-        rows, time, moving = [], 0.0, [True, False]
-        for _ in range(60):
-            time += r.exponential()
-            number = int(r.integers(2))
-            kind = (int(r.choice([STOP, REVERSAL_UP])) if moving[number] else RELEASE_UP)
-            moving[number] = kind != STOP
-            rows.append((time, number + 1, kind, 0.0))
-        begin, end = 0.4 * time, 0.9 * time
-        marks, spans = sorted({begin, end, *(row[0] for row in rows if begin < row[0] < end)}), {}
-        for a, b in itertools.pairwise(marks):
-            state = []
-            for number, first in ((1, True), (2, False)):
-                before = [row[2] for row in rows if row[1] == number and row[0] <= a]
-                state.append(before[-1] != STOP if before else first)
-            if not state[0]:
-                spans.setdefault(tuple(state), []).append((a, b))
-        longest = max(spans.values(), key=lambda one: sum(b - a for a, b in one), default=[])
-        assert sticks(table(rows), begin, end, [True, False]) == longest
 
 
 def test_exact_sticks_of_one_cycle_are_whole():

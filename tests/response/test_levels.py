@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scene_texts import MODE, POINT, mistakes
+from scene_texts import MODE, POINT
 
 from patchfem.core import G_N
 from patchfem.response.levels import JUMP, Level, bracket, hysteresis, jump, past_onset
@@ -120,20 +120,6 @@ def test_exact_onset_of_a_force_drive_is_mu_n(method):
         (pytest.approx(n), "N") for n in (20, 5.5 * 4.4482216152605, 40, 50)]
     assert loads(text).resolved().count('levels = ["20.0 N", "24.46521888393') == 1
     assert loads(loads(text).resolved()).drive.levels == loads(text).drive.levels
-
-
-def test_refuses_levels_in_the_unit_of_the_other_drive():
-    text = RIG.format(law='law = "coulomb"', levels='["3 g"]', method="")
-    assert "drive.levels" in mistakes(text.replace('kind = "base"', 'kind = "force"'))[0]
-    assert "but a force is needed" in mistakes(text.replace('kind = "base"', 'kind = "force"'))[0]
-    assert "acceleration" in mistakes(text.replace("3 g", "3 N"))[0]
-    assert "drive.onset_length" in mistakes(text.replace('"slip"', '"gauge"'))[0]
-
-
-def test_exact_nothing_jumps_in_a_response_that_is_all_but_linear():
-    """The stuck spring of an elastic-plastic interface far below its limit: the amplitude follows the drive to 2e-4."""
-    found = measured('law = "elastic-plastic"\nbond_length = "1 um"', '["1 g", "1.5 g", "2 g", "1.5 g"]')[1]
-    assert found["jump_level"].value is None and "below 1.5 times" in found["jump_level"].reason
 
 
 def test_exact_levels_by_the_march_are_those_of_the_event_engine():

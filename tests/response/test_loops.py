@@ -74,24 +74,6 @@ def test_exact_loop_of_a_jenkins_element(amplitude, length):
                                                        abs=1e-12)
 
 
-def test_exact_stiffness_is_over_the_first_harmonic_of_the_slide():
-    """q = sin + 0.3 sin 3: F = 7 sin has Re F1/q1 = 7, whatever the range of the slide is (the bars of a balance)."""
-    t, phase = evenly(2, 400)
-    q, f = np.sin(phase) + 0.3 * np.sin(3 * phase), 7 * np.sin(phase)
-    found = loops.interface_loop(np.ptp(q) / 2, *coefficients(t, q, f), 0.0, 0.0)
-    assert found["equivalent_stiffness"] == pytest.approx(7.0, rel=1e-12)
-
-
-def test_exact_loop_measures_that_do_not_exist():
-    time, phase = evenly(1, 64)
-    ones = np.ones(phase.size)
-    still = loops.interface_loop(0.0, *coefficients(time, ones, np.sin(phase)), 0.0, 1.0)
-    assert still == {"loop_area": 0.0}
-    free = loops.interface_loop(1.0, *coefficients(time, np.sin(phase), np.cos(phase)), 2.0, 0.0)
-    assert set(free) == {"loop_area", "equivalent_stiffness"}
-    assert free["equivalent_stiffness"] == pytest.approx(0.0, abs=1e-12)
-
-
 @given(st.floats(0.1, 10), st.floats(-2, 2), st.floats(-3, 3), st.floats(-pi, pi))
 def test_always_loop_stiffness_ignores_offset_and_phase(amplitude, offset, slope, shift):
     time, phase = evenly(1, 128)
@@ -177,18 +159,6 @@ def test_exact_drift(count, samples):
     rate = OMEGA * (3e-6 * np.cos(phase + 0.3) + 2e-7 / (2 * pi))
     assert loops.drift(time, slide, rate, PERIOD) == pytest.approx(2e-7, rel=1e-9)
     assert loops.drift(time, np.full(time.size, 0.3), 0 * rate, PERIOD) == 0.0
-
-
-def test_exact_mean_of_cubics_over_any_samples():
-    time = np.sort(np.random.default_rng(5).uniform(0, 2, 30))
-    time[[0, -1]] = 0, 2
-    y, v = time**3 - time, 3 * time**2 - 1
-    assert loops.time_mean(time, y, v, 0.0, 2.0) == pytest.approx(1.0, rel=1e-13)
-
-
-def test_exact_drift_of_less_than_two_cycles():
-    time, phase = evenly(1, 50)
-    assert loops.drift(time, 2e-7 * phase / (2 * pi), 0 * time, PERIOD) == pytest.approx(2e-7, rel=1e-12)
 
 
 # scenes

@@ -5,9 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scene_texts import KILOGRAM
-from scipy.optimize import least_squares
 
-from patchfem.response import ringing as ringing_module
 from patchfem.response.ringing import ring, ringing
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
@@ -99,53 +97,6 @@ def test_exact_nothing_rings(own, zeta, size):
     """A forced sine alone, too few periods, a decay that hardly swings, a last digit, too few samples."""
     t = np.linspace(0, 1.0, 301)
     assert ring(t, signal(t, 2 * np.pi * 3, own, zeta, size), 2 * np.pi * 3) is None
-
-
-def slopes_counted(monkeypatch) -> list:
-    """Grows by the steps of each fit."""
-    seen, own = [], ringing_module._fitted
-
-    def counted(*given):
-        found = own(*given)
-        seen.append(found[0] if len(given) > 4 else 0)
-        return found
-
-    monkeypatch.setattr(ringing_module, "_fitted", counted)
-    return seen
-
-
-@pytest.mark.parametrize(("periods", "zeta"), [(0.5, 4.5e-4), (0.25, 4.5e-4), (0.9, 0.02), (1.2, 0.01)])
-def test_always_half_a_ring_is_refused_at_little_cost(monkeypatch, periods, zeta):
-    """A stick of a quarter to 1.2 periods of the block: once it is fitted, neither its last digits nor a second
-    start are sought (28 to 55 steps before)."""
-    seen, t = slopes_counted(monkeypatch), np.linspace(0, 1.0, 31)
-    assert ring(t, signal(t, 0.4, 2 * np.pi * periods, zeta, 3.0), 0.4) is None
-    assert 0 < sum(seen) <= 12
-
-
-@given(st.floats(1.7, 12), st.floats(0.005, 0.1), st.integers(0, 10**6))
-def test_exact_a_fit_ends_at_the_least_squares_of_a_noisy_ring(periods, zeta, seed):
-    """The minimum of all six numbers at once, by another method: no earlier end moves it by 1e-4 of the error."""
-    t, noise = np.linspace(0, 1.0, 121), np.random.default_rng(seed).normal(size=121)
-    values = signal(t, 3.0, 2 * np.pi * periods, zeta) + 1e-4 * noise
-    own = 2 * np.pi * periods
-    rate = zeta * own / np.sqrt(1 - zeta**2)
-    forced = np.column_stack([np.ones(t.size), np.cos(3 * t), np.sin(3 * t)])
-    poles, sigma, _ = ringing_module._refined(t, values, forced, np.array([1.02 * own, 1.1 * rate]), 1e-9)
-
-    def left(at):
-        fall = np.exp(-at[1] * t)
-        columns = np.column_stack([forced, fall * np.cos(at[0] * t), fall * np.sin(at[0] * t)])
-        return values - columns @ np.linalg.lstsq(columns, values, rcond=None)[0]
-
-    best = least_squares(left, [own, rate], method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14, x_scale=[own, rate])
-    assert np.all(np.abs(poles - best.x) < 1e-4 * sigma)
-
-
-def test_exact_a_steady_line_at_a_harmonic_of_the_drive_is_forced():
-    t = np.linspace(0, 2.0, 801)
-    assert ring(t, signal(t, 10.0, 50.0, 0.0), 10.0) is None
-    assert ring(t, signal(t, 10.0, 53.0, 0.0), 10.0) is not None
 
 
 def test_exact_the_median_over_sticks_outvotes_a_stray_one():

@@ -58,12 +58,6 @@ def test_exact_root_mean_squares_in_closed_form_are_integrals(zeta, band):
     assert shaken_rms(omega, zeta, 1.0, band) == pytest.approx(np.sqrt(squares), rel=1e-9)
 
 
-def test_exact_white_noise_gives_the_root_mean_squares_of_the_textbook():
-    omega, zeta = 2 * np.pi * 100, 0.02
-    assert shaken_rms(omega, zeta, 2.0, (0.0, np.inf)) == pytest.approx(
-        np.sqrt([2 / (8 * zeta * omega**3), 2 * omega * (1 + 4 * zeta**2) / (8 * zeta)]), rel=1e-12)
-
-
 @pytest.mark.parametrize("count", [16, pytest.param(200, marks=pytest.mark.slow)])
 def test_closed_forms_lie_inside_the_scatter_of_records(count):
     """200 records of the first case: the intervals of 95 % hold the truth of 95 % less three standard deviations."""

@@ -6,13 +6,10 @@ import numpy as np
 import pytest
 
 from patchfem.core import Missing
-from patchfem.friction.bonds.parameters import LONGEST, Bonds
-from patchfem.friction.bonds.quadrature import Quadrature
+from patchfem.friction.bonds.parameters import LONGEST
 from patchfem.friction.record import loop_from
 from patchfem.model.model import build
-from patchfem.response.measures import work_check
 from patchfem.runs.bench import bench
-from patchfem.runs.bench.engine import bench_engine, strokes
 from patchfem.runs.bench.ledger import BLOCK, UNWATCHED, Watch
 from patchfem.runs.bench.stepped import stepped
 from patchfem.runs.patch.ladder import solve_all
@@ -81,15 +78,6 @@ def test_exact_a_list_of_bonds_is_the_numpy_sum_within_its_stated_error(reading,
     assert np.abs(one.ledger - two.ledger).max() <= 3 * error * np.abs(np.diff(two.ledger[0])).sum()
 
 
-@pytest.mark.slow
-def test_exact_samples_at_the_place_of_the_first_bonds_cost_no_work():
-    """Every fourth of a sine stands there; the printed force jumps, and its mean over a step beside it must not."""
-    for keys in ("order = 0\n", 'reading = "report"\norder = 2\n'):
-        one, two = both(model_of(BONDS + keys, "small", "accuracy.quadrature=direct"), 100)
-        power = np.abs(np.diff(two.ledger[0])).sum()
-        assert one.ledger == pytest.approx(two.ledger, abs=1e-6 * power)
-
-
 @pytest.mark.parametrize("law", ["coulomb that holds more", "averaged", "elastic-plastic", "growing"])
 def test_exact_frames_of_a_patch_are_those_of_its_points(law):
     model = model_of(EXACT[law], "sine", where=PATCH)
@@ -100,16 +88,6 @@ def test_exact_frames_of_a_patch_are_those_of_its_points(law):
     assert one.force == pytest.approx(two.force, abs=1e-12 * np.abs(two.force).max())
     assert one.tau == pytest.approx(two.tau, abs=1e-12 * top)
     assert one.local == pytest.approx(two.local, abs=1e-17)
-
-
-@pytest.mark.slow
-def test_exact_a_long_list_of_bonds_finds_room():
-    """Steps of two bond lengths with nothing cut off or merged: far more strips than a list begins with."""
-    model = model_of(BONDS + "order = 2\n", "sine", "accuracy.quadrature=direct", "slide.amplitude=3 mm",
-                     "slide.cycles=1")
-    one, two = (bench.run(model, None, steps) for steps in (6000, 12000))
-    assert one.engine.name == "bench, direct bond list"
-    assert one.values["friction_work"] == pytest.approx(two.values["friction_work"], rel=1e-4)
 
 
 # ---- what runs, and what it says of itself
@@ -128,23 +106,6 @@ def test_exact_a_plan_names_the_engine_that_runs(law, where, name):
     result = run(what, estimate=False)
     assert what.engine == result.extra["engine"] == result.response.engine.name == f"bench, {name}"
     assert ("bond_list_about" in what.unknowns) == name.endswith("list")
-
-
-def test_exact_strokes_are_counted_between_reversals():
-    assert strokes(np.array([0.0, 1, 1, 2, 3, 1, 0, 0, -1, 2])) == pytest.approx((10 / 3, 7 / 3))
-
-
-def test_always_short_strokes_are_summed_as_finely_as_their_force_is_small():
-    wide, short = (bench_engine(model, model.slide.samples(400)[1]).choice for model in
-                   (model_of(BONDS + "order = 2\n", slide) for slide in ("sine", "small")))
-    assert short.error < 0.2 * wide.error
-
-
-def test_always_pinned_keys_of_the_sum_are_kept():
-    model = model_of(BONDS + "order = 2\n", "sine", "accuracy.quadrature=merged", "accuracy.merge=0.1",
-                     "accuracy.tail=1e-5")
-    found = bench_engine(model, model.slide.samples(400)[1]).choice
-    assert (found.engine, found.merge, found.tail) == ("merged", 0.1, 1e-5)
 
 
 def test_refuses_a_list_that_takes_too_long_and_merging_where_none_is():
@@ -204,57 +165,10 @@ def test_always_an_interrupt_ends_a_bench_between_two_blocks():
 
 # ---- two books of energy
 
-def test_exact_a_wrong_book_is_seen_and_a_right_one_is_second_order():
-    """int cos dq over a quarter of a turn; the book is off by one part in a hundred."""
-    off = []
-    for steps in (50, 100):
-        q = np.linspace(0, np.pi / 2, steps + 1)
-        pairs = [(q, np.cos(q))]
-        off.append(work_check(np.sin(q), pairs))
-        assert work_check(1.01 * np.sin(q), pairs) == pytest.approx(0.01 / 1.01, abs=1e-4)
-    assert off[0] < 1e-4 and off[0] / off[1] == pytest.approx(4, abs=0.1)
-    assert work_check(np.zeros(3), [(np.zeros(3), np.ones(3))]) == 0.0
-
 
 def test_exact_a_jump_of_the_force_at_a_turn_costs_the_check_nothing():
     for law in ("coulomb", "coulomb that holds more"):
         assert bench.run(model_of(EXACT[law], "sine"), None, 40).values["work_check"] < 1e-13
-
-
-@pytest.mark.slow
-def test_exact_bonds_that_lose_their_pressure_give_nothing_back():
-    """A step into a place without pressure: the mean is that of the force along it, as of many short steps under the
-    same pressures; what the bonds stored is dissipated."""
-    law = Quadrature(Bonds(1.0, 1.0, 0.5, initial=0.7), 0.0)
-    one, state = np.ones(1), law.start(np.ones(1))
-    for _ in range(20):
-        state = law.carried(state, 0.1, one, one, 1.0)
-    last = law.step(state, 0.05, one, 0 * one, 1.0)
-    work, part, count = 0.0, state, 250
-    for k in range(count):
-        s0, s1 = one * (1 - k / count), one * (1 - (k + 1) / count)
-        step = law.step(part, 0.05 / count, s0, np.maximum(s1, 1e-9), 1.0)
-        work, part = work + step.mean[0] * 0.05 / count, step.state
-    assert last.mean[0] * 0.05 == pytest.approx(work, rel=1e-3)
-    assert last.dissipated[0] == pytest.approx(law.stored(state)[0] + last.mean[0] * 0.05, rel=1e-12)
-    assert law.stored(last.state)[0] == 0
-
-
-@pytest.mark.slow
-def test_exact_work_over_a_pressure_that_stays_below_is_the_trapezoid_of_its_force():
-    """Orders other than 1 lose bonds at the edges of the contact; energy_balance cannot see what becomes of theirs."""
-    text = PATCH.replace("0.02 mrad", "0.0957 mrad").replace("12.7 mm", "4 mm").replace(
-        '"0.5 mm"', '"0.16 mm"') + 'on = "lower"\n' + FRICTION + \
-        'law = "nonlocal"\nbond_length = "61.45 um"\norder = 0.5\ninitial_bonds = 0.657\n' \
-        '[slide]\nkind = "sine"\namplitude = "184.6 um"\nfrequency = "10 Hz"\ncycles = 2\n'
-    model = build(loads(text))
-    patch = solve_all(model.patch, 1e-3, False)[0]
-    found = [bench.run(model, patch, steps) for steps in (40, 80, 160)]
-    check = [one.values["work_check"] for one in found]
-    assert check[0] / check[1] > 2.5 and check[1] / check[2] > 2.5 and check[2] < 1.1e-3
-    fine = found[-1]
-    assert fine.values["friction_work"] == pytest.approx(np.trapezoid(fine.force, fine.slide), rel=2e-3)
-    assert fine.values["energy_created"] == 0
 
 
 @pytest.mark.parametrize("chi, beta, slide", [(-0.4, 0.5, 2e-7), (-0.4, 0.5, 2e-9), (0.0, 0.0, 2e-7), (-0.9, 2.0, 1e-5),

@@ -6,18 +6,15 @@ import numpy as np
 import pytest
 from command_line import cli
 from friction_forms import steady_bond_length
-from hypothesis import given
-from hypothesis import strategies as st
 from scene_texts import COULOMB, PLASTIC, POINT, SHEAR, SLIDE, SMALL_PATCH
 from scipy.integrate import quad, solve_ivp
 
-from patchfem.core import Missing, PatchfemError
-from patchfem.inputs.paths import read_path
+from patchfem.core import PatchfemError
 from patchfem.model.model import build
 from patchfem.runs.bench import bench
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
-from patchfem.scene.scene import SceneError, load, loads
+from patchfem.scene.scene import load, loads
 
 SPEED, LENGTH, RATIO, A_S, L_K, FLOOR = 1e-3, 2e-6, 0.5, 2e-6, 1e-6, 1e-6
 NONLOCAL = """[friction]
@@ -88,13 +85,6 @@ def test_exact_the_dwell_is_slide_rest_slide():
     assert slide[1:][rest] == pytest.approx(40e-6, rel=1e-12)
 
 
-@pytest.mark.parametrize("key, legs", [("slide.hold=0 s", 2), ("slide.distance_after=0 m", 2)])
-def test_exact_a_leg_without_duration_is_left_out(key, legs):
-    time, slide, *_ = build(loads(POINT + NONLOCAL + DWELL, sets=[key])).slide.samples(100)
-    assert (np.diff(time) > 0).all()
-    assert np.count_nonzero(np.diff(np.diff(slide) / np.diff(time) > SPEED / 2)) == (1 if "after" in key else 0)
-
-
 @pytest.mark.parametrize("hold", [0.0, 0.03, 0.3, 3.0])
 def test_exact_the_breakaway_follows_the_growth_at_rest(hold):
     """The peak after the rest over mu_s N, against the same law integrated by a Runge-Kutta method of order 8."""
@@ -116,25 +106,6 @@ def test_order_of_the_restart_is_two():
     assert miss[1:] == pytest.approx([miss[0] / 4, miss[0] / 16], rel=0.02) and miss[2] < 2e-6
 
 
-def test_exact_nothing_moves_at_rest_and_longer_rest_is_stronger():
-    peaks = []
-    for hold in (0.01, 0.1, 1.0):
-        found = sliding(POINT + NONLOCAL + DWELL, f"slide.hold={hold} s")
-        rest = np.flatnonzero(np.diff(found.slide) == 0)
-        assert rest.size and np.ptp(found.force[rest[0]:rest[-1] + 2]) == 0
-        assert found.values["energy_balance"] < 1e-12
-        peaks.append(found.force[rest[-1]:].max())
-    assert peaks[0] < peaks[1] < peaks[2] < 0.3 * 115.66
-
-
-@pytest.mark.parametrize("sets", [["friction.order=0"], ["friction.order=1", "friction.initial_bonds=0"]])
-def test_exact_the_direct_quadrature_rests_alike(sets):
-    """With p = 0 the force obeys the same equation as with p = 1 once the first bonds are forgotten."""
-    found = sliding(POINT + NONLOCAL + DWELL, *sets, "accuracy.steps_per_cycle=1600")
-    after = found.force[found.slide >= 39.999e-6] / (0.3 * found.load[0])
-    assert after.max() == pytest.approx(breakaway(0.3)[0], rel=1e-3)
-
-
 @pytest.mark.parametrize("order", [0, 1])
 def test_exact_the_printed_law_grows_its_force_at_rest(order):
     """Every bond grows its own length from 0 on the way and then at rest; the force is their sum, by quadrature."""
@@ -151,15 +122,6 @@ def test_exact_the_printed_law_grows_its_force_at_rest(order):
         truth = quad(force, 0, 40e-6, epsabs=1e-16, epsrel=1e-10, limit=400)[0] / LENGTH
         assert found.force[k] / (0.3 * found.load[0]) == pytest.approx(truth, rel=2e-5)
     assert found.force[rest[-1] + 1] > 1.2 * found.force[rest[0]]
-
-
-@pytest.mark.parametrize("friction", [COULOMB, ELASTIC])
-def test_exact_a_law_without_age_forgets_the_rest(friction):
-    found = sliding(POINT + friction + DWELL)
-    rest = np.flatnonzero(np.diff(found.slide) == 0)
-    assert found.force[rest[0]:rest[-1] + 2] == pytest.approx(0.3 * found.load[0], rel=1e-12)
-    assert found.values["friction_ratio_end"] == pytest.approx(0.3, rel=1e-12)
-    assert "has no effect" in loads(POINT + friction + DWELL).remarks[-1]
 
 
 def test_exact_points_behind_the_shear_see_the_true_hold():
@@ -194,42 +156,6 @@ def test_exact_a_table_of_the_corners_is_the_triangle(table):
     assert "dissipated_energy_per_cycle" not in one.values
 
 
-def test_exact_a_table_with_a_rest_is_the_dwell(table):
-    scene = table("displacement [mm], time [s]\r\n0, 0\r\n0.04, .04\r\n.04, 34e-2\r\n+0.06, 0.36\r\n\r\n", NONLOCAL,
-                  "accuracy.steps_per_cycle=600")
-    found = bench.run(build(scene), None, 600)
-    other = sliding(POINT + NONLOCAL + DWELL, steps=600)
-    assert found.force == pytest.approx(other.force, rel=1e-9)
-    assert found.values == pytest.approx(other.values, rel=1e-9, abs=1e-12)
-
-
-def test_always_more_steps_than_rows_and_rows_are_samples(table):
-    time = np.linspace(0, 0.05, 301)
-    rows = "\n".join(f"{t!r},{10e-6 * math.sin(2 * math.pi * 20 * t)!r}" for t in time.tolist())
-    model = build(table("time [s],displacement [m]\n" + rows, NONLOCAL, "accuracy.steps_per_cycle=4"))
-    for parts in (1, 2, 4):
-        t, q, *_ = model.slide.samples(steps_of(model) // parts)
-        at = np.searchsorted(t, time - 1e-12)
-        assert t[at] == pytest.approx(time, abs=1e-15) and np.diff(at).min() >= 8 // (2 * parts)
-        assert q[at] == pytest.approx(10e-6 * np.sin(2 * np.pi * 20 * time), abs=1e-18)
-    assert model.speed == pytest.approx(2 * np.pi * 20 * 10e-6, rel=1e-3)
-
-
-@given(st.lists(st.tuples(st.floats(1e-6, 10), st.floats(-1e-3, 1e-3)), min_size=1, max_size=20),
-       st.integers(1, 500))
-def test_always_the_corners_stand_in_the_cut_path(legs, steps):
-    from patchfem.model.slide import _cut
-
-    time = np.append(0, np.cumsum([leg[0] for leg in legs]))
-    slide = np.append(0, [leg[1] for leg in legs])
-    if not slide.any():
-        return
-    t, q = _cut(time, slide, steps)
-    assert (np.diff(t) > 0).all() and np.isin(time, t).all() and t[-1] == time[-1]
-    assert np.abs(np.diff(q)).sum() == pytest.approx(np.abs(np.diff(slide)).sum(), rel=1e-9)
-    assert q[np.searchsorted(t, time)].tolist() == slide.tolist()
-
-
 HEAD = "time [s],displacement [um]\n"
 
 
@@ -250,18 +176,6 @@ def test_refuses_a_broken_table_by_line(table, text, says):
     with pytest.raises(PatchfemError) as error:
         plan(scene)
     assert "path.csv" in str(error.value) and says in str(error.value)
-
-
-def test_refuses_a_missing_table(table, tmp_path):
-    with pytest.raises(Missing, match="no such path"):
-        read_path(tmp_path / "none.csv")
-    with pytest.raises(SceneError) as error:
-        table(HEAD, COULOMB, "slide.file=none.csv")
-    assert "slide.file: there is no file" in str(error.value)
-    line = (tmp_path / "scene.toml").read_text().split("\n").index('file = "path.csv"') + 1
-    (tmp_path / "path.csv").unlink()
-    with pytest.raises(SceneError, match=f"scene.toml:{line}: slide.file: there is no file"):
-        load(tmp_path / "scene.toml")
 
 
 @pytest.mark.parametrize("kind", ["dwell", "file"])
@@ -293,14 +207,6 @@ def test_exact_coulomb_breaks_away_at_its_static_friction():
     assert run_.values["friction_work"] == pytest.approx(0.2 * load * 60e-6, rel=1e-12)
 
 
-def test_exact_the_printed_law_warns_where_bonds_break_before_they_ripen():
-    """a = ell/eps at 1 mm/s: 1/ell = a_s/v^2 + 1/l_k, with l_k = 1 um and eps_k = 1 um about 1; l_k = 0.1 um: 0.1."""
-    fast = POINT + NONLOCAL + 'reading = "report"\n' + DWELL
-    found = [run(plan(loads(fast, sets=sets)), estimate=False).warnings
-             for sets in ([], ["friction.slip_growth=0.1 um"], ["friction.reading=stretch"])]
-    assert [any("of its length while it forms" in line for line in lines) for lines in found] == [True, False, False]
-
-
 @pytest.mark.parametrize("speed", ["1e-160 m/s", "1e-300 m/s"])
 @pytest.mark.parametrize("keys", ["", 'reading = "report"\n'])
 def test_exact_endlessly_slow_slides_are_those_of_full_grown_bonds(speed, keys, recwarn):
@@ -315,11 +221,3 @@ def test_refuses_a_slide_of_more_steps_than_memory_holds(tmp_path):
                      "cycles = 1e9\n")
     answer = cli("plan", scene)
     assert answer.code == 4 and "lower slide.cycles" in answer.err
-
-
-def test_refuses_a_broken_path_before_anything_runs(tmp_path):
-    scene = tmp_path / "a.toml"
-    scene.write_text(POINT + COULOMB + '[slide]\nkind = "file"\nfile = "p.csv"\n')
-    (tmp_path / "p.csv").write_text("time [s],displacement [um]\n0,0\n1,x\n")
-    answer = cli("check", scene)
-    assert answer.code == 2 and "p.csv:3: displacement: 'x' is not a finite number" in answer.err

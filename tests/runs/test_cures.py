@@ -1,22 +1,18 @@
 """The cures that warnings and notes name: that each acts as it is printed, of 200 scenes by chance, of a patch, of
 steps that are too few and of bolted joints that hold; and that what a run answers first is named before all else."""
 
-import re
-from dataclasses import replace
 
 import pytest
 from remedies import drawn, ran, remedies_of, verdict
-from scene_texts import DRIVE, JOINT, JOINT_SHAKEN, MODE, NONLOCAL, POINT, SMALL_PATCH
+from scene_texts import DRIVE, JOINT, JOINT_SHAKEN, MODE, NONLOCAL, POINT
 
 from patchfem.core import Measure
 from patchfem.model.model import build
 from patchfem.runs.accuracy_warnings import Finding, tolerance_warnings
-from patchfem.runs.patch import ladder
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
-PATCH = SMALL_PATCH.replace('element_size = "0.5 mm"\n', "")
 SHAKEN = POINT + NONLOCAL + MODE + DRIVE
 FEW = "[accuracy]\ntolerance = 1e-2\nsteps_per_cycle = 16\n"
 BENCH = JOINT + """[slide]
@@ -30,9 +26,6 @@ steps_per_cycle = {steps}
 """
 EVERY_TIME = 10, 18, 31, 33, 34, 45, 78, 89, 116, 117, 144, 150, 163, 175  # the cheapest, of every kind
 FAILED = 460, 482, 484, 725, 746  # of 500 more
-BOWED = """[contact.crown]
-radius = "100 m"
-"""
 
 
 def ran_text(text: str):
@@ -49,43 +42,6 @@ def test_always_a_printed_remedy_does_what_it_promises(seed):
     said = [] if found is None else [*found.warnings, *found.extra.get("notes", [])]
     done = [(verdict(tables, found, one), *one) for sentence in said for one in remedies_of(sentence)]
     assert not [one for one in done if one[0] in ("failed", "refused")]
-
-
-@pytest.mark.slow
-def test_exact_a_tolerance_that_is_advised_climbs_and_none_is_where_the_ladder_ends():
-    asked, tolerance, nodes = replace(build(loads(PATCH)).patch, still=False), 1e-2, []
-    while tolerance is not None:
-        found = ladder.climb(asked, tolerance)
-        nodes.append(found[0].x.size)
-        tolerance = ladder.climbs_at(asked, found, tolerance)
-    assert len(nodes) > 1 and nodes == sorted(set(nodes))
-    assert ladder.climb(asked, 1e-6)[0].x.size == nodes[-1]
-
-
-@pytest.mark.slow
-def test_always_a_mesh_at_its_cap_is_not_refined_by_a_tolerance(monkeypatch):
-    """A measure for which no mesh is chosen misses the tolerance beside the peak: no tolerance refines it."""
-    monkeypatch.setattr(ladder, "MAX_SECONDS", {True: 0.0, False: 0.0})
-    found = run(plan(loads(PATCH + '[contact.upper]\nchamfer = "0.2 mm"\n[accuracy]\ntolerance = 1e-6\n')))
-    said = [text for text in found.warnings if "the tolerance is 1e-6" in text]
-    wide = {name: one.error / abs(one.value) for name, one in found.measures.items() if one.value and one.error}
-    assert max(wide, key=wide.get) != "contact_fraction"  # and yet that is what a patch answers first
-    assert len(said) == 1 and said[0].startswith("contact_fraction has an estimated error of ")
-    assert f"the mesh ({found.patch.x.size} interface nodes) causes this error; the next mesh would take" in said[0]
-    assert said[0].endswith("; no accuracy.tolerance leads to a finer mesh; use the value with its stated error")
-
-
-def test_exact_a_mesh_that_no_tolerance_refines_is_told_with_the_seconds_of_the_next(monkeypatch):
-    """"Too long" stood there for a loop of 4 nJ whose next mesh takes a second or two."""
-    monkeypatch.setattr(ladder, "MAX_SECONDS", {True: 1e-3, False: 1e-3})
-    flat = PATCH + '[contact.shear]\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\nkind = "sine"\n' \
-        'amplitude = "65 nm"\nfrequency = "1 Hz"\n[accuracy]\ntolerance = 1e-4\n'
-    found = run(plan(loads(flat)))
-    said = [text for text in found.warnings if "interface nodes) causes this" in text]
-    seconds = ladder.next_seconds(found.patch)
-    told = [float(re.search(r"would take about (\S+) CPU s, and at most 0.001 CPU s are spent", text)[1])
-            for text in said]  # of the ladder of the static measures, and of that of the motion
-    assert 0.001 < seconds < 5 and told[-1] == pytest.approx(seconds, rel=0.05) and len(told) == 2
 
 
 def test_always_steps_that_are_left_out_cure_what_few_steps_do_not_show():
@@ -122,19 +78,6 @@ def test_exact_a_joint_that_holds_has_the_stiffness_of_its_pieces(steps):
     secant, elastic = (found.measures[name] for name in ("secant_stiffness", "tangential_stiffness"))
     assert abs(secant.value - elastic.value) <= secant.error + elastic.error
     assert secant.error <= 2e-3 * secant.value and not found.warnings
-
-
-def test_always_what_the_mesh_leaves_open_is_not_laid_on_the_steps():
-    """The edge slip of a bowed joint does not change with the steps; a finer mesh, as advised, tells it better."""
-    bench = BENCH.format(steps=100) + BOWED
-    first = ran_text(bench.replace("tolerance = 1e-2", "tolerance = 1e-3"))
-    said = [text for text in first.warnings if text.startswith("friction_ratio_end")]
-    assert len(said) == 1 and "steps_per_cycle" not in said[0] and "interface nodes) causes this" in said[0]
-    advised = re.search(r"accuracy.tolerance = (\S+) for a finer mesh", said[0])[1]
-    again = ran_text(bench.replace("tolerance = 1e-2", f"tolerance = {advised}"))
-    for name in ("friction_ratio_end", "loop_area"):
-        assert again.measures[name].error <= 0.51 * first.measures[name].error
-        assert abs(again.measures[name].value - first.measures[name].value) < first.measures[name].error
 
 
 def test_always_a_ring_that_steps_do_not_resolve_is_followed_without_them():

@@ -4,23 +4,13 @@ Each reference is the largest of the same scene's motions under sines, found by 
 frequency. The seeds from 71_000_000 on were drawn for no other use.
 """
 
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import minimize_scalar
 
 import patchfem as pf
-from patchfem.core import BaseSine
-from patchfem.export.pages import peaks
-from patchfem.response.outcome import goes_on, settled
-from patchfem.response.settling import CLASSES, steady_amplitudes, windows_of
-from patchfem.runs.rig import rig
-from patchfem.runs.rig.steady import curves
-from patchfem.runs.rig.steady.curves import Followed, Shown
-from patchfem.runs.rig.steady.top import highest
 from patchfem.scene.starting import text_of
-from patchfem.structure.drives import Sweep
 
 LAWS = ("none", "coulomb", "elastic-plastic", "chain", "iwan", "bouc-wen")
 FIRST, COUNT = 71_000_000, 30
@@ -108,80 +98,8 @@ def test_always_the_peak_of_a_random_rig_is_within_its_bars(seed):
     assert [one for one in outside(seed) if one[1] > 1] == []
 
 
-@pytest.mark.slow
-def test_always_peaks_between_cases_hold_19_times_of_20():
-    """Of cases of a swept frequency 0.08, 0.2 or 0.35 of the half-power width apart, from a random place on."""
-    held = []
-    for seed in range(72_000_000, 72_000_030):
-        if LAWS[seed % len(LAWS)] in ("iwan", "bouc-wen"):
-            continue
-        curve, at = swept(seed)
-        (f0, f_open), (h0, h_open) = ((curve.measures[one].value, curve.measures[one].error)
-                                      for one in ("peak_frequency", MAIN[0]))
-        f, y = curve.extra["curve"]["frequency"], curve.extra["curve"]["amplitude"]
-        low, high = f[(f < f0) & (y < h0 / 2**0.5)], f[(f > f0) & (y < h0 / 2**0.5)]
-        if not (low.size and high.size and f.min() < f0 < f.max()):
-            continue
-
-        def height(x, at=at):
-            return at(float(x)).measures[MAIN[0]].value
-        ends = [brentq(lambda x, height=height, h0=h0: height(x) - h0 / 2**0.5, a, b, xtol=1e-6)
-                for a, b in ((low.max(), f[f > low.max()].min()), (f[f < high.min()].max(), high.min()))]
-        width, r = ends[1] - ends[0], np.random.default_rng(seed)
-        for share in (0.08, 0.2, 0.35):
-            step, count = width * share * r.uniform(0.7, 1.3), int(2 / share)
-            x = f0 + step * (np.arange(-count, count + 1) + r.uniform(-0.5, 0.5))
-            values = np.array([height(one) for one in x[x > 0]])
-            (place, off), _, (top, above), (wide_, apart) = peaks._peak(x[x > 0], values, 0 * values)
-            held.append((abs(place - f0) <= off + f_open, abs(top - h0) <= above + h_open,
-                         not abs(wide_ - width) > apart + 2e-6))
-    assert len(held) > 40 and np.mean(held, axis=0).min() >= 0.95
-
-
-class Lines:
-    """A finder of points of a curve y(f) of which `lasts` tells where it is stable."""
-
-    leaves = 1e-2, 0.1
-    apart, count = Followed.apart, 0
-
-    def __init__(self, y, lasts=lambda f: True):
-        self.y, self.lasts = y, lasts
-
-    def at(self, f):
-        self.count += 1
-        values = {MAIN[0]: self.y(f)} if np.isfinite(self.y(f)) else {}
-        return Shown(BaseSine(1.0, f), values, {}, "", 0.0, self.lasts(f), "steady")
-
-    def between(self, one, other, share):
-        return self.at(one.drive.omega + share * (other.drive.omega - one.drive.omega))
-
-
 def mode(f):
     return 1 / np.abs(1 - f**2 + 0.02j * f)
-
-
-@pytest.mark.parametrize(("y", "lasts", "place"), [
-    (mode, lambda f: True, np.sqrt(1 - 2e-4)), (lambda f: 1 - abs(f - 0.98765), lambda f: True, 0.98765),
-    (mode, lambda f: f < 0.993, 0.993), (lambda f: np.minimum(mode(f), 30 + 200 * (1 - f)), lambda f: True, None),
-    (mode, lambda f: f > 1.011, 1.011)], ids=["mode", "kink", "until", "cut", "from"])
-@pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
-def test_exact_the_top_of_a_curve_is_closed_in(y, lasts, place, tolerance):
-    finder, fine = Lines(y, lasts), np.linspace(0.9, 1.1, 2_000_001)
-    points = [finder.at(f) for f in np.linspace(0.9, 1.1, 81)]
-    top = highest(points, finder, tolerance)
-    here, most = top.points[top.best], np.max(y(fine), where=lasts(fine) * np.ones(fine.size, bool), initial=0)
-    missed = most - here.values[MAIN[0]]
-    assert -1e-10 <= missed <= top.above + 1e-9 <= 1.1e-2 * tolerance * most and finder.count < 81 + 40
-    place = fine[np.argmax(np.where(lasts(fine), y(fine), 0))] if place is None else place
-    assert abs(here.drive.omega - place) < 1e-3 * tolerance / 1e-2
-
-
-def test_exact_a_top_beside_a_hole_is_not_known_and_one_at_an_end_is():
-    finder = Lines(lambda f: np.nan if abs(f - 1) < 1e-9 else 1 / abs(1 - f**2))
-    assert highest([finder.at(f) for f in np.linspace(0.9, 1.1, 21)], finder, 1e-3).above == np.inf
-    finder = Lines(lambda f: 2 - f)
-    top = highest([finder.at(f) for f in np.linspace(0.9, 1.1, 21)], finder, 1e-3)
-    assert (top.best, finder.count) == (0, 21) and top.above < 1e-15
 
 
 def test_exact_a_stuck_curve_has_the_peak_of_its_held_structure():
@@ -230,57 +148,3 @@ def test_always_a_steady_run_tells_where_it_still_goes(seeds):
         else:
             told.append(abs(steady.value - truth.value) <= steady.error + truth.error)
     assert np.mean(told or [1]) >= (0.9 if len(told) > 9 else 1)
-
-
-def test_exact_a_step_to_where_it_settles():
-    """Cycles of amplitude 1 + 0.05 exp(-k/60) about 1, without a beat and with one of 13 cycles."""
-    k = np.arange(200)
-    for beat in (np.ones(200), np.cos(2 * np.pi * k / 13)):
-        size = 1 + 0.05 * np.exp(-k / 60) * beat
-        extremes = np.stack([-size, size], axis=1)[None]
-        ends = size[None, 9::10]
-        tail = steady_amplitudes(ends, ends + 0j) if beat.min() > 0 else np.full((2, 1), np.nan)
-        number, value, error = settled(windows_of(extremes, 10)[0], extremes, 10, tail, (1e-2, 0.0, 10 / 60))
-        assert CLASSES[number[0]] == "steady" and goes_on(value, error, windows_of(extremes, 10)[0][:, -1], 1e-2)[0]
-        assert abs(value[0] - 1) <= error[0] < 0.01
-
-
-def test_exact_a_run_that_checks_a_curve_looks_near_its_top_alone():
-    """Down to 0.8 of the peak and a quarter of that way beyond; another peak of that height, or a short curve, is
-    searched as a whole."""
-    f = np.linspace(50, 250, 201)
-    curve = {"frequency": f, "amplitude": 1 / (1 + ((f - 140) / 10)**2)}
-    near = curves.around_the_top(sweep := Sweep(50.0, 250.0, 10.0), curve, 140.0)
-    assert (near.low, near.high, near.duration) == pytest.approx((131.0, 149.0, 10.0)) and near.starts == curves.FEW
-    back = curves.around_the_top(Sweep(250.0, 50.0, 10.0), {name: each[::-1] for name, each in curve.items()}, 140.0)
-    assert (back.low, back.high) == pytest.approx((149.0, 131.0))
-    two = curve | {"amplitude": curve["amplitude"] + 0.85 / (1 + ((f - 220) / 5)**2)}
-    assert curves.around_the_top(sweep, two, 140.0) is None
-    assert curves.around_the_top(sweep, curve | {"amplitude": np.ones(201)}, 140.0) is None
-
-
-def test_a_curve_that_is_checked_near_its_top_has_the_errors_of_a_whole_one(monkeypatch):
-    law, text, low, high, force = scene(71_000_008)
-    assert law == "iwan"
-    text += f'[drive]\nkind = "force"\nwaveform = "sweep"\nfrom = "{low!r} Hz"\nto = "{high!r} Hz"\n' \
-        f'rate = "1 Hz/s"\n{force}[accuracy]\nmethod = "harmonic"\n'
-    plain, own, taken = curves.around_the_top, rig._at_the_top, []
-
-    def told(*given):
-        taken.append(own(*given))
-        return taken[-1]
-
-    def beside(drive, curve, at):  # a neighbourhood whose largest lies at its end
-        near = plain(drive, curve, at)
-        return replace(near, low=at + 0.3 * (near.high - at))
-
-    monkeypatch.setattr(rig, "_at_the_top", told)
-    near = pf.run(text).measures
-    assert taken and None not in taken
-    taken.clear()
-    monkeypatch.setattr(curves, "around_the_top", beside)
-    whole = pf.run(text).measures
-    assert taken and set(taken) == {None}
-    for name in (*MAIN, "peak_frequency"):
-        assert near[name].value == whole[name].value
-        assert near[name].error == pytest.approx(whole[name].error, rel=0.5)

@@ -1,13 +1,11 @@
 """Curves of steady motions over a sweep with default settings: peaks narrower than any spacing of even points."""
 
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from event_run import steady
 
 import patchfem as pf
-from patchfem.runs.rig.remarks import peak_at_an_end
 
 RIG = """
 [structure]
@@ -68,18 +66,6 @@ def test_exact_a_linear_curve_is_that_of_the_event_map():
         assert curve["multiplier"][k] == pytest.approx(np.abs(other.multipliers).max(), rel=1e-9)
 
 
-@pytest.mark.slow
-def test_exact_the_balance_follows_a_peak_of_a_damping_of_0_003():
-    """Its points are those of an arc: a spring that bends by nothing leaves the linear peak to 1e-3."""
-    found = pf.run(RIG + '[structure.stiffening]\ncubic = "1e-6 N/m^3"\n',
-                   **{"drive.from": "141 Hz", "drive.to": "144 Hz"})
-    curve, fine = found.extra["curve"], np.linspace(141, 144, 10001)
-    assert found.extra["harmonics"]
-    assert curve["amplitude"].max() == pytest.approx(float(amplitude(143.0)[0]), rel=1e-3)
-    lines = np.interp(fine, curve["frequency"], curve["amplitude"])
-    assert np.abs(lines - amplitude(fine)).max() < 0.01 * curve["amplitude"].max()
-
-
 def test_always_an_undamped_mode_has_a_hole_in_its_curve():
     curve = pf.run(RIG.replace("0.003", "0"), **{"drive.from": "142 Hz", "drive.to": "144 Hz"}).extra["curve"]
     at = curve["frequency"] == 143.0
@@ -103,16 +89,3 @@ def test_exact_a_largest_response_at_an_end_of_the_sweep_is_no_peak(low, high, k
     warned = [one for one in found.warnings if "the largest response lies at" in one]
     assert len(warned) == bool(said)
     assert all(key in one and said in one for one in warned)
-
-
-def test_exact_an_end_beside_which_no_mode_lies_says_so():
-    mode = {"name": "mode 1", "free_frequency": 90.0, "stuck_frequency": 120.0}
-    drive = SimpleNamespace(low=100.0, high=200.0)
-    for at, said in ((200.0, "no mode of the scene has its resonance above this frequency"),
-                     (100.0, "mode 1 has its resonance at 90 Hz with a free interface and 120 Hz with one that ")):
-        measures = {"peak_frequency": SimpleNamespace(value=at),
-                    "relative_displacement_amplitude": SimpleNamespace(value=1e-6)}
-        run = SimpleNamespace(measures=measures, model=SimpleNamespace(rig=SimpleNamespace(drive=drive)))
-        one, = peak_at_an_end(run, lambda: [mode])
-        assert said in one and ("; lower drive.from" in one) == (at == 100.0)
-

@@ -78,13 +78,6 @@ def test_exact_a_batch_gives_the_ratio_of_single_runs(law):
         assert found.values["equivalent_damping"][k] == pytest.approx(alone.value, abs=2 * alone.error + 1e-12)
 
 
-def test_exact_levels_end_with_the_ratio_of_their_last():
-    drive = 'waveform = "levels"\nlevels = ["1 g", "2 g"]\ncycles = 30'
-    plain, scaled = (pf.run(loads(scene("coulomb", slide=slide, drive=drive))) for slide in (1.0, SLIDE))
-    for a, b in zip(plain.extra["levels"], scaled.extra["levels"]):
-        assert b.values["equivalent_damping"] == pytest.approx(a.values["equivalent_damping"], rel=1e-7)
-
-
 def test_exact_another_mode_that_slides_leaves_no_ratio():
     """At 110 Hz a mode of 300 Hz that slides as much carries some tenths of the slide; one of 0.001 does not."""
     second = '[[structure.mode]]\nname = "second"\nfrequency = "300 Hz"\ndamping = 0.02\nslide = {}\nbase = 0.9\n'

@@ -70,10 +70,6 @@ def test_always_an_engine_closes_its_balance_as_it_says(engine, value, error, cl
     assert (said == "") is closes
 
 
-def test_always_linear_runs_without_a_balance_pass():
-    assert unbalanced(ENGINES["exact"], {}) == ""
-
-
 def test_always_the_round_off_of_what_holds_still_is_no_missing_energy():
     """Two masses, of which the driven one is held at half its limit: all that passes is 1.7e-20 J of round-off."""
     held = FORCED.replace("mass = 2", "mass = 1").replace("30 N", "4.14 N").replace("90 Hz", "52.09 Hz")

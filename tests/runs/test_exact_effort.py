@@ -1,6 +1,5 @@
 """What the exact engine is expected to cost, the engine that is chosen for it, and that the cost is bounded."""
 
-from dataclasses import replace
 from time import process_time
 
 import numpy as np
@@ -10,9 +9,7 @@ from event_run import rows_of
 import patchfem as pf
 from patchfem.core import Missing
 from patchfem.runs.rig import costs
-from patchfem.runs.rig.engines import engine_of
 from patchfem.runs.rig.pieces import coulomb_limits
-from patchfem.structure.drives import Recorded
 
 CHAIN = """[structure]
 masses = ["1 kg", "2 kg"]
@@ -123,12 +120,3 @@ def test_refuses_an_exact_run_without_end():
     text = MODES.replace("0.003", "0") + RUBS + slow + '[accuracy]\nmethod = "exact"\n'
     with pytest.raises(Missing, match=r'drive\.cycles .* accuracy\.method = "march"'):
         pf.run(text)
-
-
-def test_always_sweeps_and_records_are_exact():
-    model = pf.plan(MODES + RUBS + SWEEP).model
-    assert engine_of(model).name == "exact"
-    for rows, engine in ((2000, "exact"), (400_000, "exact")):
-        time = np.arange(rows) * 1e-5
-        rig = replace(model.rig, drive=Recorded(time, np.sin(900 * time), 1 / 143), waveform="file")
-        assert engine_of(replace(model, rig=rig)).name == engine

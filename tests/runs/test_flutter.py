@@ -68,24 +68,6 @@ def test_exact_the_edge_under_a_law_that_weakens_parts_releases_that_decay_from_
     assert ends[0] < 0.97 * edge.value and ends[1] > 1.03 * edge.value
 
 
-@pytest.mark.slow
-def test_a_spring_before_the_slip_keeps_a_small_swing_up():
-    """Nothing is lost before the elements yield: a small release rises to the limit cycle that lasts."""
-    law = {"law": "elastic-plastic", "more": 'bond_length = "20 um"'}
-    small, large = (pf.run(pf.load(text(**law, start=start, cycles=200))) for start in (0.001, 0.5))
-    assert small.outcome == large.outcome == "steady"
-    swings = [one.measures["relative_displacement_amplitude"].value for one in (small, large)]
-    assert swings[0] == pytest.approx(swings[1], rel=2e-3)
-    [note] = [one for one in small.notes if "which is stable" in one]
-    assert f"{1e6 * swings[0]:.1f} um" in note
-    assert "smaller amplitude ends in the limit cycle" in note
-    edge = small.measures["flutter_amplitude"]
-    for way in (-1, 1):
-        start = 1e3 * edge.value + way * (1e3 * edge.error + 0.02 * EDGE)
-        swing = pf.run(pf.load(text(**law, start=start, cycles=20))).measures["relative_displacement_amplitude"].value
-        assert (swing > edge.value) == (way > 0)
-
-
 SECOND = '[[structure.mode]]\nname = "second"\nfrequency = "{} Hz"\ndamping = 0.02\nslide = 0.3\n[structure.start]\n'
 
 
@@ -111,28 +93,6 @@ def test_a_motion_that_grows_past_all_bounds_ends(law):
     assert found.outcome == "grows" and found.measures["flutter_amplitude"].value < 1.1e-3 * EDGE
     assert found.response.time[-1] < 2 and "when the motion exceeded 1000 m" in found.notes[-1]
     assert all(one.error is None for name, one in found.measures.items() if name != "flutter_amplitude")
-
-
-def test_without_friction_negative_damping_is_refused():
-    lone = text().replace('[friction]\nlaw = "coulomb"\nstatic = 0.3\n', "").replace('[normal]\nload = "30 N"\n', "")
-    with pytest.raises(pf.SceneError, match=r"damping: -0\.02 is negative damping, and without friction"):
-        pf.load(lone)
-    with pytest.raises(pf.SceneError, match="damping: must be > -1"):
-        pf.load(text(damping=-1.5))
-
-
-def test_a_rig_without_such_a_mode_does_not_load_its_limit_cycles(monkeypatch):
-    from patchfem.runs.rig import flutter
-
-    monkeypatch.setattr(flutter, "flutter_of", None)
-    found = pf.run(pf.load(text(damping=0.02, start=0.1, cycles=20)))
-    assert "flutter_amplitude" not in found.measures
-
-
-def test_what_is_not_known_has_its_reason():
-    still = text(law="nonlocal", more='bond_length = "20 um"\nreading = "report"', start=0.01, cycles=3)
-    edge = pf.run(pf.load(still)).measures["flutter_amplitude"]
-    assert edge.value is None and edge.reason
 
 
 def test_cases_with_such_a_mode_run_by_themselves():

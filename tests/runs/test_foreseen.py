@@ -9,12 +9,12 @@ from dataclasses import replace
 import numpy as np
 import plan_trial
 import pytest
-from scene_texts import BENCH, COULOMB, DRIVE, MODE, PATCH, PLASTIC, POINT, SECOND, STRUCTURE
+from scene_texts import BENCH, COULOMB, MODE, PATCH, POINT, STRUCTURE
 
-from patchfem import compiled, rates
+from patchfem import rates
 from patchfem.core import Missing
 from patchfem.runs import memory, run
-from patchfem.runs.plan import UP_TO, compiled_kind, plan, refuse_size
+from patchfem.runs.plan import UP_TO, plan, refuse_size
 from patchfem.runs.rig import costs
 from patchfem.runs.rig.numerics import choose
 from patchfem.scene.scene import load, loads
@@ -64,13 +64,6 @@ def test_always_the_histories_of_a_long_run_take_what_the_plan_says(method, cycl
     assert UP_TO in many.verdict and UP_TO not in planned(text, "drive.cycles=50").verdict
 
 
-def test_exact_the_parts_are_the_whole_and_the_largest_stands_first():
-    found = planned(PATCH, "contact.element_size=10 um")
-    sizes = [part.bytes for part in found.cost.parts]
-    assert sizes == sorted(sizes, reverse=True) and found.bytes == int(sum(sizes))
-    assert found.as_json()["memory"][found.cost.parts[0].what] == int(sizes[0])
-
-
 def test_exact_memory_grows_with_the_square_of_the_nodes_and_with_the_steps_of_the_window():
     few, many = (planned(PATCH, f"contact.element_size={size} um").bytes for size in (2, 1))
     assert 3.6 < many / few < 4.0
@@ -102,16 +95,6 @@ def test_exact_a_group_with_a_limit_leaves_what_it_has_not_used(tmp_path):
     assert memory._of_group(50.0, tmp_path / "none", root) == float("inf")
 
 
-def test_exact_a_limit_of_the_process_is_seen(monkeypatch):
-    used, mapped = memory.own_bytes()
-    assert 2e7 < used < mapped
-    limits = {resource.RLIMIT_AS: 4 * GIGABYTE, resource.RLIMIT_DATA: resource.RLIM_INFINITY}
-    monkeypatch.setattr(resource, "getrlimit", lambda kind: (limits[kind], resource.RLIM_INFINITY))
-    bare, compiled = memory.free_bytes(), memory.free_bytes(True)
-    assert bare == pytest.approx(4 * GIGABYTE - (mapped - used) - memory.MAPPED, abs=5e7)
-    assert bare - compiled == pytest.approx(memory.CODE, abs=1e7)
-
-
 @pytest.mark.share(1)
 @pytest.mark.parametrize("law, least", [(COULOMB, 150), (TANH, 200), (TANH, 300)])
 def test_refuses_in_one_line_what_the_process_may_not_take(tmp_path, law, least):
@@ -122,31 +105,6 @@ def test_refuses_in_one_line_what_the_process_may_not_take(tmp_path, law, least)
                           preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_AS, (least << 20, least << 20)))
     assert done.returncode == 4 and done.stderr.count("\n") == 1, done.stderr
     assert "GB are free; free some memory" in done.stderr or "out of memory" in done.stderr
-
-
-def test_exact_a_plan_tells_what_compiles_until_a_run_of_its_kind_has_come_to_its_end(tmp_path, monkeypatch):
-    monkeypatch.setattr(compiled, "_placed", lambda: (tmp_path, ""))
-    monkeypatch.setattr(compiled, "_folder", lambda: tmp_path)
-    monkeypatch.setattr(compiled, "PLAIN", False)
-    before, other = planned(RIG, MARCH), planned(RIG.replace("tanh", "elastic-plastic").replace(
-        'reference_speed = "1 mm/s"', 'bond_length = "1 um"'), MARCH)
-    seconds = before.compile_seconds
-    assert seconds > 0 and f"(and {seconds:.0f} s once for compiling)" in repr(before)
-    assert before.as_json()["compile_seconds"] == seconds and before.seconds == planned(RIG, MARCH).seconds
-    compiled.ran(compiled_kind(before.model, before.engine, before.unknowns))
-    assert planned(RIG, MARCH, "drive.cycles=7").compile_seconds == 0 and "compile" not in repr(planned(RIG, MARCH))
-    assert planned(PATCH).compile_seconds == 0 and plan(other.model).compile_seconds == other.compile_seconds == seconds
-
-
-def test_exact_a_plan_counts_no_compile_where_a_short_history_runs_as_python(tmp_path, monkeypatch):
-    monkeypatch.setattr(compiled, "_placed", lambda: (tmp_path, ""))
-    monkeypatch.setattr(compiled, "PLAIN", False)
-    monkeypatch.setattr(compiled, "PATIENCE", 2.0)
-    for law in COULOMB, PLASTIC:
-        short, long = (planned(POINT + law + STRUCTURE, f"drive.cycles={cycles}") for cycles in (30, 30000))
-        assert short.compile_seconds == 0 < long.compile_seconds
-    linear = planned(STRUCTURE, "drive.cycles=30000")
-    assert (linear.kind, linear.engine, linear.compile_seconds) == ("linear", "exact", 0)
 
 
 @pytest.mark.slow
@@ -166,64 +124,6 @@ def test_always_plans_hold_in_most_scenes(tmp_path):
     scores = [one.within() for one in plan_trial.told(6000, 80, tmp_path)]
     time, memory_ = (sum(column) / len(scores) for column in zip(*scores))
     assert time >= 0.9 and memory_ >= 0.9
-
-
-def test_always_plans_of_a_few_scenes_hold_in_memory(tmp_path, monkeypatch):
-    monkeypatch.setattr(compiled, "PATIENCE", 2.0)  # that of the processes that run them
-    assert [one.within(4.0, 1.5)[1] for one in plan_trial.told(1001, 1, tmp_path)] == [True]
-
-
-@pytest.mark.parametrize("modes", [1, 2])
-def test_exact_machine_code_is_counted_where_a_short_run_will_load_it(tmp_path, monkeypatch, modes):
-    """The loops for one mode and for several are compiled apart: one that is kept says nothing about the other."""
-    drive = DRIVE.replace("cycles = 30", "cycles = 5")  # so that a run of each is over soon as Python
-    scenes = {1: MODE + drive, 2: MODE + SECOND + drive}
-    monkeypatch.setattr(compiled, "_placed", lambda: (tmp_path, ""))
-    monkeypatch.setattr(compiled, "_folder", lambda: tmp_path)
-    monkeypatch.setattr(compiled, "PLAIN", False)
-    monkeypatch.setattr(compiled, "PATIENCE", 2.0)
-    compiled.kernels.cache_clear()  # other tests may have loaded machine code in this process
-    looked = []
-    monkeypatch.setattr(compiled.machine, "found", looked.append)
-    found = {count: planned(text) for count, text in scenes.items()}
-    assert all("code" not in one.as_json()["memory"] for one in found.values())
-    run.run(found[modes])  # as Python, because nothing is kept
-    for path in looked:
-        path.parent.mkdir(exist_ok=True)
-        path.touch()
-    assert {count for count, text in scenes.items() if "code" in planned(text).as_json()["memory"]} == {modes}
-
-
-RUBBED = """[structure]
-masses = ["1 kg", "2 kg"]
-[[structure.spring]]
-between = [1, 0]
-stiffness = "1 N/um"
-[[structure.spring]]
-between = [2, 1]
-stiffness = "2 N/um"
-[[structure.interface]]
-between = [1, 0]
-load = "30 N"
-law = "coulomb"
-static = 0.3
-[[structure.interface]]
-between = [2, 1]
-load = "20 N"
-law = "coulomb"
-static = 0.3
-[drive]
-kind = "base"
-acceleration = "2 m/s^2"
-frequency = "100 Hz"
-cycles = 2
-"""
-
-
-def test_always_a_short_run_of_several_interfaces_is_planned(monkeypatch):
-    monkeypatch.setattr(compiled, "PATIENCE", 2.0)
-    found = planned(RUBBED)
-    assert found.engine == "exact" and found.compile_seconds == 0 and 7e7 < found.bytes < 2e8
 
 
 SHAKEN = """[structure]
@@ -249,14 +149,6 @@ def test_always_a_random_run_keeps_as_many_samples_as_are_foreseen():
     kept = costs.kept_samples(choose(found.model))
     assert run.run(found).window.time.size == pytest.approx(kept, rel=0.01)
     assert 1e9 < planned(SHAKEN.format(60)).bytes < 2e9
-
-
-@pytest.mark.parametrize("kind", ["damper", "shroud"])
-def test_always_a_curve_takes_the_seconds_that_are_foreseen(kind):
-    """Within 3 of what it took on the machine of the table: damper .4 to 1.4 s, shroud 0.7 to 1.8 s a case."""
-    text = text_of(kind)
-    found = planned(text[:text.index("\n[sweep]")] + text[text.index("\n[accuracy]"):])
-    assert 0.4 < found.seconds - rates.START < 3.0 and found.steps == 160
 
 
 NINE = ["accuracy.harmonics=9"]

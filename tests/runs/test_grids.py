@@ -1,15 +1,11 @@
 """The grids of a patch: a plan counts those that a run makes, and a wave of the gap has cells that show it."""
 
-from dataclasses import replace
 
 import numpy as np
 import pytest
 from scene_texts import SMALL_PATCH
 
-from patchfem.contact import gaps
-from patchfem.model.gap import Gap
 from patchfem.model.model import build
-from patchfem.runs.patch.grids import base_grids
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.plan import expected_grids
 from patchfem.scene.scene import loads
@@ -66,27 +62,3 @@ def test_always_a_plan_expects_the_grids_of_a_contact_that_only_its_pressure_end
 def test_always_a_plan_is_at_most_one_level_off_where_a_contact_ends_inside(shape, tolerance):
     patch = asked(PIECES + shape)
     assert abs(expected_grids(patch, tolerance).levels - grids_of_run(patch, tolerance)[1]) <= 1
-
-
-def ripple(x, length, height):
-    return height / 2 * (1 - np.cos(2 * np.pi * x / length))
-
-
-def test_exact_a_new_shape_that_states_its_wave_has_cells_that_show_it(monkeypatch):
-    """Westergaard's pressure in full contact: a cosine of amplitude pi E* h/(2 l) about the mean, on pieces that are
-    deep beside the wave. 13 waves of .92 mm would fall on seven cells each of a plain gap."""
-    patch, wave, high = asked(PIECES), 12e-3 / 13, 10e-9
-    monkeypatch.setattr(gaps, "ripple", ripple, raising=False)
-    monkeypatch.setitem(gaps.STATED, "ripple", gaps.Stated(wave=lambda keys: dict(keys)["length"]))
-    keys = (("length", wave), ("height", high))
-    waved = replace(patch, gap=Gap((("ripple", keys),), None, None, None, False, "upper"))
-    assert waved.gap.wave == wave
-    (plain,), (shown,) = base_grids(patch).bodies, base_grids(waved).bodies
-    assert np.diff(plain.x).max() > wave / 8 and np.diff(shown.x).max() <= wave / 4 * 1.2
-    pressed = solve_all(waved, 1e-3)[0]
-    x, sigma = (part[np.abs(pressed.x) < 3e-3] for part in (pressed.x, pressed.pressure.sigma_n))
-    turn = 2 * np.pi * x / wave
-    swing = np.linalg.lstsq(np.stack([x**0, x**2, x**4, np.cos(turn)], 1), sigma, rcond=None)[0][3]
-    face = patch.lower.substrate
-    modulus = face.young / (1 - face.poisson**2) / 2
-    assert swing == pytest.approx(np.pi * modulus * high / 2 / wave, rel=0.01)

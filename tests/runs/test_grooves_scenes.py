@@ -1,7 +1,5 @@
 """Scenes with [normal.grooves] and [contact.grooves]: loops by their closed form, plans, refusals, nothing unasked."""
 
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -73,14 +71,6 @@ def test_exact_the_loop_of_a_slow_slide(reach):
     assert value(found, "friction_force_peak") == pytest.approx(115 * (steep + 0.4) / (1 - 0.4 * steep), rel=1e-3)
 
 
-def test_exact_the_height_of_the_load_is_stored():
-    """From the bottom to the crest: N 2 A."""
-    found = run(BENCH.replace('kind = "triangle"\namplitude = "30 um"', 'kind = "constant"\ndistance = "40 um"'))
-    assert value(found, "energy_stored") == pytest.approx(115 * 15e-6, rel=1e-12)
-    work, lost = value(found, "friction_work"), value(found, "energy_dissipated")
-    assert work - lost == pytest.approx(115 * 15e-6, rel=1e-9)
-
-
 def test_exact_a_slow_slide_breaks_away_and_goes_on_by_coefficients_of_their_own():
     """F/N = tan(flank + angle of friction): the static one at the start, on a flank that falls, then the kinetic."""
     found = run(BENCH, **{"friction.kinetic": "0.3"})
@@ -89,15 +79,6 @@ def test_exact_a_slow_slide_breaks_away_and_goes_on_by_coefficients_of_their_own
     short = BENCH.replace('kind = "triangle"\namplitude = "30 um"', 'kind = "constant"\ndistance = "1 um"')
     found = run(short, **{"friction.kinetic": "0.1", "normal.grooves.phase": "0.3 rad"})
     assert value(found, "friction_force_peak") == pytest.approx(115 * np.tan(flank + np.arctan(0.4)), rel=1e-9)
-
-
-def test_always_a_long_slow_slide_samples_every_flank():
-    """100 waves in a cycle: the trapezoidal rule on the samples finds the work, one of them stands near the steepest
-    flank."""
-    found = run(BENCH, **{"slide.amplitude": "2 mm"})
-    steep = 7.5e-6 * WAVE
-    assert value(found, "work_check") < 1e-4
-    assert value(found, "friction_force_peak") == pytest.approx(115 * (steep + 0.4) / (1 - 0.4 * steep), rel=1e-3)
 
 
 def test_exact_a_rig_slips_by_the_kinetic_coefficient():
@@ -135,14 +116,6 @@ def test_always_a_law_with_memory_acts_along_the_flank(law):
     assert value(found, "energy_balance") < 1e-10 and value(found, "work_check") < 2e-3
 
 
-def test_always_a_rig_keeps_its_books_and_says_its_vertical_force():
-    found = run(RIG, **{"normal.grooves.lifted_mass": "0.5 kg"})
-    assert found.outcome in (Outcome.STEADY, Outcome.TRANSIENT)
-    assert value(found, "energy_balance") < 1e-9 and value(found, "work_check") < 1e-3
-    assert value(found, "normal_load_least") < 115 < value(found, "normal_load_peak")
-    assert found.extra["engine"] == "march"
-
-
 def test_exact_a_patch_under_a_rigid_slide_is_the_point():
     pieces = PIECES + GROOVES
     point = f'[normal]\nload = "115 N"\n{GROOVES}'
@@ -158,23 +131,6 @@ def test_exact_flat_grooves_are_the_law_itself(text):
     there, here = run(text, **{"normal.grooves.amplitude": "0 um"}), run(flat(text))
     assert {name: one.value for name, one in there.measures.items()} == \
         {name: one.value for name, one in here.measures.items()}
-
-
-def test_always_the_steady_motion_is_that_of_the_march():
-    """With a mass that rises as heavy as half of what slides."""
-    text = RIG.replace('"coulomb"', '"tanh"\nreference_speed = "1 mm/s"')
-    asked = {"normal.grooves.lifted_mass": "0.6 kg", "accuracy.tolerance": "5e-3", "accuracy.steps_per_cycle": "400"}
-    repeated, marched = run(text, **asked, **{"accuracy.method": "harmonic"}), run(text, **asked)
-    for name in ("relative_displacement_amplitude", "loop_area", "friction_force_peak", "normal_load_peak"):
-        found, true = repeated.measures[name], marched.measures[name]
-        assert abs(found.value - true.value) <= found.error + true.error and found.error < 0.03 * abs(found.value)
-
-
-def test_refuses_heave_over_grooves():
-    text = RIG.replace("[normal]", PIECES).replace('load = "115 N"\ngrooves', "grooves").replace(
-        "slide = 1.0}", "slide = 1.0, normal = 0.1}")
-    with pytest.raises(SceneError, match=r"structure\.mode\.\S+: not supported yet with \[contact\.grooves\]"):
-        loads(text)
 
 
 def test_exact_the_plan_prints_stiffness_and_capacity():
@@ -221,23 +177,6 @@ def test_refuses_grooves_under_a_static_patch_and_soft_pieces():
         loads(soft + '\n[contact.holder]\ntangential_stiffness = "1e7 N/m"')
 
 
-def test_always_a_lifted_mass_of_a_bench_is_remarked_and_not_used():
-    assert any("lifted_mass has no meaning" in one
-               for one in loads(BENCH, sets=["normal.grooves.lifted_mass=1 kg"]).remarks)
-    text = BENCH.replace('law = "coulomb"', 'law = "elastic-plastic"\nbond_length = "1 um"')
-    here, there = (run(text, **{"slide.speed": "50 mm/s", "normal.grooves.lifted_mass": mass}) for mass in (
-        "0 kg", "1 kg"))
-    assert {name: one.value for name, one in there.measures.items()} == \
-        {name: one.value for name, one in here.measures.items()}
-
-
-def test_always_nothing_of_grooves_is_imported_unasked():
-    code = "import patchfem as pf, sys\nfrom patchfem.scene.scene import loads\npf.run(loads('''" + flat(BENCH) + \
-        "'''))\nprint([m for m in sys.modules if 'grooves' in m and 'rules' not in m])"
-    found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert found.stdout.strip() == "[]"
-
-
 @pytest.mark.parametrize("law", ["coulomb", "elastic-plastic"])
 def test_refuses_a_batch_that_knows_no_grooves(law):
     """The lumped batch takes the same rig without them, with them each case runs by itself."""
@@ -270,9 +209,3 @@ def test_always_a_lifted_mass_that_leaves_its_grooves_is_an_outcome(text):
     assert all(one.error is not None for one in found.measures.values() if one.value is not None)
     load = found.response.extra["normal_load"]
     assert load.min() <= 0.05 * load.max()
-
-
-def test_always_a_sweep_names_the_cases_that_leave_their_grooves():
-    found = pf.sweep(loads(RIG, sets=[f"{key}={value}" for key, value in LEAVES.items()]),
-                     {"drive.acceleration": ["0.1 g", "60 g"]})
-    assert list(found["outcome"].values)[1] == "leaves_grooves" != found["outcome"].values[0]

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from march_paths import share_one_loop
 from scene_texts import PIECE
-from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from patchfem.core import Missing, PatchfemError
@@ -88,16 +87,6 @@ def test_exact_grazing_onset(power, more):
     assert abs(result.response.slide[-1]) == pytest.approx(want, rel=3 * part + 1e-14 / part)
     assert result.outcome != "stuck"
     balanced(result, 1e-10)
-
-
-def test_exact_no_slip_below_the_onset():
-    for part in (0.0, 1e-10, 1e-4):
-        for method in ("auto", "march"):
-            result = result_of(rig("static = 0.3", base(30.0 * (1 - part), 20)), f"accuracy.method={method}")
-            assert result.outcome == "stuck" and np.ptp(result.response.slide) <= (method == "march") * 1e-10
-            close(result, "friction_force_peak", 30.0 * (1 - part), 1e-9)
-            assert value(result, "stick_fraction") == 1.0 and value(result, "absolute_acceleration_peak") == \
-                pytest.approx(30.0 * (1 - part), rel=1e-12)
 
 
 def two_stops(d):
@@ -294,20 +283,6 @@ def test_exact_static_above_kinetic_is_bistable():
     close(marched, "relative_displacement_amplitude", value(moving))
 
 
-def test_exact_a_stiffened_rig_is_bistable(loop):
-    """The same drive from rest and from 2 mm: two amplitudes, by DOP853 with an event search at 1e-9."""
-    text = rig("static = 0.06", base(20.0, 300, 1.1)).replace("[[structure.mode]]", "[structure.stiffening]\n"
-               'cubic = "4e10 N/m^3"\n[[structure.mode]]')
-    fine = "accuracy.steps_per_cycle=800"
-    low, high = (result_of(text, fine, *start, estimate=False)
-                 for start in ((), ('structure.start={displacement = ["2 mm"]}',)))
-    assert value(low, "slip_amplitude") == pytest.approx(0.00022226158425632175, rel=1e-3)
-    assert value(high, "slip_amplitude") == pytest.approx(0.0017582018745473929, rel=1e-4)
-    for one in (low, high):
-        assert one.outcome == "steady"
-        balanced(one, 1e-8)
-
-
 HEAVE = PIECE + """\
 load = "100 N"
 element_size = "1.27 mm"
@@ -339,31 +314,6 @@ frequency = "100 Hz"
 acceleration = "400 m/s^2"
 cycles = 4
 """
-STEADY = '%s"\nreference_speed = "20 mm/s'
-
-
-@pytest.mark.slow  # tanh under a load that changes: a loop to compile for this alone
-def test_exact_the_load_goes_through_zero_and_comes_back():
-    """Heave under a strong drive: the block lifts off and lands on a linear skin, N = max(0, N0 - k A h); beside it the
-    same equations by DOP853."""
-    found = result_of(HEAVE % (STEADY % "tanh"))
-    load = found.response.extra["normal_load"]
-    assert load.min() == 0.0 and load.max() > 150 and load[-1] >= 0
-    balanced(found, 1e-8)
-    omega, zeta = 2 * pi * np.array([100.0, 250.0]), np.array([0.003, 0.02])
-    slide, push, share = np.array([0.9, 0.1]), np.array([0.0, 0.8]), np.array([0.9, 0.4])
-    stiff = 1e11 * 0.0127**2
-
-    def rate(t, y):
-        z, v = y[:2], y[2:]
-        up = max(100.0 - stiff * (push @ z), 0.0)
-        rub = 0.3 * up * np.tanh(slide @ v / 0.02)
-        pull = -omega**2 * z - 2 * zeta * omega * v - share * 400.0 * np.sin(W * t)
-        return np.concatenate([v, pull + push * (up - 100.0) - slide * rub])
-
-    grid = np.linspace(0.03, 0.04, 4001)
-    y = solve_ivp(rate, (0, 0.04), np.zeros(4), "DOP853", grid, rtol=1e-9, atol=1e-12, max_step=2e-5).y
-    close(found, "relative_displacement_amplitude", np.ptp(y[:2].T @ [0.9, 1.0]) / 2, 1e-9)
 
 
 @pytest.mark.share(1, 2)  # Coulomb: a loop to compile for this alone
@@ -373,71 +323,6 @@ def test_always_lift_off_closes_its_energy(law):
     load = found.response.extra["normal_load"]
     assert load.min() == 0.0 and (np.abs(found.response.force) <= 0.3 * load + 1e-9).all()
     balanced(found, 1e-8)
-
-
-TWO_MASSES = """\
-[structure]
-masses = ["1 kg", "2 kg"]
-output_mass = 2
-[[structure.spring]]
-between = [1, 0]
-stiffness = "3e5 N/m"
-[[structure.spring]]
-between = [1, 2]
-stiffness = "1e5 N/m"
-[[structure.interface]]
-between = [1, 0]
-law = "coulomb"
-static = 0.3
-kinetic = 0.2
-load = "8 N"
-[[structure.interface]]
-between = [2, %d]
-law = "%s"
-static = 0.4
-load = "10 N"
-[drive]
-kind = "force"
-frequency = "40 Hz"
-force = "12 N"
-mass = 2
-cycles = 10.5
-"""
-
-
-@pytest.mark.parametrize("other, law", [(1, 'elastic-plastic"\nbond_length = "3 um'), (0, "coulomb")])
-def test_always_loops_of_several_interfaces_add_up(other, law, loop):
-    """Loop areas of the interfaces, each from its own history, make up the whole; every measure has an error."""
-    found = result_of(TWO_MASSES % (other, law))
-    w = found.window
-    for k in range(2):
-        area = np.trapezoid(w.extra["forces"][:, k], w.extra["slides"][:, k])
-        name = f"loop_area{'_2' * k}"
-        close(found, name, area * (1 / 40) / (w.time[-1] - w.time[0]), 1e-3 * value(found, name))
-    assert all((m.error is None) == bool(m.reason) for m in found.measures.values())
-
-
-def test_exact_amplitude_over_a_fraction_of_a_cycle():
-    """The window is the last whole cycle of 10.5 of a free decay, not the half one: half peak-to-peak of the output."""
-    text = rig("static = 0.05", 'kind = "free"\ndisplacement = "0.5 mm"\ncycles = 10.5')
-    found = result_of(text)
-    assert value(found) == pytest.approx(np.ptp(found.window.output) / 2, rel=1e-4)
-    assert value(found) == pytest.approx(value(found, "slip_amplitude"), rel=1e-12)
-    assert "relative_displacement_amplitude_steady" not in found.measures
-    close(result_of(text, "accuracy.method=march"), "relative_displacement_amplitude", value(found))
-
-
-def test_exact_friction_peak_of_a_ringing_stick():
-    """Stuck on the first of two modes' sum, the second rings on: the peak lies between the samples."""
-    text = rig("static = 0.1", 'kind = "base"\nwaveform = "step"\nacceleration = "120 m/s^2"\ncycles = 12',
-               more='[[structure.mode]]\nname = "b"\nfrequency = "271 Hz"\ndamping = 0.02\nslide = 0.4\nbase = 0.3\n')
-    text = text.replace("slide = 1.0", "slide = 0.9")
-    found = result_of(text)
-    assert found.outcome == "stuck"
-    fine = result_of(text, "accuracy.method=march", "accuracy.steps_per_cycle=3200")
-    close(fine, "friction_force_peak", value(found, "friction_force_peak"))
-    force = np.abs(found.window.force)
-    assert force.max() <= value(found, "friction_force_peak") <= force.max() * (1 + 1e-3)
 
 
 def test_refuses_a_start_beyond_the_travel():

@@ -2,17 +2,14 @@
 
 import re
 from time import process_time
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from patchfem.core import Missing
 from patchfem.dynamics.march import march
-from patchfem.response.levels import Level
 from patchfem.runs.plan import plan
 from patchfem.runs.rig import lists
-from patchfem.runs.rig.levels import level_measures, onset
 from patchfem.runs.rig.lists import chatters, force_that_holds, lists_grow, stalls
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
@@ -181,39 +178,3 @@ def test_refuses_a_held_block_whose_list_grows_too_long(monkeypatch):
                                       r"limit of 3 s; lower drive.cycles") as told:
         run(scene, estimate=False)
     assert float(re.search(r"about (\d+) s", str(told.value))[1]) >= 3 and process_time() - begin < 30
-
-
-def test_exact_a_list_is_stopped_where_its_steps_so_far_foresee_more_than_the_limit(monkeypatch):
-    clock, seen = iter([5.0, 12.0, 19.0, 40.0]), []
-    monkeypatch.setattr(lists, "thread_time", lambda: next(clock))
-    guard = lists.ListGuard(seen.append)
-    guard(0.01)  # what compiles before it does not count
-    guard(0.02)  # 7 s of a hundredth are 700 s, but 10 s are too few to judge by
-    with pytest.raises(Missing, match="computing time of about 700 s, more than the limit of 600 s"):
-        guard(0.03)
-    assert seen == [0.01, 0.02]
-
-
-def test_always_a_search_from_nought_ends_where_no_level_is_before_the_onset():
-    """Seven halvings bring a bracket from nought below a hundredth of the level; 40 asked for no more."""
-    asked = []
-
-    def probe(before, drive):
-        asked.append(drive)
-        return Level(drive, False, {}, {})
-
-    found = onset((Level(8.0, False, {}, {}),), probe, 0.01)
-    assert asked == [8.0 / 2**k for k in range(1, 8)]
-    assert found[0] - found[1] == 0.0 and found[0] + found[1] == asked[-1]
-
-
-def test_exact_an_onset_may_be_off_by_what_each_pair_of_coarser_runs_is_apart():
-    def run(at):
-        def probe(_, level):
-            return Level(level, level < at, {"relative_displacement_amplitude": 1e-6}, {})
-        return SimpleNamespace(levels=(probe(0, 1.0), probe(0, 2.0)), probe=probe)
-
-    fine, half, quarter, mesh = map(run, (1.5, 1.52, 1.6, 1.63))
-    rig = SimpleNamespace(kind="base", onset=("slip", None))
-    found = level_measures(rig, fine.levels, fine.probe, 1e-6, True, ((half, None), (mesh, quarter)))["onset_level"]
-    assert abs(found.value - 1.5) < 1e-5 and abs(found.error - (0.02 + 0.03)) < 1e-5

@@ -78,16 +78,6 @@ def test_exact_a_rig_feels_the_spring():
     assert found.measures["energy_balance"].value <= 1e-10
 
 
-def test_exact_bonds_of_order_0_behind_a_spring_load_it_to_the_limit():
-    """Bonds of order 0 pull with the whole limit at any slide, so a first stroke is that of the spring, to a fraction
-    of a step; where the slide turns they let go one after the other."""
-    found = bench('"nonlocal"\nbond_length = "1 um"\norder = 0', "accuracy.steps_per_cycle=4000")
-    rise = slice(0, 1000)
-    step = STIFF * np.abs(np.diff(found.slide)).max()
-    assert found.force[rise] == pytest.approx(np.minimum(STIFF * found.slide[rise], LIMIT), abs=0.5 * step)
-    assert loads(RIG, sets=[SPRING[0]]).contact.gives_way == "contact.holder.tangential_stiffness"
-
-
 def test_refuses_what_the_spring_cannot_stand_beside():
     said = only(RIG, SPRING[0], "friction.reading=report", "friction.order=-0.5")
     assert "contact.holder.tangential_stiffness" in said and "initial_bonds" in said

@@ -82,15 +82,6 @@ def test_exact_a_linear_rig_in_closed_form():
     assert reading(found.window, drive, acceleration.value, "fundamental") == pytest.approx(felt, rel=1e-8)
 
 
-def test_always_instruments_that_move_as_the_output_change_nothing():
-    text = POINT + LAWS["elastic-plastic"] + MODES
-    plain, given = (values(text, *more)[0] for more in ((), [*sets("gauge", {"axial": 1.0, "yaw": 0.0}),
-                                                            *sets("accelerometer", {"axial": 1.0, "yaw": 0.0})]))
-    assert given.plan.model.rig.modes.gauge is None
-    assert {name: one.value for name, one in plain.measures.items()} == \
-        {name: one.value for name, one in given.measures.items()}
-
-
 @pytest.mark.parametrize("more, said", [
     (("structure.travel=5 mm",), "with structure.travel"),
     (("structure.stiffening.cubic=1e12 N/m^3",), "with structure.stiffening"),
@@ -98,15 +89,6 @@ def test_always_instruments_that_move_as_the_output_change_nothing():
 def test_refuses_instruments_where_the_output_is_judged(more, said):
     with pytest.raises(SceneError, match=said):
         loads(POINT + LAWS["coulomb"] + MODES, sets=["structure.mode.yaw.gauge=0.2", *more])
-
-
-def test_order_of_half_a_swing_between_samples():
-    """A sine and its rate at k places: the error of the cubics falls as the fourth power of their distance."""
-    def miss(count):
-        t = np.pi / 2 + (np.arange(count + 1) + 0.5) * 2 * np.pi / count  # extremes in the middle of steps
-        return abs(half_swing(t, np.sin(t), np.cos(t)) - 1)
-    assert miss(400) < 2e-10
-    assert np.log2(miss(20) / miss(40)) == pytest.approx(4.0, abs=0.1)
 
 
 def test_exact_half_a_swing_of_cubics():

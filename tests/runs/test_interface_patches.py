@@ -10,7 +10,6 @@ from command_line import cli
 
 import patchfem as pf
 from patchfem.runs.patch import faces
-from patchfem.runs.plan import plan
 
 SPRING, DAMPER, MASS = 1e6, 10.0, 0.5
 LAW = 'law = "coulomb"\nstatic = 0.3\n'
@@ -81,20 +80,6 @@ def test_exact_one_interface_with_a_patch_is_the_rig_of_that_patch(law, method):
 def chain():
     """The chain of two masses with a patch at each of its interfaces, run."""
     return pf.run(CHAIN)
-
-
-def test_exact_structures_that_do_not_meet_move_as_each_alone():
-    """Two of them side by side, each behind its own patch, of which the second is the first."""
-    both = pf.run(masses(2) + held(1, 0) + held(2, 0) + face("[1, 0]", 100, 0.5) + face("[2, 0]", 100, 0.5)
-                  + DRIVE).measures
-    alone = pf.run(ALONE).measures
-    for name in ("slip_amplitude", "stick_fraction", "loop_area", "friction_force_peak", "pressure_peak",
-                 "contact_half_width", "normal_load"):
-        for one in (both[name], both[f"{name}_2"]):
-            assert one.value == pytest.approx(alone[name].value, rel=1e-9), name
-            assert one.error <= 3 * alone[name].error + 1e-12 * abs(one.value), name
-    for name in ("friction_work", "energy_dissipated"):
-        assert both[name].value == pytest.approx(2 * alone[name].value, rel=1e-9)
 
 
 def swapped(name: str) -> str:
@@ -206,33 +191,6 @@ def test_exact_a_patch_beside_a_point_and_one_that_bears_nothing():
         assert mixed.measures[name].value == pytest.approx(stiff.measures[name].value, rel=1e-2), name
 
 
-def test_exact_elements_of_strips_are_those_of_one_patch():
-    """Strips of equal pressure, side by side behind one slide, slip as the whole."""
-    strips = "[structure.interface.contact.strips]\ncount = 3\n"
-    wide, whole = (pf.build(pf.load(ALONE.replace("[drive]", more + "[drive]"))).rig.interfaces[0]
-                   for more in (strips, ""))
-    for slide in (2e-8, 1e-7, 1e-6):
-        force = [float(k @ np.minimum(slide, most)) for k, most, _ in (faces.elements_of(one, 1e-3)
-                                                                       for one in (wide, whole))]
-        assert force[0] == pytest.approx(force[1], rel=1e-3)
-
-
-def test_a_plan_counts_the_patches_and_names_their_links(chain):
-    found = plan(pf.load(CHAIN))
-    assert found.engine == chain.extra["engine"] == "piecewise"
-    one, two = (plan(pf.load(text)) for text in (ALONE, rig_of_one()))
-    assert one.unknowns == two.unknowns and one.seconds == pytest.approx(two.seconds, rel=0.2)
-    assert one.modes(one.chain)[0]["stuck_frequency"] == pytest.approx(two.modes(two.chain)[0]["stuck_frequency"])
-    assert found.unknowns["interface_points"] > one.unknowns["interface_points"]
-    twice = plan(pf.load(masses(2) + held(1, 0) + held(2, 0) + face("[1, 0]", 100, 0.5) + face("[2, 0]", 100, 0.5)
-                         + DRIVE))
-    assert twice.unknowns["interface_points"] == one.unknowns["interface_points"]  # equal ones are pressed once
-    assert found.chain["pieces_shear_2"] == found.chain["pieces_shear"]  # the same pieces, whatever presses them
-    assert sum("has a patch of its own" in one for one in found.verdict) == 2
-    rigid = plan(pf.load(CHAIN.replace("[structure.interface.contact.shear]\n", "")))
-    assert "pieces_shear_2" not in rigid.chain and "one point" in " ".join(rigid.verdict)
-
-
 def test_a_rigid_patch_moves_as_a_point_and_says_so():
     rigid = ALONE.replace("[structure.interface.contact.shear]\n", "")
     point = masses(1) + held(1, 0) + f'[[structure.interface]]\nbetween = [1, 0]\n{LAW}load = "100 N"\n' + DRIVE
@@ -278,14 +236,6 @@ def test_files_of_a_run_have_the_pressure_of_every_interface(tmp_path, monkeypat
     assert pf.load("out/scene.resolved.toml").structure.interface[1].contact.load == 60
     assert cli("export", "chain.toml", "-o", "elements.npz").code == 0
     assert np.load("elements.npz", allow_pickle=True)
-
-
-def test_a_backbone_is_that_of_the_rig_of_one_patch():
-    one, two = (pf.backbone(pf.load(text), method="quasi-static") for text in (ALONE, rig_of_one()))
-    for name in two.data_vars:
-        if name.startswith("quasi_static"):
-            np.testing.assert_allclose(one[name], two[name], rtol=1e-4, err_msg=name)
-    assert one["quasi_static_damping"].size > 10
 
 
 def test_a_slide_beyond_a_piece_and_pieces_without_a_load_end_the_run():

@@ -135,21 +135,6 @@ def test_exact_figure_16_of_the_report(written):
     assert data.output_displacement.dims == ("time",) and summary["outcome"] in ("steady", "transient")
 
 
-@pytest.mark.slow
-def test_exact_figure_16_marched(written):
-    """The march agrees within its errors, and sees the events of its last cycles where the exact engine has them."""
-    exact, events = written(FIG16)
-    march, seen = written(FIG16, "--set", "accuracy.method=march", "--set", "accuracy.steps_per_cycle=2000")
-    for name in ("relative_displacement_amplitude", "slip_amplitude", "friction_force_peak", "loop_area"):
-        mine, theirs = exact["measures"][name], march["measures"][name]
-        assert abs(mine["value"] - theirs["value"]) <= theirs["error"] + mine["error"] + theirs["floor"], name
-    late = events.event_time.values > seen.event_time.values[0] - 0.1
-    assert "samples" in seen.event_time.source and "engine" in events.event_time.source
-    assert seen.event_kind.values[1:].tolist() == events.event_kind.values[late][1:].tolist()
-    # seen at 1e-2 of the peak speed, not at rest
-    assert seen.event_time.values[1:] == pytest.approx(events.event_time.values[late][1:], abs=0.1)
-
-
 @pytest.mark.share(0)
 @pytest.mark.parametrize("method", ["exact", "march"])
 def test_exact_two_alike_masses_side_by_side_are_one_twice(written, method):
@@ -174,25 +159,6 @@ def test_exact_two_alike_masses_side_by_side_are_one_twice(written, method):
         mine = data.event_interface.values == number
         assert data.event_kind.values[mine].tolist() == alone.event_kind.values.tolist()
         assert data.event_time.values[mine] == pytest.approx(alone.event_time.values, abs=1e-10)
-
-
-@pytest.mark.slow
-def test_exact_two_interfaces_in_a_chain_marched(written):
-    """Each of another load, one of them between the masses: every measure within its error of the exact engine."""
-    exact, data = written(CHAIN)
-    march, _ = written(CHAIN, "--set", "accuracy.method=march")
-    assert data.interface.values.tolist() == ["1-0", "2-1"]
-    tested = [name for name in exact["measures"] if name.removesuffix("_2") in (
-        "relative_displacement_amplitude", "slip_amplitude", "stick_fraction", "friction_force_peak", "loop_area")]
-    assert len(tested) == 9
-    for name in tested:
-        mine, theirs = exact["measures"][name], march["measures"][name]
-        reversals = 0.03 * name.startswith("stick")  # a march counts what is slow as stuck
-        assert abs(mine["value"] - theirs["value"]) <= theirs["error"] + theirs["floor"] + reversals, name
-    slides = data.relative_displacement.values
-    assert data.modal_coordinate.attrs["long_name"].startswith("displacement of the mass or coordinate")
-    assert slides[0] == pytest.approx(data.modal_coordinate.values[:, 0], abs=1e-12)
-    assert slides[1] == pytest.approx(np.diff(data.modal_coordinate.values, axis=1)[:, 0], abs=1e-12)
 
 
 def test_exact_only_the_second_interface_slips():

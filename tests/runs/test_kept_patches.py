@@ -1,18 +1,15 @@
 """Runs of one patch share it: pressed and measured once, with the answers of runs that share nothing."""
 
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scene_texts import COATED, MODE, PLASTIC, SHEAR
 
 import patchfem as pf
-from patchfem.friction.bonds.parameters import Bonds
 from patchfem.runs.many import one_by_one
 from patchfem.runs.many.meshes import meshed
-from patchfem.runs.patch import jenkins_elements, press, store
+from patchfem.runs.patch import jenkins_elements, store
 from patchfem.runs.patch.store import content_key
-from patchfem.runs.rig import interface
 
 DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 20\n'
 TEXT = COATED + '[contact.tilt]\nangle = "0.02 mrad"\n' + SHEAR + PLASTIC + MODE + DRIVE
@@ -44,16 +41,6 @@ def test_exact_runs_of_one_patch_are_those_that_share_nothing(monkeypatch):
             np.testing.assert_array_equal(found.errors[name][case], alone.errors[name][0], name)
 
 
-def test_exact_a_patch_of_many_levels_is_pressed_once(monkeypatch):
-    pressed, own = [], press._under
-    monkeypatch.setattr(press, "_under", lambda *given: pressed.append(1) or own(*given))
-    cases = models()
-    one_by_one.solve(cases[:1])
-    once = len(pressed)
-    one_by_one.solve(cases)
-    assert once > 0 and len(pressed) == 2 * once
-
-
 @pytest.mark.parametrize("changed", [
     {"contact.load": 100.0}, {"contact.tilt.angle": 3e-5}, {"contact.crown.radius": 3.0},
     {"contact.step.height": 1e-6, "contact.step.at": 1e-3}, {"contact.width": 0.01}, {"contact.height": 0.006},
@@ -74,33 +61,3 @@ def test_always_a_file_that_may_change_is_read_again(tmp_path):
     (tmp_path / "a.toml").write_text(TEXT.replace(SHEAR, SHEAR + '[contact.profile]\nfile = "heights.csv"\n'))
     profiled = meshed([pf.build(tmp_path / "a.toml")] * 2)[0].patch
     assert profiled.meshes is not None and not store.is_shared(profiled)
-
-
-def test_exact_the_result_that_was_not_used_for_longest_is_made_again():
-    numbers = range(store.MAX_ENTRIES + 1)
-    for number in (*numbers[:-1], 0, numbers[-1]):
-        store.reuse((number,), lambda: "first")
-    kept = [store.reuse((number,), lambda: "again") for number in (0, numbers[-1], 2, 1)]
-    assert kept == ["first", "first", "first", "again"]
-
-
-def test_exact_marches_of_one_patch_share_its_shear_modes(monkeypatch):
-    """Those of another patch, law, number or tolerance are its own; what is kept goes with its patch."""
-    class Pressed:
-        pass
-
-    made = []
-    monkeypatch.setattr(interface.fields, "shear_of", lambda *given: made.append(given[1:]) or object())
-    def asked(tolerance):
-        return SimpleNamespace(accuracy=SimpleNamespace(tolerance=tolerance), patch=SimpleNamespace(gathers=False))
-
-    law, one, other = Bonds(0.3, 1e-6), Pressed(), Pressed()
-    first = interface._shear_modes(one, law, None, asked(0.01))
-    assert interface._shear_modes(one, Bonds(0.3, 1e-6), None, asked(0.01)) is first and len(made) == 1
-    for given in ((other, law, None, asked(0.01)), (one, Bonds(0.4, 1e-6), None, asked(0.01)),
-                  (one, law, 4, asked(0.01)), (one, law, None, asked(0.1))):
-        assert interface._shear_modes(*given) is not first
-    assert len(made) == 5
-    kept = len(interface._MADE)
-    del one, other, given
-    assert len(interface._MADE) == kept - 2

@@ -1,7 +1,6 @@
 """Rigs whose bonds are a list, orders other than 1 and the report's reading, on random scenes: both books close."""
 
 import numpy as np
-import pytest
 
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
@@ -73,8 +72,3 @@ def close(found) -> None:
 
 def test_always_both_books_of_6_random_rigs_close():
     close(books(1, 6))
-
-
-@pytest.mark.slow
-def test_always_both_books_of_100_random_rigs_close():
-    close(books(2, 100))

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scene_texts import COATED, COULOMB, SLIDE
+from scene_texts import COATED
 from wedges import falling
 
-import patchfem as pf
 from patchfem.closed_forms.contact import punch_pressure, rounded_punch_half_width, rounded_punch_pressure
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.elasticity.coating_bond import bond_line
-from patchfem.elasticity.elasticity import assemble, displacement, interface_compliance
-from patchfem.elasticity.elasticity import interface_compliance as condense
+from patchfem.elasticity.elasticity import displacement
 from patchfem.elasticity.recovery import cells_of
 from patchfem.mesh.files import write_mesh
 from patchfem.mesh.nested import finer
@@ -20,7 +18,6 @@ from patchfem.mesh.tensor import TensorGrid, graded_depth, graded_rows
 from patchfem.model.files import faults
 from patchfem.model.model import build
 from patchfem.model.pieces import bodies_of, outlined, rounded_edges
-from patchfem.runs.patch.condensed import condensed
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.measures import measures
 from patchfem.runs.patch.press import solve
@@ -122,18 +119,6 @@ def test_order_rounded_ends_on_a_long_block_are_the_punch_in_closed_form():
     assert "steep" not in " ".join(strained(model, patch))
 
 
-def test_exact_a_piece_that_goes_on_is_the_whole_block_asked_at_the_interface_alone():
-    model = asked(COATED + NARROW.format("upper"))
-    pair = condensed(model, *bodies_of(model))
-    body, layers = pair.grid, pair.piece.layers
-    x = np.unique(body.points[:, 0])
-    inside = np.isin(x, body.x)
-    assert x.size > body.x.size == inside.sum()
-    whole = interface_compliance(assemble(x, body.depth, body.inner.coating_rows, layers))
-    for mine, theirs in zip(condense(pair.piece), whole):
-        assert np.abs(mine - theirs[np.ix_(inside, inside)]).max() <= 1e-9 * np.abs(theirs).max()
-
-
 def test_order_a_stiff_sharp_block_on_a_long_one_is_the_flat_punch():
     text = BLOCK.replace("24 mm", "160 mm").replace("8 mm", "80 mm")
     model = asked(text + '[contact.upper]\nlength = "4 mm"\nheight = "4 mm"\n'
@@ -144,24 +129,11 @@ def test_order_a_stiff_sharp_block_on_a_long_one_is_the_flat_punch():
     assert patch.pressure.sigma_n[inner] == pytest.approx(wanted, rel=5e-3)
 
 
-def test_exact_equal_lengths_said_and_not_said_are_one_answer():
-    named = NARROW.format("upper") + NARROW.format("lower")
-    short = asked(BLOCK.replace("24 mm", "8 mm")), asked(BLOCK + named)
-    for one, other in ((asked(BLOCK), asked(BLOCK + named.replace("8 mm", "24 mm"))), short):
-        a, b = (values(solve(model, *bodies_of(model))) for model in (one, other))
-        assert a == b and one.length == other.length and other.alike and not other.outlined
-
-
 @pytest.mark.parametrize("text, outline", [(COATED, OUTLINE), (BLOCK, NARROW)])
 def test_exact_the_narrow_piece_may_lie_above_or_below(text, outline):
     a, b = (even(text + outline.format(*sides) + TILT.format("")) for sides in (("lower", "upper"), ("upper", "lower")))
     assert np.abs(a.pressure.sigma_n - b.pressure.sigma_n).max() <= 1e-9 * a.pressure.sigma_n.max()
     assert values(b) == pytest.approx(values(a), rel=1e-8)
-
-
-def test_exact_a_tilt_the_other_way_is_the_mirror_image():
-    a, b = (even(COATED + OUTLINE.format("upper", "lower") + TILT.format(sign)) for sign in ("", "-"))
-    assert np.abs(a.pressure.sigma_n - b.pressure.sigma_n[::-1]).max() <= 1e-8 * a.pressure.sigma_n.max()
 
 
 def test_exact_the_whole_load_passes_the_bond_lines_and_the_interface_of_either_piece():
@@ -213,14 +185,6 @@ def test_always_the_peak_beside_a_rounding_lies_in_the_bar_of_cells_that_pass_ov
         assert found["pressure_peak"].error < 20 * true["pressure_peak"]
 
 
-def test_always_a_bench_rubs_and_writes_its_fields_on_shaped_pieces(tmp_path):
-    text = COATED + OUTLINE.format("upper", "lower") + TILT.format("") + "[contact.shear]\n" + COULOMB + SLIDE
-    result = pf.run(text + "cycles = 1\n")
-    assert result.measures["friction_ratio_peak"].value == pytest.approx(0.3, rel=1e-6)
-    result.save(tmp_path / "out")
-    assert {"fields.vtkhdf", "result.nc"} <= {path.name for path in (tmp_path / "out").iterdir()}
-
-
 def test_refuses_a_profile_shorter_than_the_interface_though_not_than_the_longer_piece(tmp_path):
     x = np.linspace(0, 8.2, 400)
     rows = "\n".join(f"{a:.6f},{0.05 * np.sin(a):.6f}" for a in x)
@@ -237,14 +201,3 @@ def test_refuses_a_profile_shorter_than_the_interface_though_not_than_the_longer
         with pytest.raises(PatchfemError, match="trace"):
             solve(model, *bodies_of(model))
         assert [key for key, _ in faults(scene, tmp_path)] == ["contact.profile.file"]
-
-
-@pytest.mark.parametrize("more, planned, noted", [
-    ("", "the stiffness is assembled by the stencil of a tensor grid", []),
-    (NARROW.format("upper"), "the stiffness is assembled by scikit-fem, because the mesh of the "
-     "shaped ends is not a tensor grid",
-     ["scikit-fem assembles the stiffness of the lower and the upper piece"])])
-def test_always_plan_and_result_say_what_assembles_the_pieces(more, planned, noted):
-    scene = loads(BLOCK + 'element_size = "0.5 mm"\n' + more, "scene.toml")
-    assert [text for text in pf.plan(scene).verdict if "assemble" in text] == [planned]
-    assert [text for text in pf.run(scene).notes if "assemble" in text] == noted

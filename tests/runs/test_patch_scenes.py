@@ -1,33 +1,28 @@
 """Effects of the static patch through their scenes: skins, strips, profiles, joined and rounded pieces."""
 
 import json
-import os
 import re
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 from command_line import cli
-from scene_texts import COATED, COULOMB, PIECE, SLIDE
-from scipy.optimize import nnls
+from scene_texts import COATED, PIECE
 
 from patchfem.closed_forms import contact as exact
-from patchfem.core import Outcome, PatchfemError, frozen_array, say
+from patchfem.core import PatchfemError, frozen_array, say
 from patchfem.mesh.files import write_mesh
 from patchfem.mesh.pairs import as_piece
 from patchfem.mesh.tensor import graded_grid
 from patchfem.model.model import build
 from patchfem.model.pieces import bodies_of
-from patchfem.runs.patch.condensed import condensed
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.measures import measures, plane_band
-from patchfem.runs.patch.press import pressed, solve
+from patchfem.runs.patch.press import solve
 from patchfem.runs.patch.values import values
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
-from patchfem.surface.files.read import read_surface
 
 LENGTH, WIDTH, HEIGHT, LOAD = 12.7e-3, 12.7e-3, 6.35e-3, 115.653761996773
 TEXT = PIECE + """\
@@ -97,21 +92,6 @@ def test_exact_normal_stiffness_is_the_slope_of_the_load_over_the_approach(law, 
                                                             rel=5e-4 if law == "linear" else 1e-4)
 
 
-@pytest.mark.parametrize("law", SKINS)
-def test_exact_asperities_give_way_in_shear_without_the_pieces(law):
-    """A slow loop far inside the sticking range has the slope of the skin alone, and with [contact.shear] of both."""
-    bench = '[friction]\nlaw = "coulomb"\nstatic = 1e4\n[slide]\nkind = "triangle"\namplitude = "1 nm"\n' \
-            'speed = "1 mm/s"\n'
-    patch, found = solved(SKINS[law])
-    crush = 1e13 if patch.skin is None else patch.skin.stiffness
-    rigid, both = 0.8 * np.sum(crush * patch.pieces.interface.weight), found["tangential_stiffness"]
-    assert both < rigid
-    for tables, stiffness in (("", rigid), ("[contact.shear]\n", both)):
-        found = run(plan(scene(SKINS[law] + tables + bench)), estimate=False)
-        assert found.response.force.max() == pytest.approx(stiffness * 1e-9, rel=2e-4)
-        assert found.measures["loop_area"].value <= 1e-9 * stiffness * 1e-18
-
-
 # --------------------------------------------------------------------------------------------------------------- strips
 @pytest.mark.parametrize("count", [2, 8])
 def test_exact_strips_of_a_rigid_pad_on_a_linear_skin(count):
@@ -137,34 +117,6 @@ def test_exact_a_load_line_beside_the_middle_rolls_a_rigid_pad():
     assert found["roll"] == pytest.approx(-LOAD * arm / (1e13 * spread), rel=1e-5)
     outer = LOAD / (LENGTH * WIDTH) + LOAD * arm * patch.strips.offsets[-1] / spread
     assert patch.strips.pressure[-1] == pytest.approx(outer, rel=1e-4)
-
-
-@pytest.mark.parametrize("count, arm", [(2, 1e-3), (6, 3e-3)])
-def test_always_the_bars_of_a_free_roll_hold_the_count_of_strips(count, arm):
-    tables = f'[contact.crown]\nradius = "5 m"\n[contact.strips]\ncount = {{}}\noffset = "{arm} m"\n'
-    keys = 'load = "26 lbf"\nelement_size = "0.5 mm"'
-    few, many = (run(plan(scene(tables.format(n), keys))).measures for n in (count, 48))
-    for name in ("roll", "pressure_peak", "contact_fraction", "approach"):
-        assert abs(few[name].value - many[name].value) <= few[name].error + many[name].error, name
-    assert few["pressure_centre_lateral"].value == pytest.approx(arm, rel=1e-9)
-
-
-def test_exact_strips_are_written_one_by_one(tmp_path):
-    import xarray as xr
-
-    from patchfem.export.folder import write
-
-    found = scene(TILT.format(1e-5) + '[contact.strips]\ncount = 3\nroll = "0.01 mrad"\n',
-                  'load = "26 lbf"\nelement_size = "0.5 mm"')
-    write(run(plan(found), estimate=False), tmp_path)
-    with xr.open_dataset(tmp_path / "result.nc", engine="h5netcdf") as data:
-        assert data.strip_normal_stress.dims == ("strip", "x") and data.strip_offset.values[1] == 0.0
-        carried = (data.strip_normal_stress * data.weight / 3).sum()
-        assert float(carried) == pytest.approx(LOAD, rel=1e-10)
-        assert np.abs(data.strip_normal_stress.mean("strip") - data.normal_stress[0]).max() <= 1e-9 * 1e6
-    summary = json.loads((tmp_path / "summary.json").read_text("utf-8"))
-    lateral = float((data.strip_normal_stress * data.weight / 3 * data.strip_offset).sum()) / LOAD
-    assert summary["measures"]["pressure_centre_lateral"]["value"] == pytest.approx(lateral, rel=1e-9)
 
 
 def test_exact_strips_without_roll_are_the_patch():
@@ -217,63 +169,6 @@ def test_exact_a_stylus_trace_of_a_surface_is_its_gap_turned(tmp_path, on):
     assert upright["pressure_peak"] > 1.1 * trace["pressure_peak"]  # it rides on its two ends
 
 
-def test_exact_a_crown_measured_as_a_surface_is_the_crown(tmp_path):
-    x = np.linspace(-LENGTH / 2, LENGTH / 2, 8001)
-    tables = profile(tmp_path, x, -(x**2) / 2 / 5.0) + 'heights = "surface"\n'
-    read, crown = (solved(part, path=tmp_path / "scene.toml")[1]
-                   for part in (tables, '[contact.crown]\nradius = "5 m"\n'))
-    for name in ("pressure_peak", "contact_fraction", "contact_half_width", "normal_stiffness"):
-        assert read[name] == pytest.approx(crown[name], rel=1e-5), name
-
-
-def test_exact_a_slope_of_a_profile_is_taken_out_and_said(tmp_path):
-    x = np.linspace(-LENGTH / 2, LENGTH / 2, 2001)
-    patch, found = solved(profile(tmp_path, x, 1e-3 * x), path=tmp_path / "scene.toml")
-    flat = solved()[1]
-    assert any("the slope of 0.001 rad was subtracted" in note for note in patch.notes)
-    assert found["pressure_peak"] == pytest.approx(flat["pressure_peak"], rel=1e-3)
-
-
-def test_refuses_a_profile_finer_than_the_mesh_and_leaves_it_to_the_asperities(tmp_path):
-    x = np.linspace(-LENGTH / 2, LENGTH / 2, 8001)
-    tables = profile(tmp_path, x, 1e-7 * np.sin(2 * np.pi * x / 50e-6))
-    with pytest.raises(PatchfemError, match=r"scene\.toml:9: contact\.profile\.file: .* % of its rms height in waves "
-                                            r"shorter than 2 elem.*element_size"):
-        run(scene(tables, path=tmp_path / "scene.toml"))
-    patch, _ = solved(tables + SKINS["linear"], path=tmp_path / "scene.toml")
-    assert any("are represented by [contact.asperities]" in note for note in patch.notes)
-    # what the filter passes at a hundredth of the length, and the mean over a cell
-    seen = 0.5 ** (LENGTH / 100 / 50e-6)**2 * np.sinc(0.127e-3 / 50e-6)
-    inner = patch.gap[12:-12] - np.polyval(np.polyfit(patch.x[12:-12], patch.gap[12:-12], 1), patch.x[12:-12])
-    assert np.sqrt(2) * inner.std() == pytest.approx(1e-7 * abs(seen), rel=0.02)
-
-
-@pytest.mark.skipif("PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans")
-def test_exact_a_measured_gap_of_a_bolted_beam_is_pressed(tmp_path):
-    """Row 25 of 54 of the measured interface, 100 um of gap over 120 mm; the truth is a non-negative least-squares
-    problem: f >= 0 least in f C f/2 + g f at the load."""
-    row = read_surface(Path(os.environ["PATCHFEM_DATA"]) / "brb_surface_data.mat", ("m", "m")).row(25)
-    rows = "\n".join(f"{a!r},{b!r}" for a, b in zip(row.x.tolist(), row.z.tolist()))
-    (tmp_path / "row.csv").write_text(f"x [m],z [m]\n{rows}\n", "utf-8")
-    text = TEXT.format(keys='load = "10 kN"\nelement_size = "1 mm"', material=STEEL,
-                       tables='[contact.profile]\nfile = "row.csv"\n')
-    for key, value in (("length", "110 mm"), ("width", "25.4 mm"), ("height", "12.7 mm")):
-        text = re.sub(rf'^{key} = .*$', f'{key} = "{value}"', text, flags=re.M)
-    found = build(loads(text, tmp_path / "scene.toml")).patch
-    patch = solve(found, *bodies_of(found))
-    over = np.abs(row.x) < 55.5e-3
-    z = np.interp(patch.x, row.x[over], row.z[over])
-    line = np.polyval(np.polyfit(row.x[over], row.z[over], 1), patch.x)
-    assert patch.gap == pytest.approx(z - line - (z - line).min(), abs=1.5e-6)  # means over 1 mm against points
-    force = patch.pressure.sigma_n * patch.pieces.interface.weight
-    half = np.linalg.cholesky(patch.pieces.normal)
-    heavy = 1e4 * np.sqrt(np.trace(patch.pieces.normal))  # the load as one more row of the least squares
-    known, _ = nnls(np.vstack([half.T, np.full(force.size, heavy)]) * 1e3,
-                    np.append(-np.linalg.solve(half, patch.gap), heavy * 1e4) * 1e3)
-    assert force.sum() == pytest.approx(1e4, rel=1e-9) and 0 < (force > 0).sum() < 10
-    assert force == pytest.approx(known, abs=1e-2)
-
-
 # --------------------------------------------------------------------------------------------------- pieces that differ
 def meshed(folder, lower, upper) -> str:
     write_mesh(lower, folder / "pair.msh", upper)
@@ -307,18 +202,6 @@ def test_exact_pieces_of_unlike_nodes_carry_the_load_to_both_bodies(tmp_path):
 
 
 UNLIKE = '[contact.upper]\nsubstrate = "Ti-8Al-1Mo-1V"\nheight = "{}"\n'
-
-
-@pytest.mark.parametrize("height", ["6.35 mm", "9 mm"])
-def test_exact_a_mesh_of_unlike_pieces_is_the_grids_it_was_made_of(tmp_path, height):
-    tables = TILT.format(2e-5) + UNLIKE.format(height)
-    made = asked(tables, 'load = "26 lbf"\nelement_size = "0.3 mm"')
-    low, high = bodies_of(made)
-    read = asked(tables, meshed(tmp_path, low, high), path=tmp_path / "scene.toml")
-    mine, theirs = values(solve(read, *bodies_of(read))), values(solve(made, low, high))
-    assert mine == pytest.approx(theirs, rel=1e-9, abs=1e-15)
-    alike = asked(TILT.format(2e-5), 'load = "26 lbf"\nelement_size = "0.3 mm"')
-    assert theirs["approach"] > 1.1 * values(solve(alike, *bodies_of(alike)))["approach"]
 
 
 def test_refuses_a_mesh_whose_pieces_are_not_those_of_the_scene(tmp_path):
@@ -371,22 +254,6 @@ def test_exact_the_chosen_mesh_meets_hertz_within_its_error():
         assert mine[name].error <= 1e-2 * mine[name].value, name
 
 
-def test_exact_the_same_pair_serves_every_load_and_tilt():
-    found = asked(TILT.format(1e-5))
-    pair = condensed(found, *bodies_of(found))
-    for angle in (0.0, 1e-4):
-        other = asked(TILT.format(angle))
-        again, anew = values(pressed(other, pair)), solved(TILT.format(angle))[1]
-        assert again == pytest.approx(anew, rel=1e-12, abs=1e-18)
-
-
-def test_exact_worn_depth_is_a_shape_like_any_other():
-    found, crown = asked(), asked('[contact.crown]\nradius = "5 m"\n')
-    pair = condensed(found, *bodies_of(found))
-    worn = pressed(found, pair, pair.compliance.interface.x**2 / 10)
-    assert values(worn) == pytest.approx(values(pressed(crown, pair)), rel=1e-12, abs=1e-18)
-
-
 def test_exact_the_plane_band_is_the_other_plane_state():
     found = asked(TILT.format(1e-5))
     patch = solve(found, *bodies_of(found))
@@ -397,13 +264,6 @@ def test_exact_the_plane_band_is_the_other_plane_state():
     assert f"normal_stiffness by {100 * (stress['normal_stiffness'] / mine['normal_stiffness'] - 1):+.2g} %" in sentence
     wide = replace(asked(), width=60e-3)
     assert plane_band(wide, solve(wide, *bodies_of(wide))) == []
-
-
-def test_exact_nothing_touching_is_a_result_with_its_gap():
-    patch, found = solved('[contact.approach]\ndistance = "0 m"\n[contact.crown]\nradius = "1 m"\n' + SKINS["linear"],
-                          keys='element_size = "0.5 mm"')
-    assert patch.pressure.outcome is Outcome.NO_CONTACT and found["normal_load"] == 0
-    assert patch.pressure.gap == pytest.approx(patch.gap)
 
 
 def test_always_the_bar_of_an_even_mesh_holds_the_error_of_its_rows():
@@ -427,15 +287,6 @@ def test_exact_the_count_of_strips_is_in_the_bars():
         assert 0 < abs(few[name].value - many[name].value) <= few[name].error, name
 
 
-def test_refuses_a_run_that_the_memory_cannot_hold():
-    from patchfem.core import Missing
-
-    found = plan(scene(keys='load = "26 lbf"\nelement_size = "0.2 um"'))
-    assert any("`run` will refuse this scene" in sentence for sentence in found.verdict)
-    with pytest.raises(Missing, match="GB of memory are needed"):
-        run(found)
-
-
 @pytest.mark.parametrize("tables, keys, said", [
     ('[contact.upper]\nsubstrate = {young = "1 MPa", poisson = 0.3, density = "1 kg/m^3"}\n', "", "lowest Young"),
     ('[contact.upper]\nsubstrate = {young = "1 GPa", poisson = 0.4995, density = "1 kg/m^3"}\n', "",
@@ -445,14 +296,6 @@ def test_refuses_a_run_that_the_memory_cannot_hold():
 def test_always_what_leaves_the_model_is_said(tables, keys, said):
     found = run(plan(scene(tables, 'load = "26 lbf"\n' + (keys or 'element_size = "0.5 mm"'))))
     assert any(said in text for text in found.warnings)
-
-
-def test_exact_the_chain_of_a_plan_knows_both_pieces():
-    soft = '[contact.upper]\nsubstrate = {young = "1 GPa", poisson = 0.3, density = "1 kg/m^3"}\n[contact.shear]\n'
-    rub = COULOMB + SLIDE.replace("10 um", "1 um").replace("5 mm/s", "1 mm/s")
-    chain = plan(scene(soft + rub)).chain
-    bars = 1 / (HEIGHT * 2.6 / 210e9 + HEIGHT * 2.6 / 1e9) * LENGTH * WIDTH
-    assert chain["pieces_shear"] == pytest.approx(bars, rel=1e-9)
 
 
 @pytest.mark.parametrize("shape, ends, told", [

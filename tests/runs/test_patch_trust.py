@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from scene_texts import COATING, PIECE
 
@@ -41,24 +40,3 @@ def test_bars_of_a_tilted_rig_patch_hold_an_independent_program(angle):
     found = pf.run(RIG + f'[contact.tilt]\nangle = "{angle}"\n').measures
     for name, truth in zip(DECISIVE, TILTED[angle]):
         assert abs(found[name].value - truth) <= found[name].error + 2e-6 * truth, (name, found[name])
-
-
-def test_exact_a_parabola_read_from_a_file_is_a_crown(tmp_path):
-    """Each on the mesh that it chose."""
-    x = np.linspace(-6.35e-3, 6.35e-3, 255)
-    rows = "\n".join(f"{a:.17g},{a * a / 20:.17g}" for a in x)
-    (tmp_path / "shape.csv").write_text("x [m],z [m]\n" + rows + "\n")
-    (tmp_path / "scene.toml").write_text(RIG + '[contact.profile]\nfile = "shape.csv"\n')
-    read, crown = pf.run(tmp_path / "scene.toml"), pf.run(RIG + '[contact.crown]\nradius = "10 m"\n')
-    for name in DECISIVE:
-        one, other = read.measures[name], crown.measures[name]
-        assert abs(one.value - other.value) <= one.error + other.error, (name, one, other)
-
-
-def test_a_warning_names_the_pinned_mesh_and_the_chosen_one_cures_it():
-    """A size from the order of the error was advised once, which an even mesh has not where a contact ends."""
-    pinned = RIG.replace('load = "26 lbf"', 'load = "26 lbf"\nelement_size = "0.4 mm"')
-    shape = '[contact.crown]\nradius = "5 m"\n[accuracy]\ntolerance = 1e-2\n'
-    said = [one for one in pf.run(pinned + shape).warnings if "contact.element_size" in one]
-    assert len(said) == 1 and said[0].endswith("; leave out contact.element_size")
-    assert not [one for one in pf.run(RIG + shape).warnings if "tolerance" in one]

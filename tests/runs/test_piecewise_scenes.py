@@ -10,7 +10,6 @@ from support.scene_texts import (
     COULOMB,
     DRIVE,
     FORCED,
-    KEYS,
     KILOGRAM,
     MODE,
     PAIR,
@@ -20,11 +19,9 @@ from support.scene_texts import (
     SHEAR,
     SWEEP,
     friction_of,
-    only,
 )
 
 import patchfem as pf
-from patchfem.effects import LAWS
 
 IWAN = friction_of("iwan")
 RIG = POINT + PLASTIC + MODE + DRIVE
@@ -92,21 +89,10 @@ def test_exact_patch_behind_its_shear(law):
     assert np.abs(fine["slip"] - coarse["slip"]).max() < 0.02 * np.abs(coarse["slip"]).max()
 
 
-def test_exact_sweep():
-    exact, march = both(POINT + PLASTIC + MODE + SWEEP, "accuracy.tolerance=1e-4")
-    assert agree(exact, march) == []
-    assert exact.measures["slip_start_phase"].value is None
-
-
 def test_exact_both_books_close():
     """The samples hold every yield, so the trapezoidal rule on them is exact."""
     exact = pf.run(POINT + PLASTIC + MODE + SECOND + DRIVE, **{"accuracy.method": "exact"})
     assert exact.measures["work_check"].value < 1e-11 and exact.measures["loop_area"].value > 1e-4
-
-
-def test_exact_iwan():
-    exact, march = both(POINT + IWAN + MODE + DRIVE, "drive.cycles=6")
-    assert agree(exact, march) == []
 
 
 def test_exact_levels_and_their_onset():
@@ -152,11 +138,6 @@ def test_always_auto_takes_the_cheaper_engine():
     assert engine(POINT + PLASTIC + MODE + '[structure.stiffening]\ncubic = "1e12 N/m^3"\n' + DRIVE) == "march"
 
 
-def test_always_the_plan_says_what_both_engines_cost():
-    said = " ".join(pf.plan(pf.load(RIG)).verdict)
-    assert "1 element by engine piecewise; computing time" in said and "with time steps at this tolerance" in said
-
-
 def test_refuses_an_exact_run_without_end():
     stiff = RIG.replace("1 um", "1e-13 um") + '[accuracy]\nmethod = "exact"\n'
     said = r"more than the limit of \d+ s; lower drive.cycles or the stiffness of"
@@ -165,24 +146,3 @@ def test_refuses_an_exact_run_without_end():
     march = pf.plan(stiff, **{"accuracy.method": "march"}).seconds
     seconds = float(str(found.value).partition("computing time of about ")[2].split(" s")[0])
     assert ("accuracy.method" in str(found.value)) == (march < seconds)
-
-
-def test_refuses_exact_where_a_spring_bends_or_the_load_changes():
-    exact = '[accuracy]\nmethod = "exact"\n'
-    bends = POINT + PLASTIC + MODE + '[structure.stiffening]\ncubic = "1e12 N/m^3"\n' + DRIVE + exact
-    assert "no exact solution exists with [structure.stiffening]" in only(bends)
-    varies = POINT + 'amplitude = "10 N"\nfrequency = "20 Hz"\n' + PLASTIC + MODE + DRIVE + exact
-    assert "no exact solution exists with normal.amplitude" in only(varies)
-    assert "no exact solution exists for law 'tanh'" in only(
-        POINT + '[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"\n' + MODE + DRIVE + exact)
-
-
-def test_always_laws_of_pieces_are_those_with_parallel_elements():
-    from patchfem.friction.record import law_from
-    from patchfem.scene.scene import loads
-
-    for law in sorted(KEYS.keys() - {"nonlocal"}):
-        scene = loads(POINT + friction_of(law) + MODE + DRIVE, "a.toml")
-        parallel = law_from(scene.friction, 100.0).element(100.0).form == "parallel"
-        carried = "pieces" in LAWS[law].carries.split()
-        assert carried == (parallel or law == "coulomb")  # Coulomb's points behind the pieces' shear are such elements

@@ -10,7 +10,6 @@ from scene_texts import COULOMB, NONLOCAL, PLASTIC, POINT, SMALL_PATCH, TRIANGLE
 from patchfem.core import PatchfemError
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.recursion import Recursion
-from patchfem.inputs.paths import read_path
 from patchfem.model.model import build
 from patchfem.runs.bench import bench as law_bench
 from patchfem.runs.bench.ledger import UNWATCHED
@@ -24,7 +23,6 @@ LONGER = NONLOCAL.replace("1 um", "2 um")
 FILE = '[slide]\nkind = "file"\nfile = "path.csv"\n'
 STRIPS = '[contact.strips]\ncount = 4\nroll = "0.02 mrad"\n'
 L_SHAPE = "time [ms],displacement [um],lateral [um]\n0,0,0\n2,10,0\n6,10,20\n8,4,24\n"
-NEWTON = 115.65376199677297
 
 
 @pytest.fixture
@@ -79,29 +77,6 @@ def test_exact_a_column_of_zeros_is_the_slide_in_one_direction(table, keys):
     assert fast.values.keys() == two.values.keys()
 
 
-@pytest.mark.share(0, 2)
-@pytest.mark.parametrize("keys", ["", "order = 2\n", 'reading = "report"\n'])
-def test_exact_directions_changed_about(table, keys):
-    """The same path with its columns exchanged: forces exchange too, also where the x column never moves."""
-    rows = [(0, 0), (3, 6), (5, 2), (9, 8)]
-    x_only = "time [ms],displacement [um],lateral [um]\n" + "".join(f"{t},{x},0\n" for t, x in rows)
-    y_only = "time [ms],displacement [um],lateral [um]\n" + "".join(f"{t},0,{x}\n" for t, x in rows)
-    one, two = (law_bench.run(build(table(text, POINT + LONGER + keys)), None, 80) for text in (x_only, y_only))
-    assert two.lateral_force == pytest.approx(one.force, rel=1e-10, abs=1e-10) and not two.force.any()
-    assert (one.time == two.time).all()
-
-
-@pytest.mark.slow
-def test_exact_the_resting_turn_of_a_right_angle(table):
-    """After a long leg along x (z = eps) a leg along y: F_x = e^-y/eps, F_y = 1 - e^-y/eps of mu N, by hand."""
-    text = "time [ms],displacement [um],lateral [um]\n0,0,0\n20,80,0\n21,80,8\n"
-    found = law_bench.run(build(table(text)), None, 4000)
-    limit, y = 0.3 * found.load[0], found.lateral
-    turned = y > 0
-    assert found.force[turned] == pytest.approx(limit * np.exp(-y[turned] / 2e-6), rel=1e-9, abs=1e-12 * limit)
-    assert found.lateral_force[turned] == pytest.approx(limit * -np.expm1(-y[turned] / 2e-6), rel=1e-9)
-
-
 @pytest.mark.parametrize("strips", ["", STRIPS])
 def test_exact_every_point_of_a_patch_stepped_on_its_own(table, strips):
     """Resultants and yaw moment from the law at every node of every strip, with that strip's own pressure."""
@@ -145,12 +120,6 @@ def test_exact_histories_of_both_directions_are_written(table, tmp_path):
         assert data["lateral_displacement"].values[-1] == pytest.approx(24e-6)
     wide = table(L_SHAPE.replace("24", "2400"), SMALL_PATCH + LONGER, "accuracy.steps_per_cycle=50")
     assert any("0.189 of the width" in w or "0.19 of the width" in w for w in run(plan(wide), estimate=False).warnings)
-
-
-def test_exact_the_table_is_read_in_any_order_of_columns(tmp_path):
-    (tmp_path / "a.csv").write_text("lateral [mm],time [ms],displacement [um]\n0,0,0\n1e-3,2,5\n", "utf-8")
-    time, x, y = read_path(tmp_path / "a.csv")
-    assert (time[1], x[1], y[1]) == pytest.approx((2e-3, 5e-6, 1e-6))
 
 
 @pytest.mark.parametrize("text, says", [

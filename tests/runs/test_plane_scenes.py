@@ -146,15 +146,6 @@ def test_always_check_plan_run_and_sweep_take_a_plane(tmp_path):
     assert swept.code == 0, swept.err
 
 
-def test_always_a_plane_stands_beside_other_laws_and_a_spring_that_bends(tmp_path):
-    text = text_of(chain(12)).replace("[drive]", '[[structure.interface]]\nbetween = [2, 0]\nlaw = "coulomb"\n'
-                                      'static = 0.3\nload = "0.5 N"\n[structure.stiffening]\ncubic = "1e10 N/m^3"\n'
-                                      '[drive]', 1)
-    found = run_of(tmp_path, "beside", text)
-    assert found.outcome != "not_converged" and found.measures.energy_balance.value < 1e-8
-    assert found.measures.slip_amplitude_3.value > 0
-
-
 REFUSED = {
     'lateral = [3, 3]': "joins mass 3 to itself",
     'lateral = [9, 0]': "there is no mass 9",
@@ -197,12 +188,6 @@ def test_refuses_laws_without_a_form_in_a_plane(law, tmp_path):
     with pytest.raises(pf.SceneError) as caught:
         run_of(tmp_path, "bad", MASSES.replace('"elastic-plastic"', law).replace('stiffness = "60 kN/m"', more))
     assert LAWS[law] in str(caught.value)
-
-
-@pytest.mark.parametrize("method", ["exact", "harmonic"])
-def test_refuses_methods_that_know_one_direction(method, tmp_path):
-    with pytest.raises(pf.SceneError, match=r"structure\.interface\.lateral.*use 'march'"):
-        run_of(tmp_path, "bad", MASSES + f'[accuracy]\nmethod = "{method}"\n')
 
 
 def test_refuses_a_patch_a_file_a_backbone_and_friction_elements(tmp_path):

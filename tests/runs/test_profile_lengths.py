@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from scene_texts import COATING, PIECE
-from synthetic import self_affine
 
 import patchfem as pf
 from patchfem.closed_forms import contact as closed_forms
@@ -95,32 +94,3 @@ def test_points_and_cells_agree_within_their_bars(tmp_path, pieces):
         assert abs(value - even[name].value) <= error + even[name].error + even[name].floor, name
         if name in ("approach", "pressure_peak", "normal_stiffness"):
             assert error <= 2e-3 * abs(value), name
-
-
-@pytest.mark.slow
-def test_a_smooth_trace_asks_for_no_points_and_a_rough_one_does(tmp_path):
-    """Heights down to four samples, of which length/200 showed 60 %: the share, the peak and the stiffness of the
-    points are those of twice as many within a few per cent."""
-    x = np.linspace(-6.35e-3, 6.35e-3, 1601)
-    text = PIECE + 'load = "115.7 N"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING
-    smooth = pressed(tmp_path, x, 0.1e-6 * np.cos(2 * np.pi * x / 6e-3), text)
-    assert not smooth.patch.sharper
-    rough = self_affine(12.7e-3, 1600, 0.3e-6, 0.8, 0.8e-3, 32e-6, 1)
-    found = pressed(tmp_path, x, rough.z, text)
-    assert found.patch.sharper and found.patch.averaging < 8e-6
-    for name, share in (("contact_fraction", 0.03), ("pressure_peak", 0.02), ("normal_stiffness", 0.02)):
-        assert found.measures[name].error <= share * found.measures[name].value, name
-
-
-@pytest.mark.slow
-def test_a_bench_takes_the_static_measures_of_the_points(tmp_path):
-    """Its motion is that of the cells, whose changes from mesh to mesh its errors hold."""
-    x = np.linspace(-6.35e-3, 6.35e-3, 1601)
-    z = self_affine(12.7e-3, 1600, 0.3e-6, 0.8, 0.8e-3, 32e-6, 1).z
-    text = PIECE + 'load = "115.7 N"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING
-    slide = '[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\nkind = "sine"\namplitude = "1 um"\n' \
-            'frequency = "1 Hz"\n'
-    still, moved = (pressed(tmp_path, x, z, each).measures for each in (text, text + slide))
-    for name in ("pressure_peak", "contact_fraction", "approach"):
-        assert moved[name].value == pytest.approx(still[name].value, abs=moved[name].error + still[name].error)
-    assert moved["friction_force_peak"].value == pytest.approx(0.3 * 115.7, rel=1e-3)

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from scene_texts import shaken
 from scipy.signal import lsim, lti
 
 import patchfem as pf
@@ -53,22 +52,6 @@ def test_exact_energies_balance_under_elastic_plastic_friction():
         "the frequency response (H1) has no peak")
 
 
-def test_exact_friction_power_is_work_over_time_with_the_scatter_of_its_parts():
-    """Of a record, not per cycle, which a random drive has none of: other seeds lie within twice the interval."""
-    powers = []
-    for seed in range(1, 6):
-        result = pf.run(RIG | PLASTIC, **{"drive.seed": seed})
-        one, scatter = (result.measures[name] for name in ("friction_power", "friction_power_scatter"))
-        w = result.window
-        work = w.extra["ledger"][0]
-        assert one.value == pytest.approx((work[-1] - work[0]) / (w.time[-1] - w.time[0]), rel=1e-9)
-        assert 0 < scatter.value < one.value and one.unit == "W"
-        powers.append((one.value, scatter.value))
-    values, scatters = np.array(powers).T
-    assert (np.abs(values - values.mean()) < 2 * scatters).all()
-    assert "friction_power" not in pf.run(RIG).measures  # nothing rubs
-
-
 def test_each_seed_is_another_record_and_the_same_one_again():
     first, again, other = (pf.run(RIG, **{"drive.seed": seed, "drive.duration": "1 s"}).measures for seed in (1, 1, 2))
     assert first["relative_displacement_rms"].value == again["relative_displacement_rms"].value
@@ -102,18 +85,3 @@ def test_refuses_a_random_drive_that_none_can_be(given, said):
     drive = {name: one for name, one in (RIG["drive"] | given).items() if one is not None}
     with pytest.raises(pf.PatchfemError, match=said):
         pf.run(RIG | {"drive": drive})
-
-
-def test_refuses_a_steady_motion_and_wear_under_noise():
-    for more, said in (({"accuracy": {"method": "harmonic"}}, "under a sine"),
-                       ({"wear": {"coefficient": 1e-14, "cycles": 100}}, "random")):
-        with pytest.raises(pf.PatchfemError, match=said):
-            pf.run(RIG | PLASTIC | more)
-
-
-def test_a_backbone_is_that_of_the_rig_whatever_drives_it():
-    one = pf.backbone(RIG | PLASTIC, amplitudes="1 um..100 um:3", method="quasi-static")
-    other = pf.backbone(shaken('law = "elastic-plastic"\nbond_length = "50 um"', "1 g", 5), **{
-        "structure.moving_mass": 0.9, "structure.mode.axial.damping": 0.02}, amplitudes="1 um..100 um:3",
-        method="quasi-static")
-    assert one["quasi_static_frequency"].values == pytest.approx(other["quasi_static_frequency"].values, rel=1e-9)

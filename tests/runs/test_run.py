@@ -2,23 +2,18 @@
 
 import json
 import socket
-import subprocess
-import sys
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 
-import friction_forms
 import numpy as np
 import pytest
 import xarray as xr
 from command_line import cli
 from scene_texts import BENCH, COULOMB, NONLOCAL, POINT, SHEAR, SLIDE, SMALL_PATCH, STRUCTURE
-from vibration_forms import two_stop_amplitude
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkCommonDataModel import vtkCompositeDataSet
 from vtkmodules.vtkIOHDF import vtkHDFReader
-from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
 from patchfem.core import G_N, Outcome
 from patchfem.effects import EFFECTS
@@ -186,21 +181,6 @@ def test_exact_netcdf(done, name):
         assert ((data.status == 0) == (data.normal_stress == 0)).all()
 
 
-@pytest.mark.parametrize("name", ["linear", "rig", "rig march", "rig patch"])
-def test_exact_histories_are_dense_at_the_end(done, name):
-    data = netcdf(done(name)[0])
-    period = 1 / 143
-    end = float(data.time[-1])
-    assert end == pytest.approx(30 * period, rel=1e-12)
-    for cycle in (1, 2):
-        inside = (data.time >= end - cycle * period) & (data.time < end - (cycle - 1) * period)
-        assert int(inside.sum()) >= 100
-    np.testing.assert_allclose(data.base_acceleration, 5 * G_N * np.sin(OMEGA * data.time), atol=1e-9)
-    assert float(data.relative_displacement[0]) == 0.0 == float(data.relative_velocity[0])
-    if name != "linear":
-        assert float(np.abs(data.friction_force).max()) <= 0.3 * LOAD * (1 + 1e-9)
-
-
 @pytest.mark.parametrize("name", ["rig", "rig march", "rig patch", "linear"])
 def test_exact_newton_holds_at_every_sample(done, name):
     """m (a_abs) = -k q - c v - F at each kept sample."""
@@ -219,52 +199,7 @@ def test_exact_shear_frames_carry_the_friction_force(done):
     assert float((np.abs(data.shear_stress) - limit).max()) <= 1e-9 * float(limit.max())
 
 
-def test_exact_linear_response(done):
-    """30 cycles at resonance from rest: the amplitude rises as 1 - exp(-zeta w t) towards a/(2 zeta w^2)."""
-    answer = json.loads(done("linear")[1].out)
-    steady = 5 * G_N / (2 * 0.003 * OMEGA**2)
-    found = answer["measures"]["relative_displacement_amplitude"]["value"]
-    assert found == pytest.approx(steady * (1 - np.exp(-0.003 * 2 * np.pi * 30)), rel=1e-2)
-    limit = answer["measures"]["relative_displacement_amplitude_steady"]
-    assert answer["outcome"] == "transient" and limit["value"] == pytest.approx(steady, abs=limit["error"])
-    assert limit["error"] < 0.05 * steady
-
-
-def test_exact_rig_at_a_point(done):
-    answer = json.loads(done("rig")[1].out)["measures"]
-    ratio = 0.3 * LOAD / 0.884 / (5 * G_N)
-    undamped = two_stop_amplitude(ratio) * 5 * G_N / OMEGA**2
-    assert answer["relative_displacement_amplitude"]["value"] == pytest.approx(undamped, rel=0.06)
-    assert answer["friction_force_peak"]["value"] == pytest.approx(0.3 * LOAD, rel=1e-12)
-    loop = friction_forms.coulomb_loop_area(answer["slip_amplitude"]["value"], 0.3 * LOAD)
-    assert answer["loop_area"]["value"] == pytest.approx(loop, rel=1e-6)  # the last 3 cycles still settle
-    stiffness = 0.884 * OMEGA**2
-    damping = loop / (2 * np.pi * stiffness * answer["relative_displacement_amplitude"]["value"]**2)
-    assert answer["equivalent_damping"]["value"] == pytest.approx(damping, rel=1e-6)
-
-
-def test_exact_bench_at_a_point(done):
-    answer = json.loads(done("bench")[1].out)["measures"]
-    assert answer["friction_ratio_peak"]["value"] == pytest.approx(0.3, rel=1e-12)
-    assert answer["slip_amplitude"]["value"] == pytest.approx(10e-6, rel=1e-9)
-    assert answer["loop_area"]["value"] == pytest.approx(friction_forms.coulomb_loop_area(10e-6, 0.3 * LOAD), rel=1e-9)
-
-
 # fields
-
-@pytest.mark.parametrize("name", WITH_FIELDS)
-def test_exact_fields_hold_both_bodies(done, name):
-    folder, _ = done(name)
-    fields, data = Fields(folder), netcdf(folder)
-    assert fields.steps == data.sizes["frame"]
-    first = fields.frame(0)
-    assert len(first.lower.cells) == len(first.upper.cells)
-    for body, side in ((first.lower, -1), (first.upper, 1)):
-        assert np.abs(body.place[:, 1]).max() == pytest.approx(6.35e-3) and (side * body.place[:, 1] >= 0).all()
-        assert {len(c) for c in body.cells} == {4}
-        assert {"displacement", "stress", "von_mises", "material"} <= vars(body).keys()
-    assert {"normal_stress", "gap"} <= vars(first.interface).keys() and not hasattr(first.lower, "gap")
-    np.testing.assert_allclose([fields.frame(k).time for k in range(fields.steps)], data.frame_time, rtol=1e-12)
 
 
 @pytest.mark.parametrize("name", WITH_FIELDS)
@@ -319,28 +254,6 @@ def test_exact_pressure_on_the_upper_piece_is_one_point():
     assert lumped.measures["loop_area"].value == pytest.approx(point.measures["loop_area"].value, rel=1e-10)
 
 
-@pytest.mark.parametrize("law", ["nonlocal", "elastic-plastic"])
-@pytest.mark.parametrize("steps", [100, 200, 400])
-def test_always_half_the_step_stays_within_the_error(law, steps):
-    def at(count, estimate):
-        sets = [f"accuracy.steps_per_cycle={count}", f"friction.law={law}"]
-        found = run(plan(loads(POINT + NONLOCAL + STRUCTURE + STEPS, sets=sets)), estimate=estimate)
-        return found.measures["relative_displacement_amplitude"]
-
-    coarse = at(steps, True)
-    assert abs(at(2 * steps, False).value - coarse.value) < coarse.error
-
-
-def test_exact_march_of_a_rigid_law_meets_the_event_engine():
-    sets = ["drive.cycles=60"]
-    text = POINT + COULOMB + STRUCTURE
-    exact = run(plan(loads(text, sets=sets))).measures["relative_displacement_amplitude"].value
-    marched = run(plan(loads(text, sets=[*sets, "accuracy.method=march", "accuracy.steps_per_cycle=800"])))
-    found = marched.measures["relative_displacement_amplitude"]
-    assert found.value == pytest.approx(exact, rel=2e-3)
-    assert abs(found.value - exact) < found.error
-
-
 def test_exact_mesh_round_trip(written, tmp_path):
     """The patch on the mesh that was written is the patch on the mesh that was made."""
     scene = written(SMALL_PATCH)
@@ -352,16 +265,6 @@ def test_exact_mesh_round_trip(written, tmp_path):
         assert read[key].value == pytest.approx(made[key].value, rel=1e-9, abs=1e-18), key
     assert cli("run", scene, "--set", "contact.mesh=pair.msh", "--set", "contact.height=7 mm", "-o",
                tmp_path / "out").code == 2
-
-
-def test_exact_mesh_for_vtk(written, tmp_path):
-    assert cli("mesh", written(SMALL_PATCH), "-o", tmp_path / "pair.vtu").code == 0
-    reader = vtkXMLUnstructuredGridReader()
-    reader.SetFileName(str(tmp_path / "pair.vtu"))
-    reader.Update()
-    place = vtk_to_numpy(reader.GetOutput().GetPoints().GetData())
-    assert np.ptp(place, axis=0) == pytest.approx([0.0127, 0.0127, 0.0], rel=1e-12)
-    assert np.unique(place[:, 0].round(9)).size == 27
 
 
 @pytest.mark.parametrize("path", sorted(STUDIES.rglob("*.toml")), ids=lambda p: str(p.relative_to(STUDIES)))
@@ -382,15 +285,6 @@ def test_exact_plan_as_json(written):
     assert found["stiffness_chain"]["bonds"] == pytest.approx(0.3 * LOAD / 1e-6, rel=1e-12)
 
 
-def test_exact_stuck_and_apart(written, tmp_path):
-    stuck = cli("run", written(POINT + COULOMB + STRUCTURE), "--set", "drive.acceleration=3 g", "--json", "-o",
-                tmp_path / "a")
-    assert json.loads(stuck.out)["outcome"] == "stuck"
-    assert json.loads(stuck.out)["measures"]["relative_displacement_amplitude"]["value"] == 0.0
-    apart = cli("run", written(SMALL_PATCH), "--set", "contact.load=0 N", "--json", "-o", tmp_path / "b")
-    assert apart.code == 0 and json.loads(apart.out)["outcome"] == "no_contact"
-
-
 # exit codes
 
 def test_refuses_mistakes_with_one_line_each(written, tmp_path):
@@ -400,23 +294,6 @@ def test_refuses_mistakes_with_one_line_each(written, tmp_path):
     lines = answer.err.splitlines()
     assert len(lines) >= 2 and all(line.startswith(f"{scene}:") for line in lines)
     assert cli("check", scene).err == answer.err and not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize("words", [("run",), ("run", "none.toml"), ("frobnicate",), ("run", "a.toml", "--frob"),
-                                   ("mesh", "a.toml")], ids=" ".join)
-def test_refuses_bad_requests(words):
-    answer = cli(*words)
-    assert answer.code == 2 and answer.err and "Traceback" not in answer.err
-
-
-@pytest.mark.parametrize("sets", [
-    ("structure.mode.axial.lateral=1",),
-], ids=lambda sets: sets[0].split("=")[0])  # fmt: skip
-def test_refuses_keys_not_yet_built(written, tmp_path, sets):
-    words = [word for one in sets for word in ("--set", one)]
-    answer = cli("run", written(SMALL_PATCH + NONLOCAL + STRUCTURE), "-o", tmp_path / "out", *words)
-    assert answer.code == 2 and "not supported yet" in answer.err
-    assert not (tmp_path / "out").exists()
 
 
 def test_refuses_resume_and_a_mesh_without_a_patch(written, tmp_path):
@@ -433,20 +310,6 @@ def test_refuses_what_takes_too_long_or_cannot_be_written(written, tmp_path):
                  tmp_path / "out")
     assert costly.code == 4 and "list of bonds" in costly.err
     assert cli("run", written(POINT + COULOMB + SLIDE), "-o", scene / "inside").code == 4
-
-
-@pytest.mark.parametrize("raised, code", [(KeyboardInterrupt(), 130), (MemoryError(), 4), (ValueError("odd"), 1),
-                                          (PermissionError(13, "Permission denied", "x"), 4)])
-def test_exact_codes_of_interruptions(written, tmp_path, monkeypatch, raised, code):
-    from patchfem.export import folder as results_folder
-
-    def stop(*_, **__):
-        raise raised
-
-    monkeypatch.setattr(results_folder, "run", stop)
-    answer = cli("run", written(POINT + COULOMB + SLIDE), "-o", tmp_path / "out")
-    assert answer.code == code and len(answer.err.splitlines()) <= 2 and "Traceback" not in answer.err
-    assert not (tmp_path / "out").exists()
 
 
 def test_exact_an_old_folder_survives_a_failing_run(written, tmp_path, monkeypatch):
@@ -470,15 +333,6 @@ def test_exact_an_old_folder_survives_a_failing_run(written, tmp_path, monkeypat
     assert cli("run", scene, "-o", out, "-q", "--set", "drive.cycles=6").code == 0
     assert state()["summary.json"] != before["summary.json"]
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out", "scene.toml"]
-
-
-def test_exact_the_installed_command(written, tmp_path):
-    """One run in a process of its own: the answer on stdout, nothing else there, and exit code 0."""
-    one = subprocess.run([sys.executable, "-m", "patchfem", "run", str(written(POINT + COULOMB + SLIDE)), "--json"],
-                         capture_output=True, text=True, cwd=tmp_path, timeout=60)
-    assert one.returncode == 0 and "Traceback" not in one.stderr
-    assert json.loads(one.stdout)["kind"] == "bench"
-    assert (tmp_path / "out" / "scene" / "summary.json").is_file()
 
 
 def test_exact_a_run_that_misses_its_residual_is_kept_and_marked(written, tmp_path, monkeypatch):

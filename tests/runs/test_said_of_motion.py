@@ -7,7 +7,6 @@ import pytest
 
 import patchfem as pf
 from patchfem.core import Measure, Outcome
-from patchfem.export.pages.words import table_of
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.response.errors import coarser_errors
 from patchfem.response.measures import relative_gap
@@ -64,11 +63,6 @@ cycles = 6
 """
 
 
-def test_exact_transient_names_no_estimate_that_a_run_may_lack():
-    assert "_steady" not in Outcome.TRANSIENT.sentence and "if the drive is periodic" in \
-        Outcome.TRANSIENT.sentence
-
-
 @pytest.mark.parametrize(("outcome", "share", "said"), [
     (Outcome.STEADY, 0.0, True), (Outcome.STEADY, 0.3, True), (Outcome.TRANSIENT, 0.0, False)])
 def test_exact_a_drift_of_a_steady_motion_is_said_whatever_the_breakaway(outcome, share, said):
@@ -105,11 +99,3 @@ def test_exact_an_output_that_stands_still_has_no_stiffness_nor_slip():
     still = Seen(window, SimpleNamespace(period=72.0), None, {}, 12.9, 2e5, True, loop=(1e-22, 3.9, 0.0))
     assert still.slip == {"slip_amplitude": 0.0, "stick_fraction": 1.0} and still.cycle == {"loop_area": 0.0}
     assert relative_gap(1e-22, 2e-22, 2e-22) == 0 < relative_gap(1e-12, 2e-12, 2e-12)
-
-
-@pytest.mark.parametrize("worn", [False, True])
-def test_exact_the_work_beside_wear_is_that_of_the_marched_cycles(worn):
-    one = {"value": 1.0, "error": 0.0, "unit": "J", "reason": ""}
-    lines = "\n".join(table_of({"friction_work": one} | ({"worn_volume": one | {"unit": "m3"}} if worn else {})))
-    assert ("over the cycles of the motion, not those of wear" in lines) == worn != ("over the whole run" in lines)
-    assert worn or "over the two stored cycles" in "\n".join(table_of({"friction_work": one}, "harmonic"))

@@ -3,18 +3,13 @@ run on it."""
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 from scene_texts import COATING, CROWNED_JOINT, PIECE
 
 from patchfem.core import PatchfemError
-from patchfem.mesh.grading import Layout
 from patchfem.model.model import build
 from patchfem.runs.many.meshes import meshed
-from patchfem.runs.patch import condensed, grids, store
 from patchfem.runs.patch.ladder import solve_all
-from patchfem.runs.patch.measures import measures
-from patchfem.runs.patch.meshes import _merged
 from patchfem.runs.run import run
 from patchfem.scene import scene
 
@@ -38,14 +33,6 @@ def family(*angles, **keys):
     return [model(angle, **keys) for angle in angles]
 
 
-@pytest.mark.slow
-def test_exact_a_case_does_not_depend_on_the_order_of_the_others():
-    cases = family(1e-6, 1e-4, 1e-3)
-    names = {meshed(some)[0].patch.meshes.name for some in (cases, cases[::-1], cases + cases[1:3])}
-    assert len(names) == 1
-    assert meshed(cases[:2])[0].patch.meshes.name not in names
-
-
 @pytest.mark.parametrize("angle", [1e-6, 1e-3])
 def test_exact_a_case_is_the_cold_run_on_the_shared_mesh(angle):
     one = next(m for m in meshed(family(1e-6, 1e-5, 1e-3)) if m.patch.gap.angle == angle)
@@ -56,66 +43,6 @@ def test_exact_a_case_is_the_cold_run_on_the_shared_mesh(angle):
         same = warm.measures[name]
         assert same.value == pytest.approx(m.value, rel=1e-12, abs=1e-12 * m.floor), name
         assert same.error == pytest.approx(m.error, rel=1e-12, abs=1e-12 * abs(m.value)), name
-
-
-def test_exact_pieces_of_meshes_that_are_just_made_are_not_made_again(monkeypatch):
-    one = meshed(family(2e-6, 3e-5, 4e-4))[0].patch
-    anew = [condensed.condensed(one, *level, fresh=True) for level in one.meshes.levels]
-    with monkeypatch.context() as patch:
-        patch.setattr(condensed, "condensed", None)
-        pairs = condensed.shared_pairs(one)
-    assert [pair.grid for pair in pairs] == [low for low, _ in one.meshes.levels]
-    for pair, other in zip(pairs, anew, strict=True):
-        assert (pair.compliance.normal == other.compliance.normal).all() and not pair.piece.made
-        assert (pair.compliance.tangential == other.compliance.tangential).all()
-
-
-def test_exact_the_pieces_of_a_first_search_serve_all_patches_of_a_geometry(monkeypatch):
-    """The coarsest grids that they lead to are those of a search of its own; a gap with waves has other columns."""
-    low, high = (one.patch for one in family(1e-5, 1e-3))
-    store.clear()
-    alone = grids.base_grids(high).bodies
-    store.clear()
-    pair = grids.search_pair(low)
-    assert grids.search_pair(high) is pair
-    assert [list(body.x) for body in grids.base_grids(high).bodies] == [list(body.x) for body in alone]
-    monkeypatch.setattr(grids, "_longest", lambda _: 5e-5)
-    assert grids.search_pair(high).grid.x.size > pair.grid.x.size
-
-
-def test_exact_a_merged_layout_keeps_the_bands_that_its_size_asks_for():
-    """Band after band against the size of the layout so far, as one writes it down."""
-    r = np.random.default_rng(3)
-    for _ in range(30):
-        layouts = []
-        for _ in range(r.integers(1, 8)):
-            place, least = r.uniform(-1, 1, 4), 10.0**r.uniform(-5, -2, 4)
-            bands = [(a, a + r.choice([0.0, 0.1]), b) for a, b in zip(place.tolist(), least.tolist())]
-            layouts.append(Layout(-1.0, 1.0, tuple(bands), (float(place.min()), float(place.max())),
-                                  float(r.uniform(0.01, 0.1)), 0.1, 0.5))
-        kept = Layout(-1.0, 1.0, (), (-1.0, 1.0), 0.1, 0.1, 0.5)
-        bands = {band for one in layouts for band in (*one.bands, (*one.span, one.inside))}
-        for low, high, least in sorted(bands, key=lambda band: (band[2], band)):
-            if (kept.size(np.linspace(low, high, 5)) > least * (1 + 1e-9)).any():
-                kept = replace(kept, bands=(*kept.bands, (low, high, least)))
-        assert _merged(layouts, False).bands == kept.bands
-
-
-@pytest.mark.slow
-def test_always_the_shared_mesh_serves_the_hardest_case():
-    cases = family(1e-6, 1e-2)
-    for own, shared in zip(cases, meshed(cases), strict=True):
-        mine, truth = (measures(*solve_all(one.patch, tolerance), tolerance=tolerance)
-                       for one, tolerance in ((shared, 1e-2), (own, 1e-3)))
-        for name, m in mine.items():
-            assert abs(m.value - truth[name].value) <= m.error + truth[name].error + m.floor, name
-            assert m.error <= 1e-2 * abs(m.value) + max(m.floor, 1e-2 * own.patch.length / 2), name
-
-
-def test_exact_opposite_tilts_press_mirrored():
-    left, right = (solve_all(one.patch, 1e-2)[0] for one in meshed(family(-2e-4, 2e-4)))
-    assert left.pressure.sigma_n[::-1] == pytest.approx(right.pressure.sigma_n, rel=1e-9,
-                                                        abs=1e-10 * right.pressure.sigma_n.max())
 
 
 def test_exact_pinned_elements_stay_those_of_a_single_run():

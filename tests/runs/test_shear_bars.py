@@ -1,6 +1,5 @@
 """The bars of random joints and rigs that slip part by part, against meshes and steps that are far finer."""
 
-import numpy as np
 import pytest
 from shear_bars import RIG, misses
 
@@ -14,13 +13,6 @@ def test_always_the_bars_of_random_pieces_behind_their_shear_hold(kind, seeds):
     for seed in seeds:
         found = misses(kind, seed)
         assert len(found) >= 7 and max(found.values()) <= 1, (seed, found)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind, first, count", [("joint", 3000, 40), ("rig", 3000, 40), ("chain", 3000, 40)])
-def test_always_19_of_20_bars_of_random_pieces_behind_their_shear_hold(kind, first, count):
-    found = np.concatenate([list(misses(kind, seed).values()) for seed in range(first, first + count)])
-    assert (found <= 1).mean() >= 0.95 and (found <= 2).mean() >= 0.97
 
 
 @pytest.mark.parametrize("kind", ["joint", "rig"])

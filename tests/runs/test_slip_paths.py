@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from patchfem.runs.wear.slip import _beat, _read, frames_for
+from patchfem.runs.wear.slip import _read, frames_for
 
 PHASES = np.linspace(0, 1, 41)
 
@@ -39,8 +39,3 @@ def test_always_the_error_of_a_path_holds_what_its_frames_hide(slip, path, energ
 def test_order_frames_grow_as_the_root_of_the_tolerance():
     assert frames_for(1e-2) == 223 and frames_for(1e-3) / frames_for(1e-2) == pytest.approx(10**0.5, rel=0.01)
     assert frames_for(1e-9) == 800
-
-
-def test_exact_a_beat_is_the_difference_of_window_and_last_cycle():
-    assert _beat({"slip_amplitude": 1.05}, np.array([-1.0, 0.3, 1.0])) == pytest.approx(0.05, rel=1e-12)
-    assert _beat({}, np.array([-1.0, 1.0])) == 0 and _beat({"slip_amplitude": 1.0}, np.zeros(3)) == 0

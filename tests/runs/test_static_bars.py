@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from scene_texts import PIECE
-from static_reference import Body, Scene, answer
 from static_scenes import KINDS, drawn, judged, line, missed, text_of, wider
 
 import patchfem as pf
-from patchfem.contact import edges
-from patchfem.model.model import build
-from patchfem.model.pieces import bodies_of
-from patchfem.runs.patch.condensed import condensed
-from patchfem.runs.patch.press import pressed, zigzags
-from patchfem.runs.patch.values import peak_pressures
-from patchfem.scene.scene import loads
 
 TITANIUM = 'substrate = {young = "120 GPa", poisson = 0.32, density = "4370 kg/m^3"}\n'
 NARROW = '[contact]\nlength = "40 mm"\nwidth = "1 m"\nheight = "20 mm"\nload = "9100 N"\n' + TITANIUM + \
@@ -93,31 +83,6 @@ def test_bars_of_steps_hold_and_do_not_widen_where_a_stretch_comes_on_a_finer_me
         last = found.error
 
 
-@pytest.mark.parametrize("fall", [0.1, 0.5, 1.0])
-def test_always_a_peak_beside_a_fall_is_its_node(fall):
-    """A plateau that falls off between neighbours which both bear: the vertex of the three would stand above it."""
-    sigma = np.array([1.0, 1.0, 1.0, 1.0, 1 - 0.5 * fall, 1 - 0.6 * fall, 0.0])
-    assert peak_pressures(np.arange(7.0), sigma[None])[0] == 1.0
-    rising = sigma + 1e-3 * np.array([0, 1, 2, 3, 2, 1, 0])  # towards the edge
-    assert rising.max() <= peak_pressures(np.arange(7.0), rising[None])[0] <= rising.max() + 1e-3
-
-
-@pytest.mark.parametrize("top", [3.0, 3.2, 3.5, 2.7])
-def test_exact_the_peak_of_a_parabola_lies_between_its_nodes(top):
-    x = np.array([0.0, 1.1, 2.0, 3.0, 4.2, 5.0, 6.0])
-    assert peak_pressures(x, 5 - 0.3 * (x[None] - top)**2)[0] == pytest.approx(5.0, rel=1e-14)
-
-
-def test_exact_an_edge_at_a_step_is_the_step():
-    """Only where the gap opens towards the end, and within a cell."""
-    x, gap = np.linspace(0, 1, 11), np.where(np.arange(11) > 5, 1.0, 0.0)
-    ends = [edges.End(1, -1, 0.5, 0.07), edges.End(4, 1, 0.5, 0.42), edges.End(7, -1, 0.2, 0.68)]
-    moved = edges.at_steps(ends, x, gap, (x[5],))
-    assert moved[0] == ends[0] and moved[2] == ends[2]
-    assert moved[1].place == x[5] and moved[1].share == pytest.approx(1.3)
-    assert edges.at_steps(ends, x, -gap, (x[5],)) == ends
-
-
 @pytest.mark.share(0)
 @pytest.mark.parametrize("seed", range(600, 600 + len(KINDS)))
 def test_bars_of_a_random_scene_hold_an_independent_program(seed):
@@ -126,20 +91,6 @@ def test_bars_of_a_random_scene_hold_an_independent_program(seed):
     one = line(seed, fine=2e-3)
     assert wider(one) == []
     assert [row for row in judged(one) if missed(*row[2:])] == []
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("nu, said", [(0.3, False), (0.4999, False)])
-def test_bars_hold_towards_a_ratio_of_one_half(nu, said):
-    """Peak, half-width and approach of a crown by the independent program; no word of an error that is not there."""
-    body = Body(12.7e-3, 6.35e-3, 0.0, ((5e6, nu),) * 2)
-    scene = Scene(12.7e-3, 12.7e-3, "strain", body, body, 0.05, curvature=1.0)
-    truth, own = answer(scene, 2e-3)
-    run = pf.run(text_of(scene), **{"accuracy.tolerance": 1e-4})
-    for name in ("pressure_peak", "contact_half_width", "approach"):
-        m = run.measures[name]
-        assert abs(m.value - truth[name]) <= m.error + 2 * own[name] + 1e-5 * abs(truth[name]), name
-    assert any("the elements become too stiff" in text for text in run.warnings) == said
 
 
 def test_always_unlike_pieces_say_what_friction_would_change():
@@ -160,29 +111,3 @@ def test_always_the_bar_of_a_single_jump_holds_the_worn_peak():
     """Hertz worn in one jump: 39.4 MPa where 30.6 MPa are left (19 jumps); the bar was 7.7 MPa."""
     worn = pf.run(WORN).measures["pressure_peak"]
     assert abs(worn.value - 30.56e6) <= worn.error <= 0.5 * worn.value
-
-
-@pytest.mark.parametrize("amplitude", [0.0, 0.067])
-def test_exact_a_zigzag_is_the_share_of_the_pressure_that_alternates(amplitude):
-    x, turns = np.cumsum(1.1 ** np.arange(30.0)), (-1.0) ** np.arange(30)
-    assert zigzags(x, 1 + 0 * x) <= 1e-12 and zigzags(x, np.sqrt(1 - np.linspace(-1, 1, 30)**2)) == 0
-    assert zigzags(x, 1 + amplitude * turns) == pytest.approx(amplitude / (1 + amplitude), abs=1e-12)
-
-
-@pytest.mark.parametrize("worn, said", [(0.0, 0), (4e-9, 1)])
-def test_a_ripple_is_said_where_the_pressure_zigzags(worn, said):
-    """One join, which is expected to ripple by 6.7 %: a smooth pressure has none, one on alternating nodes has."""
-    asked = build(loads(PIECE + 'load = "2000 N"\nelement_size = "0.5 mm"\n' + TITANIUM)).patch
-    pair = condensed(asked, *bodies_of(asked))
-    pair = replace(pair, joint=SimpleNamespace(ripple=0.067, reason="is expected to ripple by 6.7 %"))
-    patch = pressed(asked, pair, worn * (-1.0) ** np.arange(pair.compliance.interface.x.size))
-    assert [text for text in patch.notes if "ripple" in text] == said * ["contact.mesh: is expected to ripple by 6.7 %"]
-
-
-@pytest.mark.slow
-def test_no_tighter_tolerance_is_offered_against_what_a_poisson_ratio_leaves():
-    """It was 1e-5, which left the peak at 2e-4."""
-    stiff = PIECE + 'load = "100 N"\n' + TITANIUM.replace("0.32", "0.49") + '[contact.crown]\nradius = "1 m"\n'
-    (text,) = [text for text in pf.run(stiff, **{"accuracy.tolerance": 1e-4}).warnings if "has an estimated "
-                                                                                          "error" in text]
-    assert "Poisson" in text and "refines" not in text

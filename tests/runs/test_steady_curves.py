@@ -2,9 +2,7 @@
 
 import numpy as np
 import pytest
-import xarray as xr
-from command_line import cli
-from scene_texts import COATED, COULOMB, MODE, NONLOCAL, PLASTIC, POINT, SECOND, SHEAR, SWEEP
+from scene_texts import COATED, COULOMB, MODE, PLASTIC, POINT, SECOND, SHEAR, SWEEP
 
 import patchfem as pf
 from patchfem.response.levels import KEPT
@@ -48,17 +46,6 @@ def test_exact_a_curve_without_friction_in_closed_form(more):
     assert np.all(found["acceleration_distortion"] <= found["acceleration_distortion_error"])
 
 
-@pytest.mark.usefixtures("few")
-def test_exact_a_curve_of_two_instruments_shows_each_at_its_own_place():
-    """The displacement where the gauge moves, the acceleration where the accelerometer does."""
-    instruments = {"structure.mode.axial.gauge": "0.9", "structure.mode.axial.accelerometer": "1.1"}
-    found = curve_of(MODE + HARD, **instruments)
-    size, felt = (linear(found["frequency"], (share,), level=6 * G)[k] for k, share in enumerate((0.9, 1.1)))
-    assert found["amplitude"] == pytest.approx(size, rel=1e-8)
-    assert found["acceleration_peak"] == pytest.approx(felt, rel=1e-8)
-    assert found["acceleration_fundamental"] == pytest.approx(felt, rel=1e-8)
-
-
 @pytest.mark.share(1)
 @pytest.mark.usefixtures("few")
 @pytest.mark.parametrize("law", [COULOMB, GIVES], ids=["coulomb", "elastic-plastic"])
@@ -69,22 +56,6 @@ def test_exact_a_point_of_a_curve_is_the_run_at_its_sine(law):
         run = pf.run(POINT + law + MODE + drive.format(float(found["frequency"][k])), **STEADY)
         for column, name in SHOWN.items():
             assert found[column][k] == pytest.approx(run.measures[name].value, rel=1e-9), (k, column)
-
-
-@pytest.mark.slow
-def test_exact_a_balance_over_the_frequency_is_within_its_bars():
-    """Elastic-plastic elements by named harmonics against the map from yield to yield, which is exact."""
-    drive = HARD.replace('"150 Hz"', '"141 Hz"')
-    balance = curve_of(POINT + GIVES + MODE + drive, **{"accuracy.harmonics": "15"})
-    assert len(balance["frequency"]) > 5
-    for k in range(0, len(balance["frequency"]), 4):
-        frequency = balance["frequency"][k]
-        keys = {"drive.waveform": "sine", "drive.frequency": f"{float(frequency)!r} Hz"}
-        exact = pf.run(POINT + GIVES + MODE + '[drive]\nkind = "base"\nacceleration = "6 g"\ncycles = 9\n',
-                       **STEADY, **keys).measures
-        for column, name in SHOWN.items():
-            gap = abs(balance[column][k] - exact[name].value)
-            assert gap <= balance[f"{column}_error"][k] + exact[name].error, (frequency, column)
 
 
 @pytest.mark.share(1)
@@ -103,15 +74,6 @@ def test_exact_levels_are_those_of_a_long_run(law):
         for name, value in a.values.items():
             assert value == pytest.approx(b.values[name], rel=1e-8, abs=round_off.get(name, 1e-12)), (b.drive, name)
     assert abs(steady.measures["level_hysteresis"].value) < 1e-12  # the motion at a level is the only one
-
-
-def test_exact_levels_are_rows_of_the_curve():
-    run = pf.run(POINT + NONLOCAL.replace("1 um", "20 um") + MODE + LEVELS.format('"3 g", "6 g", "4 g"', 12), **STEADY)
-    curve, levels = run.extra["curve"], run.extra["levels"]
-    assert curve["level"] == pytest.approx(G * np.array([3, 6, 4])) and len(levels) == 3
-    for k, one in enumerate(levels):
-        for column, name in SHOWN.items():
-            assert curve[column][k] == one.values[name] and curve[f"{column}_error"][k] == one.errors[name]
 
 
 def test_exact_the_onset_of_slip_of_an_element_in_closed_form():
@@ -134,26 +96,6 @@ def test_exact_a_level_without_a_bounded_motion_is_a_row_that_says_so():
     with_elements = pf.run(text.replace(COULOMB, PLASTIC), **STEADY)
     assert [one.outcome for one in with_elements.extra["levels"]] == ["stuck", "steady", "not_converged"]
     assert any("1 of 3 drive levels" in said and "undamped mode" in said for said in with_elements.warnings)
-
-
-@pytest.mark.slow
-def test_exact_the_file_and_the_page_hold_accelerations_and_levels(tmp_path):
-    path = tmp_path / "scene.toml"
-    path.write_text(POINT + COULOMB + MODE + LEVELS.format('"3 g", "5 g", "6 g"', 12) +
-                    '[accuracy]\nmethod = "harmonic"\n', "utf-8")
-    answer = cli("run", path, "-o", tmp_path / "out", "-q")
-    assert answer.code == 0, answer.err
-    with xr.open_dataset(tmp_path / "out" / "result.nc") as data:
-        assert list(data.level_outcome.values) == ["stuck", "steady", "steady"]
-        for column in SHOWN:
-            assert data[f"curve_{column}"].dims == data[f"curve_{column}_error"].dims == ("curve_point",)
-        fundamental = data.level_absolute_acceleration_fundamental
-        assert fundamental.attrs["units"] == "m s-2" and fundamental.values[0] == pytest.approx(3 * G)
-        np.testing.assert_array_equal(data.curve_acceleration_fundamental.values, fundamental.values)
-    page = (tmp_path / "out" / "report.html").read_text()
-    row = page[page.index("<th class=n>level"):].split("</tr>")[2]
-    assert "<td>steady</td><td>slips</td>" in row and row.count(" g") == 3
-    assert "Absolute acceleration at the output" in page and "first harmonic" in page
 
 
 LOCKED = POINT + '[friction]\nlaw = "elastic-plastic"\nstatic = 0.05\nbond_length = "20 um"\n' + MODE + \

@@ -40,12 +40,6 @@ def test_exact_stiffness_and_bond_length_say_the_same(name):
             assert one.value == pytest.approx(theirs.measures[key].value, rel=1e-9, abs=1e-15, nan_ok=True), key
 
 
-def test_exact_a_backbone_is_the_same():
-    mine, theirs = (pf.backbone(loads(text), amplitudes=[1e-5, 1e-4], method="quasi-static") for text in both(RIG))
-    for name in ("frequency", "damping"):
-        np.testing.assert_allclose(mine[f"quasi_static_{name}"], theirs[f"quasi_static_{name}"], rtol=1e-12)
-
-
 def test_exact_a_sweep_of_the_load_leaves_the_stiffness():
     """Lanes of 64 loads: some held, whose force is STIFF times the slide, and some that slip."""
     values = np.geomspace(20, 5e3, 64)

@@ -72,19 +72,6 @@ def test_fields_pages_and_stretches_show_the_peak_and_the_contact_of_the_measure
     assert any("whose largest pressure is" in note for note in result.notes)
 
 
-def test_how_a_trace_is_read_is_a_note_without_round_off(scene, tmp_path):
-    """A trace from 0 to 3 mm in steps of 1.7 um, printed to 10 nm, on pieces of 2 mm."""
-    x = np.arange(1765) * 1.70123e-6
-    rows = "\n".join(f"{a * 1e3:.5f},{0.01 * np.cos(2e4 * (a - x[-1] / 2)):.6f}" for a in x)
-    (tmp_path / "trace.csv").write_text(f"x [mm],z [um]\n{rows}\n")
-    (tmp_path / "scene.toml").write_text(SCENE)
-    found = pf.run(tmp_path / "scene.toml")
-    assert not any("trace.csv" in text for text in found.warnings)
-    told = [text for text in found.notes if "trace.csv" in text]
-    assert any("x is rounded to 10 nm" in text for text in told)
-    assert any("x runs from 0 um to 3.001 mm in the file" in text for text in told)
-
-
 def test_a_value_that_is_not_known_is_not_done(tmp_path):
     """A contact far narrower than its elements."""
     text = SCENE.split("[contact.tilt]")[0].replace("20 N", "1 N") + """\

@@ -42,15 +42,6 @@ def test_exact_a_pitching_mode_closes_its_energy_and_balances_its_fields(law):
     assert kept["normal_load"] is load and np.ptp(load) > 1e-3 * load[0]
 
 
-def test_exact_no_pitch_is_the_plain_rig():
-    """A pitch that the drive cannot reach: the motion is that of the scene without it."""
-    quiet = PITCH.replace("slide = 0.1\n", "slide = 0.0\nbase = 0.0\n")
-    quiet = quiet.replace("slide = 0.8", "slide = 0.8\nbase = 0.9")
-    moved, plain = (result_of(text, *FEW) for text in (quiet, quiet.replace('pitch = "40 rad/m"\n', "")))
-    assert moved.response.slide == pytest.approx(plain.response.slide, abs=1e-9 * np.abs(plain.response.slide).max())
-    assert moved.response.extra["normal_load"] == pytest.approx(115.65, abs=0.01)
-
-
 def test_exact_the_spring_of_the_holder_is_in_series_with_the_pitch():
     """Forces at a turn of the holder: the piece turns by the moment over the spring less than the holder."""
     words = ["contact.tilt.angle=0.01 mrad", "contact.holder.rotational_stiffness=2e4 N m/rad"]

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import cli, loaded
+from command_line import cli
 from partial_slip import Step, advance, operators_of, start
 from pieces import bare, refined_middle
 from scene_texts import COATED, COULOMB, MODE, NONLOCAL, POINT, SHEAR, STRUCTURE, mistakes, only
@@ -18,11 +18,9 @@ from patchfem.closed_forms.contact import hertz_half_width, hertz_peak
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity.elasticity import assemble, interface_compliance
-from patchfem.export import netcdf, report
 from patchfem.model.model import build
 from patchfem.runs.patch.result import solve_all
 from patchfem.runs.wear import evolve
-from patchfem.runs.wear.measures import edge_peak
 from patchfem.scene.scene import loads
 from patchfem.wear.jumps import Wearing, after
 from patchfem.wear.jumps import start as unworn
@@ -85,45 +83,11 @@ def test_exact_one_point_wears_by_its_load_and_path(motion):
     assert "worn_depth_max" not in found.measures
 
 
-@pytest.mark.share(0)
-@pytest.mark.parametrize("contact", [POINT, TILTED], ids=["point", "patch"])
-def test_exact_the_error_of_a_march_holds_the_volume_of_the_exact_engine(contact):
-    """A march whose steps are halved on the way to its result wears by those of its first pass, and says so."""
-    scene = contact + COULOMB + MODE + '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\n' \
-        "cycles = 400\n" + WEAR + "[accuracy]\n"
-    one, two = (ran(scene + f'method = "{method}"\n').measures["worn_volume"] for method in ("exact", "march"))
-    assert 0 < abs(two.value - one.value) <= two.error < 1e-2 * two.value
-
-
 def test_exact_energy_form_is_archard_with_coefficient_times_friction():
     one = ran(TILTED + COULOMB + SINE + WEAR)
     two = ran(TILTED + COULOMB + SINE + WEAR.replace('1e-14', repr(KAPPA / 0.3)) + 'form = "energy"\n')
     for name in ("worn_volume", "worn_depth_max", "pressure_peak"):
         assert two.measures[name].value == pytest.approx(one.measures[name].value, rel=1e-9)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("most, few", [(64, (2, 4, 16)),
-                                       pytest.param(128, (2, 4, 16, 32), marks=pytest.mark.slow)])
-def test_always_few_jumps_say_how_wrong_they_are(most, few):
-    """A contact edge that moves far in a jump leaves a peak behind it; the errors of all measures hold the truth."""
-    text = TILTED.replace("0.5 mm", "0.1 mm") + COULOMB + SINE + WEAR.replace("135723", "2e6")
-    many = ran(text + f"jumps = {most}\n").measures
-    for jumps in few:
-        some = ran(text + f"jumps = {jumps}\n").measures
-        for name in ("worn_depth_max", "pressure_peak", "approach", "contact_fraction", "normal_stiffness"):
-            assert abs(some[name].value - many[name].value) <= some[name].error + many[name].error, (jumps, name)
-
-
-@pytest.mark.slow
-def test_exact_the_cost_of_jumps_is_a_curve(tmp_path):
-    scene = tmp_path / "worn.toml"
-    scene.write_text(TILTED + COULOMB + SINE + WEAR)
-    answer = cli("cost", scene, "--over", "jumps", "-o", tmp_path / "cost", "-q", "--json")
-    assert answer.code == 0, answer.err
-    runs = json.loads(answer.out)["jumps"]["runs"]
-    away = [one["distances"].get("worn_depth_max", 0.0) for one in runs]
-    assert [one["label"] for one in runs] == ["2", "4", "8", "16", "32", "by tolerance"] and away[0] > 3 * away[2]
 
 
 @pytest.mark.share(0, 2, 3, 4)
@@ -149,35 +113,6 @@ def test_exact_a_slide_that_does_not_repeat_is_one_cycle(slide, path):
     for contact in (TILTED, TILTED + SHEAR):
         found = ran(contact + COULOMB + f"[slide]\n{slide}\n" + WEAR).measures["worn_volume"]
         assert found.value == pytest.approx(KAPPA * LOAD * path * CYCLES, rel=1e-12 if contact == TILTED else 0.06)
-
-
-@pytest.mark.share(1)
-@pytest.mark.parametrize("law", ['law = "elastic-plastic"', 'law = "nonlocal"'])
-def test_exact_short_bonds_wear_as_coulomb_friction(law):
-    """Energy form: the friction work of a law with memory goes to that of Coulomb as its bond length goes to zero."""
-    form = WEAR + 'form = "energy"\n'
-    coulomb = ran(TILTED + COULOMB + SINE + form).measures["worn_volume"].value
-    misses = []
-    for length in ("0.1 um", "1e-6 um"):
-        text = TILTED + f'[friction]\n{law}\nstatic = 0.3\nbond_length = "{length}"\n' + SINE + form
-        misses.append(abs(ran(text).measures["worn_volume"].value / coulomb - 1))
-    assert 1e-4 < misses[0] < 0.05 and misses[1] < 1e-6
-
-
-@pytest.mark.slow
-def test_always_a_rig_under_partial_slip_wears_where_it_slips():
-    """Slip paths of a march with shear modes: local, found anew after every jump, less than the holder's everywhere."""
-    found = ran(SOFT_RIG + WEAR, **{"accuracy.tolerance": "1e-2"})
-    history, amplitude = found.extra["wear"], found.measures["slip_amplitude"].value
-    volume = found.measures["worn_volume"]
-    assert 0.9 < volume.value / (KAPPA * LOAD * 4 * amplitude * CYCLES) < 1.0
-    assert (np.diff(history["contact_fraction"]) >= -1e-12).all() and (np.diff(history["worn_volume"]) > 0).all()
-    assert history["relative_displacement_amplitude"][0] != history["relative_displacement_amplitude"][-1]
-    finer = ran(SOFT_RIG + WEAR, **{"accuracy.tolerance": "3e-3"})
-    for name in ("worn_volume", "worn_depth_max"):
-        one, two = found.measures[name], finer.measures[name]
-        assert abs(one.value - two.value) <= one.error + two.error
-    assert len(finer.extra["wear"]["cycle"]) >= len(history["cycle"])
 
 
 def test_exact_files_hold_the_way_of_the_wear(tmp_path):
@@ -250,32 +185,6 @@ def test_exact_shakedown_of_a_crown_under_a_tangential_force():
     assert found == pytest.approx(stick / half + 0.6 * line / (np.pi * stick * peak), abs=2e-3)
 
 
-def test_exact_plan_names_the_jumps_and_what_they_share():
-    bench, rig = (pf.plan(loads(text + WEAR, "worn.toml")) for text in (TILTED + COULOMB + SINE, SOFT_RIG))
-    assert any("the motion computed only once" in line for line in bench.verdict)
-    assert any("computed again" in line for line in rig.verdict)
-    plain = pf.plan(loads(SOFT_RIG, "new.toml"))
-    assert rig.seconds > plain.seconds and not any("wear" in line for line in plain.verdict)
-
-
-def test_exact_a_peak_at_the_edge_of_the_contact_is_told_from_one_inside():
-    """The element at an edge that moves between nodes takes what its neighbours should (4.9 of 36 MPa once)."""
-    inside, edge = np.array([0, 0, 12, 25, 28, 31, 30, 27, 21, 0.0]), np.array([0, 0, 36, 24, 28, 31, 30, 27, 21, 0.0])
-    assert edge_peak(inside) == 0 and edge_peak(edge) == 36 - 31
-    assert edge_peak(edge[2:]) == 0  # the contact ends with the piece: the pressure may rise there
-    assert edge_peak(np.array([0, 3.0, 5.0, 0])) == edge_peak(np.zeros(9)) == 0  # nothing lies inside
-
-
-def test_exact_the_file_and_the_page_mark_peaks_at_the_edge():
-    found = {"cycle": np.array([0.0, 5e4, 1e5]), "pressure_peak": np.array([9e7, 4e7, 3e7]),
-             "pressure_peak_at_edge": np.array([0.0, 4.87e6, 0.0])}
-    held = netcdf.with_wear(netcdf.Contents(), found, {"pressure_peak": "Pa"}).variables
-    assert held["wear_pressure_peak_at_edge"][1][1] == 4.87e6 and "wear_pressure_peak" in held
-    assert "After 50000 cycles the peak pressure is that of a node at the edge" in report._edge_peaks(found)
-    assert "stands up to 4.9 MPa above" in report._edge_peaks(found)
-    assert report._edge_peaks(found | {"pressure_peak_at_edge": np.zeros(3)}) == ""
-
-
 def test_exact_the_tolerance_of_a_warning_leads_to_a_finer_mesh_under_wear():
     """The patch before wear chooses the mesh; by the worn one the warning named a tolerance that led to the same."""
     text = WORN_CROWN.format(tolerance=1e-2)
@@ -299,13 +208,6 @@ def test_always_a_motion_without_bounds_wears_nothing():
                     'acceleration = "9 g"\ncycles = 100\n' + WEAR)
         assert found.outcome == outcome and "worn_volume" not in found.measures
         assert any("nothing was worn" in line for line in found.warnings)
-
-
-def test_exact_a_scene_without_wear_imports_nothing_of_it(tmp_path):
-    scene = tmp_path / "new.toml"
-    scene.write_text(TILTED + COULOMB + SINE)
-    code = "import json, sys, patchfem as pf; pf.run(sys.argv[1]); print(json.dumps(sorted(sys.modules)))"
-    assert not {name for name in loaded(code, scene) if name.startswith(("patchfem.wear", "patchfem.runs.wear."))}
 
 
 def _refusing(monkeypatch, cycle):
@@ -391,15 +293,6 @@ def test_refuses_an_interrupted_run_of_another_scene_and_names_the_way_on(tmp_pa
     assert other.code == 2 and "another scene" in other.err
     assert cli("run", scene, "-o", tmp_path / "out", "--resume", "--no-page").code == 0
     assert not (tmp_path / "out" / "wear.npz").exists() and not (tmp_path / "out.partial").exists()
-
-
-def test_exact_a_motion_that_wear_cannot_change_has_its_bits_wherever_a_run_goes_on():
-    """Found on the worn patch, where a run went on from, the path differed by rounding."""
-    model = build(loads(TILTED + COULOMB + SINE + WEAR, "wear.toml"))
-    patch = solve_all(model.patch, model.accuracy.tolerance)[0]
-    worn = np.random.default_rng(1).uniform(0, 1e-7, (20, patch.x.size))
-    paths = {evolve._Motion(model, patch)(depth).tobytes() for depth in worn}
-    assert len(paths) == 1
 
 
 @pytest.mark.parametrize("quiet, state, told", [((), "wear.npz", 1), (("-q",), "wear.npz", 0), ((), "", 0)])

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import cli
-from scene_texts import COATED, COULOMB, MODE, PIECE, mistakes
+from scene_texts import COATED, COULOMB, MODE, PIECE
 
 import patchfem as pf
 from patchfem.contact.unilateral import solve_forces
@@ -13,7 +13,6 @@ from patchfem.model.model import build
 from patchfem.runs.patch.press import areas, presser
 from patchfem.runs.patch.result import solve_all
 from patchfem.runs.rig.strips import across
-from patchfem.runs.wear import evolve
 from patchfem.scene.scene import loads
 from patchfem.wear.jumps import Wearing, after, start
 
@@ -70,18 +69,6 @@ def test_exact_jumps_of_strips_are_those_of_one_block_diagonal_problem():
     assert np.abs(strips.force.ravel() - flat.force).max() < 1e-9 * LOAD
 
 
-def test_exact_strips_pressed_from_the_last_contact_set_have_the_bits_of_those_pressed_alone():
-    model = build(loads(TILTED + ROLLED + COULOMB + SINE + WEAR + LOOSE, "strips.toml"))
-    pair = solve_all(model.patch, 1e-2, False)[0].pair
-    press, area = presser(model.patch, pair), areas(model.patch, pair.compliance.interface)
-    for share in (0.0, 0.1, 0.12, 1.0, 0.12, 0.0):
-        worn = share * 3e-7 * np.linspace(1, 0, area.size).reshape(area.shape)
-        for soft in (0 * area, 2e-13 / area):
-            force = press(worn, soft)
-            assert np.array_equal(force, presser(model.patch, pair)(worn, soft))
-            assert np.array_equal(press.near.closed, force > 0)
-
-
 def test_exact_a_rolled_pad_on_springs_evens_its_pressure_out():
     """Winkler: p = p_mean + (p_0 - p_mean) exp(-kappa s k N) in full contact, on pieces that hardly give way."""
     stiff = PIECE + 'load = "26 lbf"\nelement_size = "4 mm"\nsubstrate = {young = "1e17 Pa", poisson = 0.3, ' \
@@ -95,14 +82,6 @@ def test_exact_a_rolled_pad_on_springs_evens_its_pressure_out():
     share = 1e-14 * 40e-6 * n
     expected = mean * share + first / k * (1 - np.exp(-share * k))
     assert np.abs(worn(found) - expected[:, None]).max() < 2e-4 * expected.max()
-
-
-@pytest.mark.slow
-def test_always_few_strips_say_how_wrong_they_are():
-    text = TILTED + ROLLED + COULOMB + SINE + WEAR + LOOSE
-    few, many = (ran(text.replace("count = 4", f"count = {count}")).measures for count in (4, 16))
-    for name in ("worn_depth_max", "pressure_peak", "approach", "contact_fraction", "normal_stiffness"):
-        assert abs(few[name].value - many[name].value) <= few[name].error + many[name].error, name
 
 
 @pytest.mark.parametrize("yaw", ["0", "20"])
@@ -142,29 +121,3 @@ def test_exact_files_hold_the_depth_of_every_strip(tmp_path):
         assert np.abs(sides[..., 2].mean(axis=1) - data.strip_offset.values[:, None]).max() < 1e-9
         assert np.abs(held - depth[:, :, None]).max() < 1e-6 * depth.max()
     assert "in every strip over the width" in (tmp_path / "out" / "report.html").read_text()
-
-
-def test_exact_an_interrupted_run_of_strips_goes_on_to_the_same_bits(tmp_path):
-    model = build(loads(TILTED + ROLLED + COULOMB + SINE + WEAR + LOOSE, "strips.toml"))
-    patch, *coarse = solve_all(model.patch, 1e-2)
-    kept = []
-    whole = evolve.evolve(model, patch, coarse[:2], keep=lambda *state: kept.append(state))
-    evolve.save_state(tmp_path / "state.npz", "key", *kept[2])
-    on = evolve.evolve(model, patch, coarse[:2], begin=evolve.load_state(tmp_path / "state.npz", "key"))
-    assert 3 < len(on.moments) == len(whole.moments)
-    for name in ("depth", "force", "rough", "path"):
-        assert np.array_equal(getattr(on.state, name), getattr(whole.state, name))
-    assert np.array_equal(on.stripped[1], whole.stripped[1]) and np.array_equal(on.depths[0], whole.depths[0])
-
-
-def test_refuses_what_strips_do_not_wear_beside():
-    soft = TILTED + STRIPS + "[contact.shear]\n" + COULOMB + MODE + DRIVEN + WEAR
-    assert any("contact.strips with [contact.shear]" in line for line in mistakes(soft))
-
-
-def test_exact_friction_over_the_worn_depth_is_alike_in_strips():
-    table = '[wear.friction]\ndepth = ["0 um", "20 nm", "60 nm"]\ncoefficient_factor = [1, 1.3, 1.5]\n'
-    plain, strips = (ran(TILTED + beside + COULOMB + SINE + WEAR + table + LOOSE) for beside in ("", STRIPS))
-    assert plain.measures["static_coefficient"].value > 0.32
-    for name in ("static_coefficient", "worn_volume", "loop_area"):
-        assert strips.measures[name].value == pytest.approx(plain.measures[name].value, rel=1e-9)

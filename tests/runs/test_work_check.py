@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from march_paths import share_one_loop
 
-from patchfem.friction.path_work import sampled_work
 from patchfem.response.measures import relative_gap
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
@@ -65,14 +64,6 @@ def test_exact_a_stuck_interface_shows_no_round_off():
     for method in ("exact", "march"):
         assert checked(POINT + 'law = "coulomb"\n' + RIG.replace("5 g", "1 g"), f"accuracy.method={method}")[0] < 1e-4
     assert relative_gap(2e-17, 1e-17, 1e-17, 1.0) < 1e-6
-
-
-def test_exact_a_book_that_is_off_is_seen():
-    """The area of an ellipse, off by one part in a hundred."""
-    turn = np.linspace(0, 2 * np.pi, 4001)
-    parts = sampled_work(np.cos(turn), -np.sin(turn))
-    assert relative_gap(parts.sum(), np.pi, np.pi) < 1e-6
-    assert relative_gap(parts.sum(), 1.01 * np.pi, 1.01 * np.pi) == pytest.approx(0.01 / 1.01, rel=1e-3)
 
 
 @pytest.mark.parametrize("text", [POINT + LAWS["bonds"] + RIG, POINT + 'law = "nonlocal"\nbond_length = "1 um"\n'

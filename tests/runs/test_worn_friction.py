@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from command_line import cli
 
 import patchfem as pf
 from patchfem.runs.patch.result import solve_all
@@ -97,15 +96,6 @@ def test_always_wear_beyond_the_table_is_told():
     assert [one for one in found.warnings if "is larger than the last value of wear.friction.depth, 1 um" in one]
 
 
-def test_exact_a_resumed_run_has_the_same_bits():
-    model = pf.build(loads(SCENE, "a.toml", TABLE))
-    patch, states = solve_all(model.patch, model.accuracy.tolerance, False)[0], []
-    whole = evolve(model, patch, (None, None), keep=lambda *state: states.append(state))
-    again = evolve(model, patch, (None, None), begin=states[len(states) // 2])
-    assert again.state.depth.tobytes() == whole.state.depth.tobytes()
-    assert again.moments[-1].values == whole.moments[-1].values
-
-
 @pytest.mark.parametrize("sets, told", [
     (['wear.friction.depth=["1 um","2 um"]'], "wear.friction.depth: depths that rise from 0 are needed"),
     (['wear.friction.depth=["0 um","1 um","3 um"]'], "2 factors for 3 depths; give one factor for each"),
@@ -125,13 +115,3 @@ def test_refuses_friction_over_the_wear_of_a_point():
     text = '[normal]\nload = "100 N"\n' + SCENE[SCENE.index("[friction]"):]
     with pytest.raises(SceneError, match=r"wear.friction: a \[normal\] contact has no area.*: use \[contact\]"):
         loads(text, "a.toml")
-
-
-def test_exact_a_sweep_takes_tables(tmp_path):
-    scene = tmp_path / "a.toml"
-    scene.write_text(SCENE)
-    answer = cli("sweep", scene, "--over", "wear.friction.coefficient_factor=[1,1],[1,0.5]", "-o", tmp_path / "out",
-                 "-q", "--set", "wear.jumps=4", "--json")
-    assert answer.code == 0, answer.err
-    rows = (tmp_path / "out" / "sweep.csv").read_text()
-    assert '"[1,0.5]"' in rows and "static_coefficient" in rows

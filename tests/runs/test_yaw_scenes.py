@@ -59,22 +59,6 @@ def test_exact_strips_by_events_and_by_the_march(one_loop):
     assert np.abs(yawed).max() > 1e-4
 
 
-@pytest.mark.share(2)
-@pytest.mark.parametrize("law, keys, shared", [
-    ("coulomb", "", False), ("elastic-plastic", 'bond_length = "1 um"', False),
-    ("nonlocal", 'bond_length = "1 um"', True),
-    pytest.param("nonlocal", 'bond_length = "1 um"', False, marks=pytest.mark.slow)])
-def test_exact_strips_that_do_not_roll_do_not_yaw(law, keys, shared, monkeypatch):
-    """Even loads: nothing turns the patch, the motion is that of the patch as one; shared: in the loop of all laws, for
-    that of bonds alone takes 5 s to compile."""
-    if shared:
-        share_one_loop(monkeypatch)
-    _, turned = found(law, keys, roll="0 rad")
-    _, alone = found(law, keys, yaw="0 rad/m", roll="0 rad")
-    for name in ("relative_displacement_amplitude", "loop_area", "friction_work"):
-        assert turned[name].value == pytest.approx(alone[name].value, rel=2e-3)
-
-
 def test_refuses_a_yaw_without_strips_and_with_laws_a_strip_cannot_have():
     bare = TEXT.format(law="coulomb", keys="", yaw="30 rad/m", roll="0 rad", method="auto")
     assert any("structure.mode.yaw.yaw" in line and "contact.strips" in line

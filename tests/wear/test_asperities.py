@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
-from rubbing import anisotropy, overlap_of, periodic_amplitude, rub
+from rubbing import anisotropy, rub
 from synthetic import SIGMA, report_area
 
 from patchfem.core import PatchfemError
@@ -79,50 +77,6 @@ def test_exact_a_hard_piece_prints_its_envelope():
     assert (approach - over).min(axis=0) - out == pytest.approx(0 * out, abs=0.05 * UM)
 
 
-def elastic(lower, upper, reach, worn, jumps, stiff):
-    """The same on springs, all places of a cycle at once: mean overlap worn / stiff at every place.
-
-    The k highest points stand above the plane that leaves this overlap, with k the number of heights above which the
-    volume is less than it.
-    """
-    lower, upper = lower.copy(), upper.copy()
-    share = np.r_[0.5, np.ones(2 * reach - 1), 0.5] / (2 * reach)
-    for _ in range(jumps):
-        off_lower, off_upper = 0 * lower, 0 * upper
-        for u, weight in zip(range(-reach, reach + 1), share):
-            both = lower + np.roll(upper, u, 1)
-            high = np.sort(both, axis=None)[::-1]
-            total = np.cumsum(high)
-            k = np.searchsorted(total - high * np.arange(1, high.size + 1), worn / stiff * high.size)
-            plane = (total[k - 1] - worn / stiff * high.size) / k
-            pressed = np.maximum(both - plane, 0) * weight * stiff / jumps / 2
-            off_lower += pressed
-            off_upper += np.roll(pressed, -u, 1)
-        lower, upper = lower - off_lower, upper - off_upper
-    return lower, upper
-
-
-@pytest.mark.slow
-def test_always_stiff_springs_wear_alike():
-    """Rigid pieces do not need a law of pressure: springs come to the same shapes, the nearer the stiffer."""
-    lower, upper = surfaces((25, 25))
-    rigid = rub(lower, upper, STEP, 3 * STEP, 6 * UM, bite=6 * UM / 12 / 800)
-    off = []
-    for stiff in (40, 160, 640):
-        soft = elastic(lower, upper, 3, 6 * UM, 2 * stiff, stiff)
-        off.append([np.sqrt(((a - b) ** 2).mean()) for a, b in zip(soft, (rigid.lower, rigid.upper))])
-    off = np.array(off)
-    assert (off[1] < off[0] / 1.8).all() and (off[2] < off[1] / 2.2).all() and (off[2] < 0.05 * UM).all()
-
-
-@pytest.mark.slow
-def test_always_smaller_bites_change_less():
-    lower, upper = surfaces((60, 60))
-    found = [rub(lower, upper, STEP, 3 * STEP, 8 * UM, bite=8 * UM / 12 / count).lower for count in (20, 80, 320, 1280)]
-    change = [np.sqrt(((a - b) ** 2).mean()) for a, b in pairwise(found)]
-    assert change[1] < change[0] / 2**0.8 and change[2] < change[1] / 2 and change[2] < 0.05 * UM
-
-
 @pytest.mark.parametrize("seeds", [1, pytest.param(2, marks=pytest.mark.slow)])
 def test_always_band_ratios_of_an_independent_program(seeds):
     """At 6.4 and 12.8 um it found 0.849 +- 0.032 and 0.684 +- 0.019 after 6 um off each piece, 0.950 and 0.879 after
@@ -182,21 +136,6 @@ def test_always_traces_wear_too():
     assert (lower - out.lower).mean() == pytest.approx(UM, rel=1e-12) and out.lower.shape == (1, 60)
     flat = rub(np.zeros((1, 9)), np.zeros((1, 9)), STEP, 2 * STEP, 2 * UM)
     assert flat.lower == pytest.approx(np.full((1, 9), -UM), rel=1e-12)
-
-
-def test_exact_overlap_of_a_ramp():
-    """Heights 0, 1, ... 9: the mean overlap is 1 where D = 5: (4 + 3 + 2 + 1) / 10."""
-    heights, out = np.arange(10.0)[None], np.empty((1, 10))
-    for start in (None, 0.0, 8.5, 20.0):
-        assert overlap_of(heights, 1.0, start, out) == pytest.approx(5, abs=1e-7)
-        assert out.mean() == pytest.approx(1, rel=1e-14)
-
-
-def test_exact_band_of_a_sine():
-    x = STEP * np.arange(320)
-    wave, long = 2 * np.pi * x * 13 / (320 * STEP), 2 * np.pi * x * 2 / (320 * STEP)
-    z = np.tile(2 * UM * np.sin(wave + 0.3) + UM * np.cos(long), (5, 1))
-    assert periodic_amplitude(z, STEP, 1) == pytest.approx(2 * UM, rel=1e-12)
 
 
 @pytest.mark.parametrize("change, message", [

@@ -16,7 +16,6 @@ from patchfem.campaigns.rows.search import residual_of
 from patchfem.core import G_N, PatchfemError
 from patchfem.export.fits.rows import Starts, describe_answer
 from patchfem.model.model import build
-from patchfem.response.spectrum import reading
 from patchfem.runs.many.watched import Watcher
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
@@ -161,17 +160,6 @@ def test_exact_a_rubbing_rig_is_found_from_its_own_rows(tmp_path, rubbed):
     assert any("steady motions are computed" in text for text in found.keys.warnings)
 
 
-@pytest.mark.slow
-def test_a_noisy_rubbing_rig_lies_within_its_intervals(tmp_path, rubbed):
-    draw = np.random.default_rng(3)
-    noisy = [(f, level, *(value * np.exp(0.05 * draw.standard_normal()) for value in (a, y)), flag)
-             for f, level, a, y, flag in rubbed]
-    found = fitted(scene_of(tmp_path, RUBS), table(tmp_path, noisy), free(*RUBS_FREE), starts=1)
-    for (low, high), value in zip(found.keys.fit.intervals, (0.45, 2.4e6)):
-        assert low < value < high and high / low < 1.5
-    assert 0.02 < found.keys.fit.rms < 0.08
-
-
 def test_always_the_fit_does_not_see_what_is_held_or_left_out(tmp_path, rubbed):
     """Other readings in the rows held out, and in those left out, change no bit of the values, nor of any start."""
     scene = scene_of(tmp_path, RUBS, f"structure.bonded.stiffness={TRUE['structure.bonded.stiffness']}")
@@ -205,17 +193,6 @@ def test_exact_a_marched_motion_is_watched_as_it_runs():
     seen, measures = Watcher(model, None)(model.rig.drive), run(plan(model)).measures
     assert seen.acceleration == measures["absolute_acceleration_peak"].value
     assert seen.displacement == measures["relative_displacement_amplitude"].value
-
-
-@pytest.mark.parametrize("sets", [[], ["structure.mode.axial.accelerometer=0.7"]])
-def test_exact_what_a_window_shows_is_seen_without_one(sets):
-    model = build(loads(RUBS, sets=["accuracy.method=harmonic", *sets]))
-    drive = model.rig.drive
-    whole, part = (Watcher(model, None, None, windowed)(drive) for windowed in (True, False))
-    assert part.window is None and part[1:3] == pytest.approx(whole[1:3], rel=1e-13)
-    assert abs(part.fundamental) == pytest.approx(reading(whole.window, drive, 0.0, "fundamental"), rel=1e-8)
-    assert part.acceleration == pytest.approx(np.abs(whole.window.acceleration).max(), rel=1e-3)  # of 400 samples
-    assert part.displacement == pytest.approx(np.ptp(whole.window.slide) / 2, rel=1e-4)  # the gauge moves as the slide
 
 
 def test_rows_flagged_u_are_lower_bounds(tmp_path):
@@ -290,23 +267,6 @@ def test_the_verb_answers_as_the_contract_says(tmp_path):
         again["measures"]["absolute_acceleration_peak"]["value"], rel=1e-4)
 
 
-@pytest.mark.slow
-def test_nulls_have_no_score_where_a_kind_was_never_fitted(tmp_path):
-    """Displacements that are held out alone are predicted by the rig, and by nothing without mechanics; no score of
-    theirs is that of the accelerations alone."""
-    rows = [(*row[:3], row[3] if row[0] == 160 else "", "") for row in linear_rows()]
-    given = ["fit", str(scene_of(tmp_path, LINEAR).path), "--to", str(table(tmp_path, rows)), "--free", *LINEAR_FREE,
-             "--starts", "1", "-o", str(tmp_path / "out")]
-    for words, part in ((["--hold", "frequency=160 Hz"], "held_out"), (["--leave-out", "frequency"], "left_out")):
-        code, _, said = cli(*given, *words)
-        assert code == 0, said
-        answer = json.loads((tmp_path / "out" / "fit.json").read_text())
-        assert answer["scores"][part]["displacement"] < 1e-3 and answer["scores"][part]["all"] < 1e-3
-        for null in answer["nulls"].values():
-            assert null[part]["displacement"] is None and null[part]["all"] is None
-            assert null[part]["acceleration"] > 0.05
-
-
 def test_exact_a_fit_goes_on_from_the_starts_that_are_done(tmp_path):
     """With the ends of all starts, or of the first alone, kept on disk: the same bits with less work; those of another
     question count for nothing."""
@@ -327,13 +287,6 @@ def test_exact_a_fit_goes_on_from_the_starts_that_are_done(tmp_path):
     for one in (again, half, other):
         assert np.array_equal(one.keys.fit.values, first.keys.fit.values)
         assert np.array_equal(one.found.rms, first.found.rms)
-
-
-@pytest.mark.parametrize("text", ["[]", "3", "{", "[" * 100_000, '{"ends": {"all/0": [[1], 2]}}'])
-def test_exact_starts_of_another_shape_count_for_nothing(tmp_path, text):
-    """The first two once ended `fit --resume` with an internal fault."""
-    (tmp_path / "starts.json").write_text(text)
-    assert Starts(tmp_path / "starts.json", "one", True).known == {}
 
 
 def test_placebos_are_whole_fits_of_their_own(tmp_path):
@@ -388,41 +341,3 @@ def test_the_table_of_a_fit_holds_what_was_measured_and_computed(tmp_path):
         assert row["held"] == ("1" if f == 160 else "0")
     page = (tmp_path / "out" / "report.html").read_text("utf-8")
     assert unheard(page) == [] and page.count("<svg") == 1 and "rms of ln(computed/measured)" in page
-
-
-@pytest.mark.slow
-def test_always_an_interrupted_fit_keeps_its_starts_for_the_same_table_alone(tmp_path, monkeypatch):
-    """Interrupted behind its search and resumed, it makes fewer motions; resumed with other rows it is the fit of
-    these."""
-    def stopped(*given):
-        raise KeyboardInterrupt
-
-    tables = [table(tmp_path, linear_rows(0.05, seed=seed), f"{seed}.csv") for seed in (1, 2)]
-    words = ["fit", str(scene_of(tmp_path, LINEAR).path), "--free", *LINEAR_FREE, "--starts", "1"]
-
-    def answer(path, out, *more):
-        assert cli(*words, "--to", str(path), "-o", str(tmp_path / out), *more)[0] == 0
-        return json.loads((tmp_path / out / "fit.json").read_text())
-
-    for k, path in enumerate(tables):
-        out, kept = f"out{k}", tmp_path / f"out{k}.partial"
-        with monkeypatch.context() as patched:
-            patched.setattr("patchfem.campaigns.rows.fit._predict_null", stopped)
-            assert cli(*words, "--to", str(tables[0]), "-o", str(tmp_path / out))[0] == 130
-        assert [one.name for one in kept.iterdir()] == ["starts.json"] and not (tmp_path / out).exists()
-        whole, resumed = answer(path, f"whole{k}"), answer(path, out, "--resume")
-        assert resumed["values"] == whole["values"] and not kept.exists()
-        assert (resumed["motions"] < whole["motions"]) == (k == 0)
-
-
-def test_exact_a_free_load_presses_the_patch_anew(tmp_path):
-    """The pressure of the patch carries the load of each model, 100 N and then 150 N."""
-    text = RUBS.replace("[normal]\nload", '[contact]\nlength = "10 mm"\nwidth = "10 mm"\nheight = "5 mm"\n'
-                        'element_size = "2.5 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\nload', 1)
-    text = text.replace("elastic-plastic", "coulomb").replace('bond_length = "0.5 um"\n', "")
-    path = table(tmp_path, [(143.0, 8 * G_N, 9 * G_N, 2e-5, "")])
-    computed = Computed(Asked(scene_of(tmp_path, text), cells_of(path).conditions, free("contact.load=50 N..200 N"),
-                              path))
-    for load_of in (100.0, 150.0):
-        patch = computed._pressed(computed.asked.model([load_of]))
-        assert patch.pressure.load == pytest.approx(load_of, rel=1e-3)

@@ -74,20 +74,6 @@ def test_exact_cases_that_share_a_chosen_mesh_are_named_by_their_sweep():
     assert sizes[0] == sizes[1]  # each case pins its own
 
 
-@pytest.mark.parametrize("other", [Asked(Path("a.toml"), BENCH.replace("5 mm/s", "6 mm/s")),
-                                   Asked(Path("a.toml"), BENCH, ("slide.speed=6 mm/s",))], ids=["text", "set"])
-def test_exact_another_scene_has_other_names(other):
-    found = cases("normal.load=1 N,2 N")
-    assert not set(found.names(other)) & set(found.names(Asked(Path("a.toml"), BENCH)))
-
-
-def test_exact_another_version_has_other_names(monkeypatch):
-    asked, found = Asked(Path("a.toml"), BENCH), cases("normal.load=1 N,2 N")
-    before = found.names(asked)
-    monkeypatch.setattr("patchfem.campaigns.sweeps.asked.__version__", "0.0.0")
-    assert not set(found.names(asked)) & set(before)
-
-
 def test_exact_the_content_of_a_file_is_part_of_the_name(tmp_path):
     path = tmp_path / "path.csv"
     path.write_text("time [s],displacement [m]\n0,0\n1,1e-6\n")

@@ -4,11 +4,8 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import replace
-from multiprocessing import Pipe
 from pathlib import Path
-from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -16,11 +13,10 @@ from command_line import cli
 from deadly_cases import Deadly
 from scene_texts import BENCH, COULOMB, POINT, SHORT
 
-from patchfem import compiled
 from patchfem.campaigns.sweeps import executors
 from patchfem.campaigns.sweeps.asked import Asked
 from patchfem.campaigns.sweeps.cases import Cases
-from patchfem.campaigns.sweeps.executors import Here, pool
+from patchfem.campaigns.sweeps.executors import Here
 from patchfem.campaigns.sweeps.executors.cluster import Cluster
 from patchfem.campaigns.sweeps.executors.pool import Pool
 from patchfem.campaigns.sweeps.sweep import TRIES, Chunks, Clock, Work, solved
@@ -63,13 +59,6 @@ def importable(monkeypatch):
 @pytest.mark.parametrize("once", [pytest.param(True, marks=pytest.mark.slow), False], ids=["once", "always"])
 def test_exact_a_killed_worker_costs_its_own_case_only(tmp_path, importable, once):
     one_case_only(tmp_path, once, Pool(2))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("once", [True, False], ids=["once", "always"])
-def test_exact_a_killed_worker_of_a_cluster_costs_its_own_case_only(tmp_path, importable, once):
-    pytest.importorskip("distributed")
-    one_case_only(tmp_path, once, executors.of("dask", 2))
 
 
 def one_case_only(tmp_path: Path, once: bool, executor) -> None:
@@ -152,50 +141,6 @@ def test_exact_the_time_left_is_told_when_something_was_done():
     assert clock(1000, 2.0) < 2000 * 0.01 / 2 and clock.left == 2000
 
 
-def test_always_the_time_of_a_chunk_is_without_what_compiles(monkeypatch):
-    def slow(*_):
-        with compiled.spending():
-            time.sleep(0.3)
-        return "answer"
-
-    monkeypatch.setattr("patchfem.campaigns.sweeps.sweep.answer", slow)
-    left = [[0, 1]]
-    (chunk, seconds, found), = Here().run(None, lambda: left.pop() if left else None)
-    assert (chunk, found) == ([0, 1], "answer") and seconds < 0.2
-
-
-class Prompt:
-    """A worker that answers before it is asked what; `given`: the chunks of all of them."""
-
-    given: ClassVar = []
-
-    def __init__(self, work, silent):
-        self.chunk, (self.pipe, self.there) = None, Pipe()
-
-    def give(self, chunk):
-        self.chunk = chunk
-        Prompt.given.append(chunk)
-        self.there.send(chunk)
-
-    def taken(self):
-        self.chunk = None
-        return self.pipe.recv(), 0.1, "answer"
-
-    def end(self):
-        self.pipe.close()
-
-
-def test_exact_a_worker_has_its_next_chunk_before_its_answer_is_written(monkeypatch):
-    monkeypatch.setattr(pool, "Worker", Prompt)
-    monkeypatch.setattr(Prompt, "given", [])
-    left = iter([[0], [1], [2], [3]])
-    running = Pool(2).run(None, lambda: next(left, None))
-    seen = [next(running)[0]]
-    assert Prompt.given == [[0], [1], [2]]
-    seen += [chunk for chunk, *_ in running]
-    assert sorted(seen) == Prompt.given == [[0], [1], [2], [3]]
-
-
 def test_exact_a_cluster_answers_as_this_process_does():
     pytest.importorskip("distributed")
     found, _ = all_of(work(), Cluster("", 1))
@@ -262,20 +207,3 @@ def test_exact_a_sweep_killed_in_the_middle_goes_on_to_the_same_files(whole, tmp
     half.mkdir()
     (half / "summary.json").write_text('{"patchf')
     resumed(whole, out)
-
-
-@pytest.mark.slow
-def test_exact_an_interrupted_pool_keeps_what_is_done(whole, tmp_path):
-    path, _, _ = whole
-    out = tmp_path / "swept"
-    command = [sys.executable, "-m", "patchfem", "sweep", path, "--over", "friction.static=0.05..0.6:400lin",
-               "-o", out, "-j", "2"]
-    running = subprocess.Popen(list(map(str, command)), stderr=subprocess.PIPE, text=True, start_new_session=True)
-    while not ((out / "cases").is_dir() and any((out / "cases").glob("[0-9a-f]*"))):
-        assert running.poll() is None
-        time.sleep(0.005)
-    os.killpg(running.pid, signal.SIGINT)
-    _, said = running.communicate(timeout=60)
-    assert running.returncode == 130 and said.rstrip().endswith("--resume")
-    assert cli("sweep", path, "--over", "friction.static=0.05..0.6:400lin", "-o", out, "--resume").code == 0
-    assert len(names(out / "cases")) == 400

@@ -104,22 +104,6 @@ def test_exact_patches_made_from_the_first_are_those_built_from_text(name):
         assert Asked(Path("b.toml"), text)._like(("contact.load=3 N",), (3.0,)) is None
 
 
-def test_exact_a_table_of_measured_responses_is_in_no_rule(tmp_path):
-    """Cases of a patch with [measured] are made from the first; one whose table is not there is told by its scene."""
-    (tmp_path / "rows.csv").write_text("frequency,acceleration\n143,1\n", encoding="utf-8")
-    text = PATCHES["bonds"] + '[measured]\nfile = "rows.csv"\n'
-    asked = Asked(tmp_path / "a.toml", text)
-    for angle in (1e-5, 3e-4):
-        sets, values = (f"contact.tilt.angle={angle!r} rad", "friction.static=0.4"), (angle, 0.4)
-        found = told(asked, sets, values)
-        assert asked._like(sets, values) is not None and found.measured[0] == tmp_path / "rows.csv"
-        assert same(found, told(asked, sets, ()))
-    with pytest.raises(PatchfemError, match=r"measured\.file"):
-        Asked(tmp_path / "b.toml", text.replace("rows", "none")).model(sets, values)
-    files = text + '[contact.profile]\nfile = "rows.csv"\n'
-    assert Asked(tmp_path / "c.toml", files)._like(("contact.load=3 N",), (3.0,)) is None
-
-
 ONE = POINT + "{}" + MODE + DRIVE
 OF_LAW = {"bond_length": ("elastic-plastic", "nonlocal"), "reference_speed": ("tanh",),
           "stiffness": ("bouc-wen", "lugre", "springs"), "stribeck_speed": ("lugre",)}
@@ -151,11 +135,3 @@ def test_exact_columns_of_models_are_the_numbers_of_each(name):
             np.testing.assert_array_equal(mine, theirs)
         few = columns_of(alike.some([4, 2]), lanes._of_contact)
         np.testing.assert_array_equal(few, columns_of(single, lanes._of_contact)[:, [4, 2]])
-
-
-def test_exact_a_rule_sees_what_it_tells_apart():
-    asked = Asked(Path("a.toml"), SCENES["weakening"])
-    for key, value, said in (("friction.static", 0.1, "kinetic"), ("structure.mode.axial.damping", 0.6, "")):
-        first = asked.model((f"{key}=0.3",), (0.3,))
-        found = told(asked, (f"{key}={value}",), (value,))
-        assert said in found if said else len(found.source.remarks) > len(first.source.remarks)

@@ -5,11 +5,10 @@ import subprocess
 import sys
 from pathlib import Path
 
-import numpy as np
 import pytest
 from command_line import cli
 from scene_texts import BENCH
-from study_module import ROOT, study
+from study_module import ROOT
 
 SBATCH = """\
 #!{python}
@@ -69,14 +68,3 @@ def test_exact_a_job_array_gives_the_files_of_one_sweep(slurm, tmp_path):
         assert (out / name).read_bytes() == (want / name).read_bytes()
     assert sorted(one.name for one in (out / "cases").iterdir()) == sorted(
         one.name for one in (want / "cases").iterdir())
-
-
-@pytest.mark.slow
-def test_exact_workers_in_jobs_give_the_answers_of_one_sweep(slurm, tmp_path):
-    pytest.importorskip("dask_jobqueue")
-    scene, _, want = asked(tmp_path)
-    jobqueue = study("cluster/jobqueue.py")
-    found = jobqueue.main(str(scene), str(tmp_path / "jobs"), "2", *OVER, python=sys.executable, interface="lo")
-    assert len(slurm.read_text().splitlines()) == 2
-    assert (tmp_path / "jobs" / "sweep.csv").read_bytes() == (want / "sweep.csv").read_bytes()
-    assert np.isfinite(found["loop_area"].values).all()

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 from scene_texts import PATCH
 
-from patchfem.campaigns.sweeps import sweep
 from patchfem.campaigns.sweeps.asked import Asked
 from patchfem.campaigns.sweeps.cases import Cases
 from patchfem.campaigns.sweeps.executors import Here
-from patchfem.campaigns.sweeps.executors import pool as pool_module
 from patchfem.campaigns.sweeps.executors.pool import Pool
 from patchfem.campaigns.sweeps.sweep import Work, solved, with_meshes
 from patchfem.runs.many.answers import joined_answers
@@ -18,15 +16,6 @@ from patchfem.scene.axes import read
 
 WORK = Work(Asked(Path("a.toml"), PATCH), Cases(tuple(read(["contact.tilt.angle=2e-5 rad,2e-4 rad",
                                                            "contact.load=50 N,100 N"])[0])))
-
-
-@pytest.mark.slow
-def test_exact_a_part_of_a_sweep_has_the_answers_of_the_whole():
-    whole = joined_answers(4, [part[:2] for part in solved(WORK, range(4), Here())])
-    rest = joined_answers(4, [part[:2] for part in solved(WORK, [3, 1], Here())])
-    assert len({one["interface_nodes"] for one in whole.numerics.values()}) == 1
-    for name, values in whole.values.items():
-        np.testing.assert_allclose(rest.values[name][[3, 1]], values[[3, 1]], rtol=1e-9)
 
 
 def test_exact_meshes_are_made_once_and_travel_with_the_work():
@@ -42,14 +31,3 @@ def test_exact_processes_that_begin_before_the_meshes_are_chosen_take_them():
     assert pool.ready == [] and found.numerics == here.numerics
     for name, values in here.values.items():
         np.testing.assert_allclose(found.values[name], values, rtol=1e-9)
-
-
-def test_always_no_process_is_left_where_no_meshes_could_be_chosen(monkeypatch):
-    pool, started = Pool(2), []
-    own = pool_module.Worker.__init__
-    monkeypatch.setattr(pool_module.Worker, "__init__", lambda one, *given: started.append(one) or own(one, *given))
-    monkeypatch.setattr(sweep, "with_meshes", lambda work: 1 / 0)
-    with pytest.raises(ZeroDivisionError):
-        next(solved(WORK, range(4), pool))
-    assert len(started) == 2 and all(one.process.poll() is not None for one in started)
-

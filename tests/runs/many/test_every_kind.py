@@ -76,9 +76,3 @@ def test_exact_many_are_runs_of_their_own(kind):
 def test_exact_benches_that_stay_as_they_are_pressed_share_that():
     taken = {kind: many.batch_of(cases(kind, 1, 2)[0]) for kind in ("bench", "bench wear")}
     assert taken["bench"].name == "benches" and taken["bench wear"] is None
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", TEXTS)
-def test_exact_two_hundred_are_runs_of_their_own(kind):
-    assert held_against_own_runs(kind, 2, 200) == 200

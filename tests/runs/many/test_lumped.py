@@ -6,10 +6,9 @@ from batch_beside import held_against
 from scene_texts import MODE
 
 from patchfem.api import base_of, build, load
-from patchfem.model.alike import Alike
 from patchfem.runs.many import one_by_one
 from patchfem.runs.many.answers import Answers
-from patchfem.runs.many.lumped import columns, lumped
+from patchfem.runs.many.lumped import lumped
 from patchfem.scene.sets import assignments
 
 DRIVE = '[drive]\nkind = "{kind}"\n{kind_size}\nfrequency = "140 Hz"\ncycles = 40\n'
@@ -43,7 +42,6 @@ def models(law: str, seed: int, count: int) -> list:
 
 def batch(cases):
     """Answers of the batch, group by group."""
-    from patchfem.runs.many.answers import Answers
 
     found, groups = Answers.blank(len(cases)), {}
     for case, model in enumerate(cases):
@@ -61,38 +59,6 @@ def test_exact_batch_is_the_single_runs(law, count):
     held_against(cases, one_by_one.solve(cases), batch(cases))
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("law", LAWS)
-def test_exact_batch_is_the_single_runs_many(law):
-    cases = models(law, 2, 180)
-    held_against(cases, one_by_one.solve(cases), batch(cases))
-
-
-def test_exact_cases_shared_by_threads_are_the_same_to_the_last_bit(monkeypatch):
-    from patchfem.runs.many.lumped import threads
-
-    cases = [one for one in models("coulomb", 3, 100) if one.rig.cycles == 20]
-    alone = lumped.solve(cases)
-    monkeypatch.setattr(threads, "LEAST", 8)
-    monkeypatch.setattr(threads, "cores", lambda: 3)
-    shared = lumped.solve(cases)
-    for name, values in alone.values.items():
-        np.testing.assert_array_equal(shared.values[name], values)
-        np.testing.assert_array_equal(shared.errors[name], alone.errors[name])
-    assert list(shared.outcome) == list(alone.outcome) and shared.reasons == alone.reasons
-
-
-def test_always_parts_make_up_the_cases(monkeypatch):
-    from patchfem.runs.many.lumped import threads
-
-    monkeypatch.setattr(threads, "cores", lambda: 4)
-    for count in (0, 1, 31, 64, 129, 1000):
-        seen = []
-        threads.in_threads(seen.append, count)
-        assert sorted(k for part in seen for k in range(count)[part]) == list(range(count))
-        assert len(seen) == max(1, min(4, count // 32))
-
-
 def test_exact_what_is_extrapolated_far_is_that_of_a_single_run(monkeypatch):
     """Of two Coulomb cases one still changes; its steady estimate, beyond its tolerance, shows the last bits of the
     extremes and phasors it is made of: the batch has those bits without a run by itself, and the same words."""
@@ -108,62 +74,6 @@ def test_exact_what_is_extrapolated_far_is_that_of_a_single_run(monkeypatch):
     held_against(cases, ones, batch(cases))
 
 
-@pytest.mark.parametrize("law", ["elastic-plastic", "iwan"])
-def test_exact_cycles_that_repeat_are_counted_at_once(law, monkeypatch):
-    """Damped cases that settle long before their last cycles: one cycle stands for all that are left, with the bits of
-    single runs, which move through every one of them."""
-    from patchfem.dynamics.events import histories
-
-    base = base_of(load(SCENE.format(law=LAWS[law], kind="base", kind_size=SIZES["base"])))
-    shared = ["drive.cycles=120", "structure.mode.axial.damping=0.1"]
-    cases = [build(base.changed([*shared, f"normal.load={load} N"])) for load in ("30", "80")]
-    done, march, brief = [], [], histories.briefly
-    monkeypatch.setattr(histories, "briefly", lambda *given: done.extend(brief(*given)) or done[-1:])
-    real = histories._Run._march
-    monkeypatch.setattr(histories._Run, "_march", lambda self, *given: march.append(1) or real(self, *given))
-    many = [lumped.solve([case]) for case in cases]
-    assert done and all(one.repeats and one.cycles_done == 120 for one in done) and len(march) <= 6 * len(done)
-    monkeypatch.undo()
-    assert list(many[0].outcome) == ["steady"]
-    held_against(cases, one_by_one.solve(cases), batch(cases))
-
-
-def test_exact_a_stick_in_which_nothing_rings_is_told_by_the_batch(monkeypatch):
-    """Cells that hold so long that what rings could turn a few times: the samples of one more cycle say that nothing
-    does, as those of ten cycles say in a single run, without one."""
-    from patchfem.response import ringing
-
-    base = base_of(load(SCENE.format(law=LAWS["iwan"], kind="base", kind_size=SIZES["base"])))
-    shared = ["normal.load=104.4 N", "structure.moving_mass=0.884 kg", "structure.mode.axial.frequency=143 Hz",
-              "drive.frequency=143 Hz", "drive.cycles=100", "friction.stiffness=1e7 N/m", "friction.beta=0.5"]
-    cases = [build(base.changed([*shared, "drive.acceleration=30 m/s^2"]))]
-    looked, ring = [], ringing.ring
-    monkeypatch.setattr(ringing, "ring", lambda *given: looked.append(ring(*given)) or looked[-1])
-    ones = one_by_one.solve(cases)
-    # two of each run, with 49 and 193 cells, and of the four for the error of each
-    assert looked and len(looked) <= 20 and not any(looked)
-    looked.clear()
-    monkeypatch.setattr(one_by_one, "solve", None)
-    held_against(cases, ones, batch(cases))
-    assert looked
-
-
-def test_exact_nothing_rings_in_a_motion_that_holds_and_repeats(monkeypatch):
-    """Cells of which less than half ever slip: what decays has gone when every cycle is the same, so neither a single
-    run nor a batch looks for it, however long the stick."""
-    from patchfem.response import ringing
-
-    base = base_of(load(SCENE.format(law=LAWS["iwan"], kind="base", kind_size=SIZES["base"])))
-    cases = [build(base.changed(["normal.load=100 N", "drive.cycles=100", "structure.mode.axial.damping=0.1",
-                                 f"drive.acceleration={push} m/s^2"])) for push in (2, 8)]
-    monkeypatch.setattr(ringing, "ring", None)
-    ones = one_by_one.solve(cases)
-    assert list(ones.values["stick_fraction"]) == [1, 1] and "ring_frequency" not in ones.values
-    monkeypatch.setattr(one_by_one, "solve", None)
-    many = batch(cases)
-    held_against(cases, ones, many)
-
-
 def test_always_few_cells_are_told_from_many():
     """Cells of a density that a tolerance asks for: the answers of all 769 lie within the bars, where small cycles
     slip too, for which the first cells are too few."""
@@ -175,15 +85,3 @@ def test_always_few_cells_are_told_from_many():
             if np.isfinite(value[0]) and name not in ("energy_balance", "work_check"):
                 assert abs(value[0] - best.values[name][0]) <= found.errors[name][0] + found.floors[name][0], name
                 assert found.errors[name][0] <= 1e-3 * abs(value[0]) + found.floors[name][0], name
-
-
-def test_always_bonds_without_a_drift_are_not_warned_of_it():
-    """Where no case of a batch has a drift, there is no column of it."""
-    law = 'law = "nonlocal"\nstatic = 0.3\nbond_length = "1 um"'
-    model = build(load(SCENE.format(law=law, kind="base", kind_size=SIZES["base"])))
-    found = Answers.blank(3)
-    alike = Alike(None, model, np.zeros((3, 0)), None, np.arange(3))
-    assert not columns._by_law(alike, found).any()
-    found.measure("drift_per_cycle", "m")
-    found.values["drift_per_cycle"][1] = 1e-6
-    assert columns._by_law(alike, found).tolist() == [False, True, False]

@@ -56,12 +56,6 @@ def test_exact_a_failing_batch_is_made_up_for_by_single_runs(monkeypatch):
     assert "breaks: ZeroDivisionError" in said[0]
 
 
-def test_exact_a_batch_that_fails_to_look_at_a_model_leaves_it_to_a_single_run(monkeypatch):
-    batch = many.Batch("blind", lambda model: 1 / 0, lambda model: 0, lambda models, say: 1 / 0)
-    monkeypatch.setattr(many, "BATCHES", (batch,))
-    same(many.answers([pf.build(BENCH)]), 0, pf.run(BENCH))
-
-
 def test_exact_a_batch_gets_its_groups_and_gives_back_in_order(monkeypatch):
     seen = []
 
@@ -90,14 +84,6 @@ def test_exact_parts_join_to_the_whole(order):
         np.testing.assert_array_equal(found.values[name], values)
         np.testing.assert_array_equal(found.errors[name], whole.errors[name])
     assert found.reasons == whole.reasons and found.notes == whole.notes
-
-
-def test_exact_values_without_errors_are_those_with_them():
-    bare, whole = many.answers([pf.build(BENCH)], estimate=False), many.answers([pf.build(BENCH)])
-    assert bare.outcome.tolist() == whole.outcome.tolist() and np.nanmax(whole.errors["loop_area"]) > 0
-    assert all(np.isnan(errors).all() or not errors.any() for errors in bare.errors.values())
-    for name, values in whole.values.items():
-        np.testing.assert_array_equal(bare.values[name], values)
 
 
 def test_always_a_fault_of_one_case_leaves_the_others(monkeypatch):

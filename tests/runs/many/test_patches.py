@@ -1,22 +1,16 @@
 """Static patches pressed together, held against their own single runs: values, bars, warnings and notes."""
 
-from pathlib import Path
 
 import numpy as np
 import pytest
 from scene_texts import COATING, PIECE
 
-from patchfem.campaigns.sweeps.asked import Asked
-from patchfem.campaigns.sweeps.cases import Cases
-from patchfem.campaigns.sweeps.executors import Here
-from patchfem.export.sweeps.run import swept
 from patchfem.model.model import build
 from patchfem.runs.many import many, one_by_one, patches
 from patchfem.runs.many.meshes import meshed
 from patchfem.runs.patch.grids import contact_extent
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.scene import scene
-from patchfem.scene.axes import values_of
 
 TEXT = PIECE + '{}load = "{} N"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING + "{}\n[accuracy]\ntolerance = 1e-2\n"
 TILT, LINE = '[contact.tilt]\nangle = "{} rad"\n', '[contact.load_line]\noffset = "{} m"\n'
@@ -78,12 +72,6 @@ def test_exact_cases_of_every_kind_beside_each_other():
         assert any(part in one for one in said), part
 
 
-def test_exact_each_tolerance_has_meshes_of_its_own():
-    texts = [TEXT.format(PINNED, load, "").replace("1e-2", size) for size in ("1e-2", "1e-3") for load in (100, 200)]
-    one, other, finer, finest = (model.patch.meshes for model in meshed([build(scene.loads(text)) for text in texts]))
-    assert one is other and finer is finest and one is not finer
-
-
 @pytest.mark.parametrize("tables", [TILT, TILT + SKIN])
 def test_exact_patches_solved_together_are_those_of_their_own(tables):
     """What moves a patch takes of it: pressure, gap, compliance, and the rest that the pressed patch carries."""
@@ -102,50 +90,12 @@ def test_exact_patches_solved_together_are_those_of_their_own(tables):
             assert contact_extent(mine).places == pytest.approx(contact_extent(own).places, rel=1e-9)
 
 
-def test_exact_contacts_inside_the_interface_press_together_too():
-    models = family(CROWN + TILT, 1e-5, 1e-3)
-    assert all(one is not None for one in patches.static.solved_patches([model.patch for model in models], 1e-2))
-    same(models)
-
-
-def test_exact_a_sweep_in_columns_is_that_of_its_models():
-    """The cases of a sweep are one model with columns of numbers; here the same as models of their own."""
-    values = [(-4.5, 2.0, 300.0), (-3.2, 0.4, 700.0), (-3.9, 20.0, 90.0)]
-    text = TEXT.format(PINNED, 100.0, TILT.format(1e-4) + CROWN)
-    keys = {"contact.tilt.angle": [f"{10**a!r} rad" for a, _, _ in values],
-            "contact.crown.radius": [f"{r!r} m" for _, r, _ in values],
-            "contact.load": [f"{load!r} N" for _, _, load in values]}
-    cases = Cases(tuple(values_of(key, texts, False) for key, texts in keys.items()), True)
-    found = swept(Asked(Path("patch.toml"), text), cases, Here())
-    models = meshed([build(scene.loads(text, sets=[f"{key}={texts[k]}" for key, texts in keys.items()]))
-                     for k in range(3)])
-    wanted = many.answers(models)
-    for name, column in wanted.values.items():
-        for mine, other in ((found.values[name], column), (found.errors[name], wanted.errors[name])):
-            assert mine == pytest.approx(other, rel=1e-12), name
-
-
 def test_refuses_a_profile_to_be_pressed_with_others(tmp_path):
     """What it is averaged over stands in its own bars."""
     (tmp_path / "waves.csv").write_text("x [mm],z [um]\n" + "".join(f"{0.1 * k},{k % 3}\n" for k in range(-70, 71)))
     text = TEXT.format(PINNED, 100.0, '[contact.profile]\nfile = "waves.csv"\n')
     models = meshed([build(scene.loads(text, tmp_path / "patch.toml")) for _ in range(2)])
     assert "profile" in patches.refuses(models[0])
-
-
-def test_exact_a_case_does_not_depend_on_its_neighbours():
-    models = family(TILT, -1e-4, 1e-5, 1e-3)
-    found, turned = many.answers(models), many.answers(models[::-1])
-    for name, values in found.values.items():
-        near = PEAK if name in ("pressure_peak", "loaded_fraction") else 1e-12
-        assert turned.values[name][::-1] == pytest.approx(values, rel=near)
-
-
-def test_exact_opposite_tilts_have_the_same_contact():
-    found = many.answers(family(TILT, -2e-4, 2e-4, loads=(100.0,)))
-    for name, (left, right) in found.values.items():
-        sign = -1 if name in ("moment", "pressure_centre", "rotation") else 1
-        assert left == pytest.approx(sign * right, rel=1e-9), name
 
 
 def test_refuses_what_is_not_pressed_together():

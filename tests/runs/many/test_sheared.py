@@ -46,10 +46,3 @@ def held(law: str, seed: int, count: int) -> int:
 @pytest.mark.parametrize("law", LAWS)
 def test_exact_batch_of_patches_is_the_single_runs(law):
     assert held(law, 1, 6) >= 3
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", [2, 3])
-@pytest.mark.parametrize("law", LAWS)
-def test_exact_batch_of_patches_is_the_single_runs_many(law, seed):
-    assert held(law, seed, 100) >= 50
