@@ -1,227 +1,390 @@
-"""Measures of the package's structure, read from its sources alone: `python tests/house.py [ROOT]` prints the table.
+"""Count the size and the style of the sources by folder, and compare the counts with a baseline.
 
-ROOT is any checkout; nothing of it is imported. What the figures mean:
+    python tests/house.py                    print the counts of every folder, and the sums
+    python tests/house.py patchfem/contact   print every line of a folder that breaks a rule
+    python tests/house.py --lower            lower the baseline `tests/house.toml` to the present counts
 
-- room: a folder of the package that holds modules (a nested one is a room of its own), or a module lying flat at the
-  top; the package's own `__init__` is no room.
-- upward arrow: a pair of rooms (a, b), where a file of a imports a file of b, that points against the order of the
-  rooms. The order is free and the best one found counts, so none means that the rooms form no circle.
-- cycle of files: files that import each other over any number of steps. Imports inside functions or for types alone
-  count, and so does a module of compiled code that is loaded by its literal name.
-- own lazy import: a name of ours imported below the outermost level of a file; `from .x import a, b` has two. What
-  stands under `if TYPE_CHECKING` never runs and is none.
-- taken whole: a module of ours that a file takes as a module at its outermost level; it is loaded at its first use
-  (`patchfem.later`), a module of compiled code at once.
-- parameters: all but `self`, `*args` and `**kwargs` included. Length of a function: its lines without its docstring.
+`tests/test_house.py` fails if a count exceeds the baseline. A count that has to rise is raised by hand in the
+baseline, in the commit that gives the reason. Tokens leave out comments and docstrings, so that neither
+documentation nor the format of a file changes them. Rules of style are counted in the package and in the
+studies. In the tests are counted imports three folders deep, private names and uses of monkeypatch.
 """
 
 import ast
-import gc
-import random
+import re
 import sys
-from collections import Counter
-from functools import cache
+import tokenize
+import tomllib
+from collections import Counter, defaultdict
 from io import StringIO
 from pathlib import Path
-from statistics import median, quantiles
-from tokenize import COMMENT, generate_tokens
 from typing import NamedTuple
 
-PACKAGE = "patchfem"
-IMPORTING = (ast.Import, ast.ImportFrom, ast.Call)
-DEFS = (ast.FunctionDef, ast.AsyncFunctionDef)
+ROOT = Path(__file__).parents[1]
+BASELINE = "tests/house.toml"
+TREES = ("patchfem", "studies", "tests")
+SHOWN_LINES = 12  # lines that the message about one count names
+FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
+COMPREHENSIONS = (ast.ListComp, ast.SetComp, ast.DictComp, ast.GeneratorExp)
+NOT_COUNTED = {
+    tokenize.COMMENT,
+    tokenize.NL,
+    tokenize.NEWLINE,
+    tokenize.INDENT,
+    tokenize.DEDENT,
+    tokenize.ENDMARKER,
+}
+
+RULES = {
+    "tokens": "tokens of code",
+    "N1": "a function is named by a bare participle",
+    "N2": "a function is named by an adverb",
+    "N3": "a name begins or ends with a preposition",
+    "N4": "a function is named by a filler word",
+    "N5": "a parameter of one letter that the docstring does not explain",
+    "N6": "a constant is named by one filler word, adverb or participle",
+    "C1": "several constants are assigned in one statement",
+    "C2": "the comment of a constant is a fragment",
+    "C4": "more than 12 constants in a module",
+    "D2": "a public function of 3 or more parameters has no sections in its docstring",
+    "D3": "a docstring begins with a tuple",
+    "D4": "a docstring begins with What, Who, How many, With, As ...",
+    "D5": "the first line of a docstring is not a sentence",
+    "F1": "a function returns a bare tuple of 3 or more values",
+    "F2": "a function has more than 6 parameters",
+    "F3": "a flag that can be passed by position",
+    "F5": "a conditional expression inside another",
+    "F6": "a conditional expression over several lines",
+    "F7": "a comprehension over three lines, or with two `for`",
+    "F8": "several values are assigned in one statement",
+    "F9": "more than two functions inside a function",
+    "R1": "a record with more than 8 fields",
+    "deep": "a name imported from a module three folders deep",
+    "private": "a private name of the package",
+    "monkeypatch": "a use of monkeypatch.setattr",
+}
+IRREGULAR_PARTICIPLES = frozenset(
+    "begun bent borne bound broken brought built caught chosen dealt done drawn driven fed felt foreseen found given "
+    "gone grown heard held hidden hung kept known laid left lost made meant met paid said seen sent shown sold "
+    "sought spent split sprung struck stuck sunk swept taken taught thrown told torn won worn wound written".split()
+)
+NOUNS_IN_ED = frozenset("embed exceed feed need seed speed".split())
+ADVERBS = frozenset(
+    "above across afresh after again ahead alike alone along already anew apart around before below beneath beside "
+    "between beyond here inside later off once out outside over there together twice under within".split()
+)
+FILLERS = frozenset(
+    "alike any big book cheap close dear done each else every far few found go high how large least low made many mine "
+    "more most near now odd one other others out own place plain rest round say seen sharp small some sure then thing "
+    "things told way what which who whole why wide worth".split()
+)
+PREPOSITIONS = frozenset("after at before beyond by from in of over under without".split())
+VERBS_BEFORE_PREPOSITION = (
+    "from_",
+    "to_",
+    "as_",
+    "on_",
+    "at_",
+    "in_",
+    "by_",
+)  # `from_file` is idiomatic
+AXES = frozenset("xyztnm_")  # letters of coordinates, time and sizes need no explanation
+SECTION = re.compile(r"^ *(Parameters|Returns|Yields|Attributes)\n *---", re.M)
+OPENING = re.compile(
+    r"(What|Who|Whether what|How many|How far|That|With|As|Where|Why|Between which)\b"
+)
+FRAGMENT = re.compile(
+    r"(above|an?|and|at|below|beyond|by|from|in|its|of|or|over|so|that|times|to|where|which|within)\b"
+)
 
 
-class Import(NamedTuple):
-    """target: dotted name inside the package ("" is its top), or the package of others; taken: the name taken from the
-    target, "" for the module itself; lazy: below the outermost level, and not for types alone; by_name: the module's
-    name was given as text."""
+class Breach(NamedTuple):
+    """One line that breaks a rule."""
 
-    target: str
-    taken: str
-    ours: bool
-    lazy: bool
-    by_name: bool
+    rule: str
+    path: Path
+    line: int
+    text: str
 
 
-def sources(root: Path, folder: str = PACKAGE) -> dict:
-    """Dotted name inside `folder` ("dynamics.events", "mesh" for a package's `__init__`, "" for the top) -> text."""
-    tree = {}
-    for path in sorted((Path(root) / folder).rglob("*.py")):
-        parts = path.relative_to(Path(root) / folder).with_suffix("").parts
-        tree[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path.read_text("utf-8")
-    return tree
+# ---- the rules
 
 
-@cache
-def nodes_of(text: str) -> tuple:
-    """The nodes of a source, its module first; a source is parsed once, and no search for garbage goes through the
-    thousands of nodes that stay."""
-    was = gc.isenabled()
-    gc.disable()
-    try:
-        return tuple(ast.walk(ast.parse(text)))
-    finally:
-        if was:
-            gc.enable()
+def is_participle(word: str) -> bool:
+    """Return whether a word without underscores is a past participle."""
+    regular = word.endswith("ed") and len(word) > 4 and word not in NOUNS_IN_ED
+    return "_" not in word and (regular or word in IRREGULAR_PARTICIPLES)
 
 
-def folder_of(name: str, tree: dict) -> str:
-    """The folder that holds a file, "" for the top; the name of an `__init__` is its folder."""
-    return name if any(other.startswith(name + ".") for other in tree) else name.rpartition(".")[0]
+def name_rules(node):
+    """Yield the rules that the name of a function breaks, with the name."""
+    word = node.name.strip("_")
+    first = word.partition("_")[0]
+    last = word.rpartition("_")[2]
+    if is_participle(word):
+        yield "N1", node, node.name
+    if word in ADVERBS:
+        yield "N2", node, node.name
+    if (
+        "_" in word
+        and not word.startswith(VERBS_BEFORE_PREPOSITION)
+        and {first, last} & PREPOSITIONS
+    ):
+        yield "N3", node, node.name
+    if word in FILLERS:
+        yield "N4", node, node.name
 
 
-def imports(name: str, text: str, tree: dict) -> list:
-    """Every import that a walk of the file finds, one entry for each name imported; np.load("data.npz") is none."""
-    package = [PACKAGE, *(part for part in folder_of(name, tree).split(".") if part)]
-    (parsed, *nodes), out = nodes_of(text), []
-    outer = {id(node) for node in parsed.body} | {id(inner) for node in parsed.body if _for_types(node)
-                                                  for inner in node.body}
-    for node in nodes:
-        if not isinstance(node, IMPORTING):
+def parameter_rules(node, documentation: str):
+    """Yield the rules that the parameters of a function break."""
+    positional = [
+        arg for arg in (*node.args.posonlyargs, *node.args.args) if arg.arg not in ("self", "cls")
+    ]
+    parameters = [*positional, *node.args.kwonlyargs]
+    explained = set(re.findall(r"\b\w\b", documentation))
+    for arg in parameters:
+        if len(arg.arg) == 1 and arg.arg not in AXES | explained:
+            yield "N5", arg, f"{node.name}({arg.arg})"
+    if len(parameters) > 6:
+        yield "F2", node, f"{node.name}: {len(parameters)} parameters"
+    defaults = dict(zip(reversed(positional), reversed(node.args.defaults)))
+    for arg in positional:
+        default = defaults.get(arg)
+        has_flag = isinstance(default, ast.Constant) and isinstance(default.value, bool)
+        if has_flag or getattr(arg.annotation, "id", "") == "bool":
+            yield "F3", arg, f"{node.name}({arg.arg})"
+    is_public = bool(documentation) and not node.name.startswith("_")
+    if is_public and len(parameters) >= 3 and not SECTION.search(documentation):
+        yield "D2", node, node.name
+
+
+def docstring_rules(node, documentation: str):
+    """Yield the rules that the first line of a docstring breaks."""
+    first = documentation.partition("\n")[0].rstrip()
+    if first.startswith("("):
+        yield "D3", node, f"{node.name}: {first}"
+    if OPENING.match(first):
+        yield "D4", node, f"{node.name}: {first}"
+    if first and not first.endswith((".", ":")):
+        yield "D5", node, f"{node.name}: {first}"
+
+
+def own_nodes(node):
+    """Yield the nodes of a function without those of the functions and classes inside it."""
+    for child in ast.iter_child_nodes(node):
+        if not isinstance(child, (*FUNCTIONS, ast.Lambda, ast.ClassDef)):
+            yield child
+            yield from own_nodes(child)
+
+
+def body_rules(node):
+    """Yield the rules that the statements of a function break."""
+    longest = 0
+    for part in own_nodes(node):
+        n_lines = getattr(part, "end_lineno", 0) - getattr(part, "lineno", 0) + 1
+        if isinstance(part, ast.Return) and isinstance(part.value, ast.Tuple):
+            longest = max(longest, len(part.value.elts))
+        elif isinstance(part, ast.IfExp):
+            if sum(isinstance(inner, ast.IfExp) for inner in ast.walk(part)) > 1:
+                yield "F5", part, node.name
+            if n_lines > 1:
+                yield "F6", part, node.name
+        elif isinstance(part, COMPREHENSIONS) and (n_lines > 2 or len(part.generators) > 1):
+            yield "F7", part, node.name
+        elif isinstance(part, ast.Assign) and isinstance(part.value, ast.Tuple):
+            if any(isinstance(target, ast.Tuple) for target in part.targets):
+                yield "F8", part, node.name
+    if longest > 2:
+        yield "F1", node, f"{node.name}: {longest} values"
+    if sum(isinstance(inner, (*FUNCTIONS, ast.Lambda)) for inner in ast.walk(node)) > 3:
+        yield "F9", node, node.name
+
+
+def record_rules(node):
+    """Yield the rule that a NamedTuple or dataclass with too many fields breaks."""
+    is_record = re.search(
+        "NamedTuple|dataclass", " ".join(map(ast.unparse, [*node.bases, *node.decorator_list]))
+    )
+    n_fields = sum(isinstance(part, ast.AnnAssign) for part in node.body)
+    if is_record and n_fields > 8:
+        yield "R1", node, f"{node.name}: {n_fields} fields"
+
+
+def constant_rules(tree, lines: list):
+    """Yield the rules that the constants of a module break."""
+    n_constants = 0
+    for node in tree.body:
+        if not isinstance(node, (ast.Assign, ast.AnnAssign)):
             continue
-        for dotted, taken in _asked(node, package):
-            head, _, target = dotted.partition(".")
-            ours, by_name = head == PACKAGE, isinstance(node, ast.Call)
-            if ours and taken and f"{target}.{taken}".strip(".") in tree:  # `from ..contact import gaps` takes a module
-                target, taken = f"{target}.{taken}".strip("."), ""
-            if not (by_name and ours) or (target and any(f"{one}.".startswith(f"{target}.") for one in tree)):
-                out.append(Import(target if ours else head, taken, ours, id(node) not in outer, by_name))
-    return out
+        target = node.targets[0] if isinstance(node, ast.Assign) else node.target
+        names = [
+            part.id
+            for part in ast.walk(target)
+            if isinstance(part, ast.Name) and part.id.strip("_").isupper()
+        ]
+        n_constants += len(names)
+        if names and isinstance(target, ast.Tuple):
+            yield "C1", node, ", ".join(names)
+        for name in names:
+            word = name.strip("_").lower()
+            if word in FILLERS | ADVERBS or is_participle(word):
+                yield "N6", node, name
+        comment = lines[node.end_lineno - 1].partition("  # ")[2]
+        if names and FRAGMENT.match(comment):
+            yield "C2", node, comment
+    if n_constants > 12:
+        yield "C4", tree, f"{n_constants} constants"
 
 
-def _for_types(node) -> bool:
-    return isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"
+def style_rules(tree, text: str):
+    """Yield (rule, node, text) for every breach of style in a module."""
+    yield from constant_rules(tree, text.splitlines())
+    for node in ast.walk(tree):
+        if isinstance(node, FUNCTIONS):
+            documentation = ast.get_docstring(node) or ""
+            yield from name_rules(node)
+            yield from parameter_rules(node, documentation)
+            yield from docstring_rules(node, documentation)
+            yield from body_rules(node)
+        elif isinstance(node, ast.ClassDef):
+            yield from record_rules(node)
 
 
-def _asked(node, package: list):
-    """(full dotted name, name taken from it) for each name that a statement imports or a call loads."""
-    if isinstance(node, ast.Import):
-        yield from ((alias.name, "") for alias in node.names)
-    elif isinstance(node, ast.ImportFrom):
-        kept = package[: len(package) + 1 - node.level] if node.level else []
-        base = ".".join([*kept, *([node.module] if node.module else [])])
-        yield from ((base, alias.name) for alias in node.names)
-    elif isinstance(node, ast.Call) and node.args:
-        called = getattr(node.func, "attr", getattr(node.func, "id", ""))
-        text = _text(node.args[0]) if called in ("load", "import_module") else ""
-        if text:  # `compiled.load` wants a name inside the package
-            yield (f"{PACKAGE}.{text.removeprefix(PACKAGE + '.')}" if called == "load" else text), ""
+def border_rules(tree, text: str):
+    """Yield (rule, node, text) where a test reaches behind the border of a folder of the package."""
+    modules = set()  # names of imported modules of the package
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ImportFrom) and (node.module or "").split(".")[0] == "patchfem":
+            modules |= {alias.asname or alias.name for alias in node.names}
+            for alias in node.names:
+                if node.module.count(".") >= 2:
+                    yield "deep", node, f"{node.module}.{alias.name}"
+                if alias.name.startswith("_"):
+                    yield "private", node, alias.name
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Attribute):
+            owner = getattr(node.value, "id", "")
+            if owner in modules and re.match("_[^_]", node.attr):
+                yield "private", node, f"{owner}.{node.attr}"
+            if (owner, node.attr) == ("monkeypatch", "setattr"):
+                yield "monkeypatch", node, "monkeypatch.setattr"
 
 
-def _text(node) -> str:
-    """A literal text; of one with gaps, the folder named before its first gap."""
-    first = next(iter(node.values), node) if isinstance(node, ast.JoinedStr) else node
-    text = first.value if isinstance(first, ast.Constant) and isinstance(first.value, str) else ""
-    return text if first is node else text.rpartition(".")[0]
+# ---- the counts
 
 
-def graph_of(tree: dict) -> dict:
-    """File -> the files of the package that it imports, without the top, which every import runs anyway."""
-    return {name: {one.target for one in imports(name, text, tree) if one.ours and one.target in tree} - {name, ""}
-            for name, text in tree.items()}  # fmt: skip
+def count_tokens(tree, text: str) -> int:
+    """Count the tokens of a source without comments and docstrings."""
+    docstrings = set()
+    for node in ast.walk(tree):
+        if (
+            isinstance(node, (ast.Module, ast.ClassDef, *FUNCTIONS))
+            and ast.get_docstring(node) is not None
+        ):
+            docstrings.add((node.body[0].lineno, node.body[0].col_offset))
+    tokens = tokenize.generate_tokens(StringIO(text).readline)
+    return sum(token.type not in NOT_COUNTED and token.start not in docstrings for token in tokens)
 
 
-def study_graph(tree: dict) -> dict:
-    """The same for loose scripts that import each other by bare name, from their own folder first."""
-    graph = {}
-    for name, text in tree.items():
-        asked = {one.target for one in imports(name, text, {}) if not one.ours}
-        beside = {one: f"{name.rpartition('.')[0]}.{one}" for one in asked}
-        missing = {one for one in asked if beside[one] not in tree}
-        graph[name] = {beside[one] for one in asked - missing} | {one for one in tree if one.split(".")[-1] in missing}
-    return graph
+def folder_of_file(path: Path, root: Path) -> str:
+    """Return the folder in which a file is counted: patchfem/export for patchfem/export/pages/lead.py."""
+    return "/".join(path.relative_to(root).parts[:-1][:2])
 
 
-def circles(graph: dict) -> list:
-    """Groups of nodes that reach each other, the largest group first."""
-    reach = {one: set(targets) for one, targets in graph.items()}
-    for middle in graph:
-        for one in graph:
-            reach[one] |= reach[middle] if middle in reach[one] else set()
-    groups = {frozenset(two for two in reach[one] if one in reach[two]) for one in graph if one in reach[one]}
-    return sorted((sorted(group) for group in groups), key=lambda group: (-len(group), group))
+class Counts(NamedTuple):
+    """Counts of a checkout."""
+
+    values: dict  # folder -> {rule: count}, without zeros
+    breaches: dict  # (folder, rule) -> list of Breach
 
 
-def room_graph(tree: dict) -> dict:
-    """Room -> the other rooms that it imports from."""
-    room, graph = {name: folder_of(name, tree) or name for name in tree}, graph_of(tree)
-    return {one: {room[b] for a in tree if room[a] == one for b in graph[a]} - {one} for one in {*room.values()} - {""}}
+def count_sources(root: Path = ROOT) -> Counts:
+    """Count tokens and breaches of the rules in every folder of a checkout."""
+    values = defaultdict(Counter)
+    breaches = defaultdict(list)
+    for path in sorted(path for tree in TREES for path in (root / tree).rglob("*.py")):
+        text = path.read_text("utf-8")
+        tree = ast.parse(text)
+        folder = folder_of_file(path, root)
+        values[folder]["tokens"] += count_tokens(tree, text)
+        rules = border_rules if folder.startswith("tests") else style_rules
+        for rule, node, words in rules(tree, text):
+            values[folder][rule] += 1
+            breaches[folder, rule].append(Breach(rule, path, getattr(node, "lineno", 1), words))
+    return Counts({folder: dict(counter) for folder, counter in values.items()}, dict(breaches))
 
 
-def upward(graph: dict, tries: int = 200) -> int:
-    """Arrows that point up in the best order found; only those inside a circle can, the rest has an order."""
-    chance = random.Random(1)
-    return sum(min(_settled(graph, chance.sample(group, len(group))) for _ in range(tries)) for group in circles(graph))
+def read_baseline(root: Path = ROOT) -> dict:
+    """Read {folder: {rule: largest count that is allowed}}."""
+    return tomllib.loads((root / BASELINE).read_text("utf-8"))
 
 
-def _settled(graph: dict, order: list) -> int:
-    """Upward arrows after each node has been moved to where it makes the fewest, until none moves; order: top last."""
-    moved = True
-    while moved:
-        moved = False
-        for one in list(order):
-            rest = [other for other in order if other != one]
-            costs = [sum(other in graph[one] for other in rest)]
-            for other in rest:
-                costs.append(costs[-1] - (other in graph[one]) + (one in graph[other]))
-            best = costs.index(min(costs))
-            if costs[best] < costs[order.index(one)]:
-                order, moved = [*rest[:best], one, *rest[best:]], True
-    return sum(b in graph[a] for i, a in enumerate(order) for b in order[i + 1 :])
+def write_baseline(values: dict, root: Path = ROOT) -> None:
+    """Write the baseline, one folder per line."""
+    lines = []
+    for folder in sorted(values):
+        counts = ", ".join(
+            f"{rule} = {values[folder][rule]}" for rule in RULES if values[folder].get(rule)
+        )
+        lines.append(f'"{folder}" = {{ {counts} }}\n')
+    head = "# Largest counts that are allowed, by folder: tests/house.py explains them and lowers them.\n"
+    (root / BASELINE).write_text(head + "".join(lines), "utf-8")
 
 
-def parameters(node) -> list:
-    given = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs, node.args.vararg, node.args.kwarg]
-    return [one.arg for one in given if one is not None and one.arg != "self"]
+def exceeded_counts(counts: Counts, baseline: dict) -> list:
+    """Return one message for every count above the baseline; lines of the files changed last come first."""
+    messages = []
+    for folder, values in counts.values.items():
+        allowed = baseline.get(folder, {})
+        for rule, count in values.items():
+            if count <= allowed.get(rule, 0):
+                continue
+            breaches = sorted(
+                counts.breaches.get((folder, rule), []), key=lambda one: -one.path.stat().st_mtime
+            )
+            lines = [f"\n    {one.path}:{one.line}: {one.text}" for one in breaches[:SHOWN_LINES]]
+            messages.append(
+                f"{folder}: {rule} {count}, allowed {allowed.get(rule, 0)} ({RULES[rule]}){''.join(lines)}"
+            )
+    return messages
 
 
-def _docstring(node) -> set:
-    """The lines that the docstring of a function, class or module takes."""
-    written = isinstance(node, (ast.Module, ast.ClassDef, *DEFS)) and ast.get_docstring(node)
-    return set(range(node.body[0].lineno, node.body[0].end_lineno + 1)) if written else set()
+def lower_baseline(counts: Counts, baseline: dict) -> dict:
+    """Return the baseline with every count lowered to the present one; none rises."""
+    lowered = {}
+    for folder, values in counts.values.items():
+        allowed = baseline.get(folder, values)
+        lowered[folder] = {rule: min(count, allowed.get(rule, 0)) for rule, count in values.items()}
+    return lowered
 
 
-def _code_and_comments(text: str) -> tuple:
-    """(lines that are not empty, comment or docstring; comments, those behind code too)."""
-    lines = {i for i, line in enumerate(text.split("\n"), 1) if line.strip() and not line.lstrip().startswith("#")}
-    docs = set().union(*map(_docstring, nodes_of(text)))
-    return len(lines - docs), sum(token.type == COMMENT for token in generate_tokens(StringIO(text).readline))
+def print_table(values: dict) -> None:
+    """Print the sums of the three trees and the counts of their folders."""
+    for tree in TREES:
+        folders = {
+            folder: counts
+            for folder, counts in sorted(values.items())
+            if folder.split("/")[0] == tree
+        }
+        total = sum((Counter(counts) for counts in folders.values()), Counter())
+        for folder, counts in {f"{tree} (sum)": total, **folders}.items():
+            print(f"{folder:24}", *(f"{rule} {counts[rule]}" for rule in RULES if counts.get(rule)))
 
 
-def figures(root: Path) -> dict:
-    """Name of each figure -> its value, in the order of the table."""
-    tree = sources(root)
-    functions = [node for text in tree.values() for node in nodes_of(text) if isinstance(node, DEFS)]
-    lengths = [node.end_lineno - node.lineno + 1 - len(_docstring(node)) for node in functions]
-    docs = [ast.get_docstring(node) for node in functions if ast.get_docstring(node)]
-    code, comments = map(sum, zip(*map(_code_and_comments, tree.values())))
-    rooms = room_graph(tree)
-    long = max(tree, key=lambda name: tree[name].count("\n"))
-    folder, held = Counter(folder_of(name, tree) for name in tree).most_common(1)[0]
-    own = [one for name, text in tree.items() for one in imports(name, text, tree) if one.ours and not one.by_name]
-    return {
-        "rooms": len(rooms), "arrows between rooms": sum(map(len, rooms.values())), "upward arrows": upward(rooms),
-        "files in cycles": circles(graph_of(tree)), "studies in cycles": circles(study_graph(sources(root, "studies"))),
-        "own lazy imports": sum(one.lazy for one in own),
-        "modules taken whole": sum(not one.lazy and not one.taken for one in own),
-        "functions": len(functions), "with a scene": sum("scene" in parameters(node) for node in functions),
-        "with over 6 parameters": f"{sum(len(parameters(node)) > 6 for node in functions) / len(functions):.1%}",
-        "lines of a function, median": median(lengths), "90 % below": round(quantiles(lengths, n=10)[-1], 1),
-        "docstrings of one line": f"{sum(chr(10) not in doc for doc in docs) / len(docs):.0%}",
-        "comments per 100 lines of code": round(100 * comments / code, 1),
-        "files": len(tree), "lines": sum(text.count("\n") for text in tree.values()),
-        "longest module": f"{long or '__init__'}, {tree[long].count(chr(10))} lines",
-        "most files in a folder": f"{folder or 'the top'}, {held}",
-    }  # fmt: skip
-
-
-def main(root=Path(__file__).parents[1]) -> None:
-    for name, value in figures(Path(root)).items():
-        groups = value if isinstance(value, list) else []
-        shown = value if value != groups else " + ".join(str(len(group)) for group in groups) or "none"
-        print(f"{name:34}{shown}", *(", ".join(group) for group in groups), sep="\n    ")
+def main(words: list) -> None:
+    """Run the command line."""
+    counts = count_sources()
+    if words == ["--lower"]:
+        write_baseline(lower_baseline(counts, read_baseline()))
+    elif words:
+        for breaches in (
+            found for (folder, _), found in counts.breaches.items() if folder == words[0]
+        ):
+            for breach in breaches:
+                print(f"{breach.rule} {breach.path.relative_to(ROOT)}:{breach.line}: {breach.text}")
+    else:
+        print_table(counts.values)
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:2])
+    main(sys.argv[1:])

@@ -14,7 +14,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
-from house import DEFS, circles, graph_of, imports, nodes_of, sources
+from import_graph import FUNCTIONS, import_cycles, import_graph, imports, sources, syntax_nodes
 
 HERE = Path(__file__).parents[1]
 SCENE = ("", "__main__", "api", "commands.*", "scene", "scene.*", "model", "model.*")  # may know a Scene
@@ -26,12 +26,12 @@ OUTSIDE = {"numba": ("*kernels", "compiled", "compiled.*"), "pyvista": ("export.
 PHYSICS = ["core", "mesh", "surface", "elasticity", "contact", "slip", "dynamics", "runs"]  # must be read in this order
 ORDERED = ("dynamics", "runs", "export")  # folders with a reading order of their own
 FUNCTION_LINES = 90
-KNOWING = (ast.Name, ast.Attribute, ast.alias, ast.ClassDef, ast.arg, ast.AnnAssign, *DEFS)  # nodes that name a thing
+KNOWING = (ast.Name, ast.Attribute, ast.alias, ast.ClassDef, ast.arg, ast.AnnAssign, *FUNCTIONS)  # these name a thing
 
 
 def reading_order(tree: dict, folder: str = "") -> list:
     """(number, name) of each entry of the numbered list in the docstring of a folder, "" the package."""
-    listed = ast.get_docstring(nodes_of(tree.get(folder, ""))[0]) or ""
+    listed = ast.get_docstring(syntax_nodes(tree.get(folder, ""))[0]) or ""
     return [(int(number), name.rstrip("/")) for number, name in re.findall(r"^\s*(\d+)\.\s+`([\w/]+)`", listed, re.M)]
 
 
@@ -58,7 +58,7 @@ def of_a_folder(folder: str, tree: dict, found: dict) -> list:
     rungs, out = {name: number for number, name in reading_order(tree, folder)}, set()
     for name, all_of_it in found.items():
         own = rungs.get(inside(name, folder))
-        out |= {f"{name} imports {one.target} upward" for one in all_of_it if one.ours and own is not None
+        out |= {f"{name} imports {one.target} upward" for one in all_of_it if one.is_own and own is not None
                 and rungs.get(inside(one.target, folder), own) > own}
     return of_the_order(tree, folder) + sorted(out)
 
@@ -68,7 +68,7 @@ def of_imports(name: str, found: list, rungs: dict) -> list:
     own, out = rungs.get(name.split(".")[0]), set()
     for one in found:
         rung = rungs.get(one.target.split(".")[0])
-        if not one.ours or own is None or (one.target, one.taken) == ("", "__version__"):
+        if not one.is_own or own is None or (one.target, one.name) == ("", "__version__"):
             continue
         if rung is None:
             out.add(f"{name} imports {one.target}, which the reading order does not name")
@@ -81,7 +81,7 @@ def of_outside(found: dict) -> list:
     """Packages of others imported where they have no place, and more than one exporter that writes meshes."""
     out, exporters = [], []
     for name, all_of_it in found.items():
-        used = {one.target for one in all_of_it if not one.ours}
+        used = {one.target for one in all_of_it if not one.is_own}
         out += [f"{name} imports {package}" for package, places in OUTSIDE.items()
                 if package in used and not any(fnmatch(name, place) for place in places)]  # fmt: skip
         exporters += [name] if "meshio" in used and name.startswith("export.") else []
@@ -109,13 +109,13 @@ def _knows(node) -> bool:
 def of_functions(parsed: dict) -> list:
     """Functions that have grown too long. The size of a module follows its idea, so nothing counts it."""
     sizes = [(f"{name}.{node.name}", node.end_lineno - node.lineno + 1) for name, nodes in parsed.items()
-             for node in nodes if isinstance(node, DEFS)]
+             for node in nodes if isinstance(node, FUNCTIONS)]
     return [f"{name} has {count} lines" for name, count in sizes if count > FUNCTION_LINES]
 
 
 def of_effects(tree: dict) -> list:
     """Modules that the table of effects names and that do not exist."""
-    nodes = nodes_of(tree.get("effects", ""))
+    nodes = syntax_nodes(tree.get("effects", ""))
     texts = [node.value for node in nodes if isinstance(node, ast.Constant) and isinstance(node.value, str)]
     named = {text.removeprefix("patchfem.") for text in texts if re.fullmatch(r"patchfem(\.\w+)+", text)}
     return [f"effects names {name}, which does not exist" for name in sorted(named - set(tree))]
@@ -123,11 +123,11 @@ def of_effects(tree: dict) -> list:
 
 def faults(tree: dict) -> list:
     """Every breach of the ladder in a dict {dotted name: source}, as sentences."""
-    parsed = {name: nodes_of(text) for name, text in tree.items()}
+    parsed = {name: syntax_nodes(text) for name, text in tree.items()}
     found = {name: imports(name, text, tree) for name, text in tree.items()}
     order = reading_order(tree)
     rungs = {name: number for number, name in order} | {"": len(order) + 1, "__main__": len(order) + 1}
-    out = of_the_order(tree) + [f"cycle of files: {', '.join(group)}" for group in circles(graph_of(tree))]
+    out = of_the_order(tree) + [f"cycle of files: {', '.join(group)}" for group in import_cycles(import_graph(tree))]
     for name in tree:
         out += of_imports(name, found[name], rungs) + of_scene(name, parsed[name])
     for folder in ORDERED:
@@ -164,9 +164,9 @@ def test_exact_the_package_is_a_ladder():
 def test_exact_the_checker_sees_what_there_is():
     tree = sources(HERE)
     found = [one for name, text in tree.items() for one in imports(name, text, tree)]
-    assert len(tree) > 100 and len(reading_order(tree)) > 10 and sum(one.ours for one in found) > 500
+    assert len(tree) > 100 and len(reading_order(tree)) > 10 and sum(one.is_own for one in found) > 500
     assert {"numpy", "core"} <= {one.target for one in found}
-    assert any(one.by_name and one.target.endswith("kernels") for one in found)
+    assert any(one.is_text and one.target.endswith("kernels") for one in found)
     assert re.search(r"patchfem(\.\w+)+", tree["effects"])  # else `of_effects` looks at nothing
 
 

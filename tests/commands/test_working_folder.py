@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 from command_line import cli
-from house import nodes_of, sources
+from import_graph import sources, syntax_nodes
 from scene_texts import BENCH, COATED
 
 from patchfem.__main__ import VERBS
@@ -75,7 +75,7 @@ def test_always_every_interpreter_that_is_started_leaves_out_the_working_folder(
     """Lists of words that begin with the interpreter name -P next."""
     seen = 0
     for name, text in sources(Path(__file__).parents[2]).items():
-        for node in nodes_of(text) if "sys.executable" in text else ():
+        for node in syntax_nodes(text) if "sys.executable" in text else ():
             words = [ast.unparse(one) for one in node.elts] if isinstance(node, ast.List) else []
             if words[:1] in (["sys.executable"], ["PYTHON"]):
                 assert words[1] == "'-P'", name

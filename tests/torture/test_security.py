@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 from command_line import cli
-from house import nodes_of, sources
+from import_graph import sources, syntax_nodes
 from scene_texts import BENCH, MODE
 from torture.hostile import Planted
 
@@ -28,7 +28,7 @@ FINE = "re.compile('x'); from .http import x; np.load(a, allow_pickle=False); js
 def found_in(name: str, text: str) -> set:
     """What a module has that no module may have, but for HARMLESS; only what has a word of it is parsed."""
     out = set()
-    for node in nodes_of(text) if WORDS.search(text) else ():
+    for node in syntax_nodes(text) if WORDS.search(text) else ():
         if isinstance(node, ast.Import | ast.ImportFrom):
             names = [one.name for one in node.names] if isinstance(node, ast.Import) else \
                 [node.module or ""] if not node.level else []

@@ -1,0 +1,120 @@
+"""Imports of the package, read from its sources without importing them.
+
+`imports` lists what one file imports: every statement, also inside functions and under TYPE_CHECKING, and every
+compiled module that is loaded by its literal name. `import_graph` joins the lists of all files.
+"""
+
+import ast
+import gc
+from functools import cache
+from pathlib import Path
+from typing import NamedTuple
+
+PACKAGE = "patchfem"
+FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
+LOADERS = ("load", "import_module")  # functions whose first argument is the name of a module
+
+
+class Import(NamedTuple):
+    """One imported name."""
+
+    target: str  # dotted name of the module inside the package ("" is its top), or the name of another package
+    name: str  # name imported from the target, "" for the module itself
+    is_own: bool  # whether the target belongs to the package
+    is_text: bool  # whether the name of the module is a text, as in `compiled.load("dynamics.loop_kernels")`
+
+
+def sources(root: Path, folder: str = PACKAGE) -> dict:
+    """Read the sources of a folder: {dotted name inside the folder: text}, "" for its top."""
+    tree = {}
+    for path in sorted((Path(root) / folder).rglob("*.py")):
+        parts = path.relative_to(Path(root) / folder).with_suffix("").parts
+        tree[".".join(parts[:-1] if parts[-1] == "__init__" else parts)] = path.read_text("utf-8")
+    return tree
+
+
+@cache
+def syntax_nodes(text: str) -> tuple:
+    """Parse a source once and return all its nodes, the module first."""
+    was_enabled = gc.isenabled()
+    gc.disable()  # the collector would visit all nodes of all files again and again
+    try:
+        return tuple(ast.walk(ast.parse(text)))
+    finally:
+        if was_enabled:
+            gc.enable()
+
+
+def imports(name: str, text: str, tree: dict) -> list:
+    """List the imports of the file with the dotted name `name`; np.load("data.npz") is not an import."""
+    is_package = any(other.startswith(f"{name}.") for other in tree)
+    folder = name if is_package else name.rpartition(".")[0]
+    package = [PACKAGE, *(part for part in folder.split(".") if part)]
+    found = []
+    for node in syntax_nodes(text):
+        for dotted, imported in _imported_names(node, package):
+            head, _, target = dotted.partition(".")
+            is_own = head == PACKAGE
+            is_text = isinstance(node, ast.Call)
+            module = f"{target}.{imported}".strip(".")
+            if (
+                is_own and imported and module in tree
+            ):  # `from ..contact import gaps` imports a module
+                target = module
+                imported = ""
+            exists = target and any(f"{other}.".startswith(f"{target}.") for other in tree)
+            if exists or not (is_text and is_own):
+                found.append(Import(target if is_own else head, imported, is_own, is_text))
+    return found
+
+
+def _imported_names(node, package: list):
+    """Yield (dotted name of the module, name imported from it) of an import statement or a call of a loader."""
+    if isinstance(node, ast.Import):
+        for alias in node.names:
+            yield alias.name, ""
+    elif isinstance(node, ast.ImportFrom):
+        parents = package[: len(package) + 1 - node.level] if node.level else []
+        base = ".".join([*parents, *([node.module] if node.module else [])])
+        for alias in node.names:
+            yield base, alias.name
+    elif isinstance(node, ast.Call) and node.args:
+        called = getattr(node.func, "attr", getattr(node.func, "id", ""))
+        text = _literal_text(node.args[0]) if called in LOADERS else ""
+        if text and called == "load":  # `compiled.load` takes a name inside the package
+            yield f"{PACKAGE}.{text.removeprefix(PACKAGE + '.')}", ""
+        elif text:
+            yield text, ""
+
+
+def _literal_text(node) -> str:
+    """Return a literal text; of an f-string, the folder that it names before its first placeholder."""
+    is_format = isinstance(node, ast.JoinedStr) and bool(node.values)
+    first = node.values[0] if is_format else node
+    text = first.value if isinstance(first, ast.Constant) and isinstance(first.value, str) else ""
+    return text.rpartition(".")[0] if is_format else text
+
+
+def import_graph(tree: dict) -> dict:
+    """Return {file: files of the package that it imports}, without the top, which every import runs anyway."""
+    graph = {}
+    for name, text in tree.items():
+        targets = {
+            one.target for one in imports(name, text, tree) if one.is_own and one.target in tree
+        }
+        graph[name] = targets - {name, ""}
+    return graph
+
+
+def import_cycles(graph: dict) -> list:
+    """Return the groups of files that import each other over any number of steps, the largest group first."""
+    reachable = {name: set(targets) for name, targets in graph.items()}
+    for middle in graph:
+        for targets in reachable.values():
+            if middle in targets:
+                targets |= reachable[middle]
+    cyclic = [name for name in graph if name in reachable[name]]
+    groups = {
+        frozenset(other for other in reachable[name] if name in reachable[other]) for name in cyclic
+    }
+    return sorted((sorted(group) for group in groups), key=lambda group: (-len(group), group))

@@ -1,0 +1,105 @@
+"""The size and the style of the sources do not get worse, and the checker sees every breach."""
+
+import ast
+
+import pytest
+from house import (  # fmt: skip
+    RULES,
+    border_rules,
+    count_sources,
+    count_tokens,
+    exceeded_counts,
+    lower_baseline,
+    read_baseline,
+    style_rules,
+    write_baseline,
+)
+
+CLEAN = '''"""A module without a breach."""
+MAX_STEPS = 5  # the largest number of steps for which the result is exact
+
+def solve_steps(matrix, load, *, is_linear=False):
+    """Solve a system of equations.
+
+    Parameters
+    ----------
+    matrix, load : arrays
+    """
+    low, high = limits(matrix)
+    return [row * load for row in matrix if row], low
+'''
+PLANTED = {
+    "N1": "def settled(): pass",
+    "N2": "def together(): pass",
+    "N3": "def size_of(): pass",
+    "N4": "def most(): pass",
+    "N5": 'def solve(q):\n    """Solve."""',
+    "N6": "MOST = 5",
+    "C1": "MAX_A, MAX_B = 1, 2",
+    "C2": "MAX_A = 1  # of a length",
+    "C4": "\n".join(f"MAX_{k} = {k}" for k in range(13)),
+    "D2": 'def solve(first, second, third):\n    """Solve."""',
+    "D3": 'def solve():\n    """(force, slip) of a rig."""',
+    "D4": 'def solve():\n    """What a rig does."""',
+    "D5": 'def solve():\n    """Solve a rig that has\n    two masses."""',
+    "F1": "def solve():\n    return 1, 2, 3",
+    "F2": "def solve(a1, a2, a3, a4, a5, a6, a7): pass",
+    "F3": "def solve(is_linear=False): pass",
+    "F5": "def solve():\n    return 1 if a else (2 if b else 3)",
+    "F6": "def solve():\n    return (1 if a else\n        2)",
+    "F7": "def solve():\n    return [x for y in z for x in y]",
+    "F8": "def solve():\n    first, second = 1, 2",
+    "F9": "def solve():\n    return lambda: 1, [lambda: 2, lambda: 3]",
+    "R1": "class Rig(NamedTuple):\n" + "\n".join(f"    field{k}: int" for k in range(9)),
+    "deep": "from patchfem.export.pages import lead",
+    "private": "from patchfem import api\napi._check()",
+    "monkeypatch": "def test(monkeypatch):\n    monkeypatch.setattr(module, 'name', 1)",
+}
+
+
+def broken_rules(text: str) -> set:
+    return {
+        rule for rules in (style_rules, border_rules) for rule, _, _ in rules(ast.parse(text), text)
+    }
+
+
+def test_always_no_count_exceeds_the_baseline():
+    assert not (messages := exceeded_counts(count_sources(), read_baseline())), "\n".join(messages)
+
+
+def test_exact_a_clean_module_breaks_no_rule():
+    assert broken_rules(CLEAN) == set()
+    assert set(PLANTED) == set(RULES) - {"tokens"}
+
+
+@pytest.mark.parametrize("rule", PLANTED)
+def test_exact_a_planted_breach_is_seen(rule):
+    assert broken_rules(PLANTED[rule]) == {rule}
+
+
+def test_exact_comments_and_docstrings_are_no_tokens():
+    text = (
+        '"""A module."""\n\nx = [1]  # a list\n\ndef f():\n    """Return."""\n    return "text"\n'
+    )
+    assert count_tokens(ast.parse(text), text) == 5 + 5 + 2
+
+
+def test_refuses_a_count_above_the_baseline_and_names_the_line(tmp_path):
+    module = tmp_path / "patchfem" / "contact" / "gaps.py"
+    module.parent.mkdir(parents=True)
+    (tmp_path / "tests").mkdir()
+    module.write_text(CLEAN + "def settled(): pass\n", "utf-8")
+    write_baseline(count_sources(tmp_path).values, tmp_path)
+    assert exceeded_counts(count_sources(tmp_path), read_baseline(tmp_path)) == []
+    module.write_text(CLEAN + "def settled(): pass\ndef glued(): pass\n", "utf-8")
+    tokens, names = exceeded_counts(count_sources(tmp_path), read_baseline(tmp_path))
+    assert tokens.startswith("patchfem/contact: tokens ")
+    assert "N1 2, allowed 1" in names and f"{module}:{CLEAN.count(chr(10)) + 2}: glued" in names
+
+
+def test_exact_the_baseline_only_falls():
+    class Present:
+        values = {"patchfem/contact": {"tokens": 90, "N1": 3}}  # noqa: RUF012
+
+    lowered = lower_baseline(Present, {"patchfem/contact": {"tokens": 100, "N1": 2, "N2": 5}})
+    assert lowered == {"patchfem/contact": {"tokens": 90, "N1": 2}}
