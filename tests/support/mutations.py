@@ -1,0 +1,912 @@
+"""Plant random faults in the package and find those that no test catches (mutation testing).
+
+Draw 20 faults in a folder of the package, run the tests on each fault, and compare two states of the tests:
+
+    python tests/support/mutations.py draw /tmp/faults.json --folders contact friction/laws --seed 1 --count 20
+    python tests/support/mutations.py run /tmp/faults.json /tmp/before --tests tests/contact tests/friction
+    python tests/support/mutations.py run /tmp/faults.json /tmp/after --tests tests/contact tests/friction
+    python tests/support/mutations.py compare /tmp/before /tmp/after
+
+`draw` chooses lines of code evenly (one fault per line) and leaves out docstrings, messages, type hints, imports and
+decorators. `run` works on a copy of the checkout, so the checkout may be edited meanwhile and several runs may go on at
+once. It first runs the tests without a fault and records which tests reach which fault. A test that fails or skips
+there is left out. Then it plants one fault at a time and runs the tests that reach it, the quick tests of the folder of
+the same name first, until one fails. A fault that makes the tests hang counts as caught. A second `run` with the same
+folder of results continues an interrupted one; after a change of the tests or the package take a new folder.
+`--root CHECKOUT` tests another checkout of the project, `--jobs 2` runs two processes. Faults whose lines were changed
+since the drawing are reported as gone. `show` lists the outcomes, with the survivors in full.
+
+A compiled kernel is compiled anew for each fault in it, which takes 10 to 60 s. Its lines cannot be traced; the tests
+that reach its folder or a module that names the kernel's module are run.
+"""
+
+import argparse
+import ast
+import copy
+import json
+import os
+import random
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections import Counter, defaultdict
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from functools import cache
+from itertools import count
+from pathlib import Path
+from queue import SimpleQueue
+from typing import NamedTuple
+
+ROOT = Path(__file__).resolve().parents[2]
+PACKAGE = "patchfem"
+FIRST_SECONDS = (
+    15.0  # duration without fault of the tests that are run first: most faults are caught by them
+)
+HANG_FACTOR = 4.0  # tests that take this many times their duration without fault hang; below it, the machine is busy
+HANG_SECONDS = 60.0  # added to that time for imports, and for kernels that are compiled anew
+MAX_BYTES = (
+    8 << 30
+)  # address space of a process under test, so that a fault cannot exhaust the machine
+NOT_COPIED = (".git", ".venv", "__pycache__", ".pytest_cache", ".hypothesis", ".ruff_cache")
+CLOCK = count(
+    int(time.time())
+)  # times of modification: Python recognises a changed source by its time in seconds
+
+SWAPPED_OPERATORS = {
+    ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.FloorDiv: ast.Mult,
+    ast.Mod: ast.FloorDiv, ast.Pow: ast.Mult, ast.BitAnd: ast.BitOr, ast.BitOr: ast.BitAnd,
+}  # fmt: skip
+SWAPPED_COMPARISONS = {
+    ast.Lt: (ast.LtE, ast.Gt), ast.LtE: (ast.Lt, ast.GtE), ast.Gt: (ast.GtE, ast.Lt), ast.GtE: (ast.Gt, ast.LtE),
+    ast.Eq: (ast.NotEq,), ast.NotEq: (ast.Eq,), ast.Is: (ast.IsNot,), ast.IsNot: (ast.Is,), ast.In: (ast.NotIn,),
+    ast.NotIn: (ast.In,),
+}  # fmt: skip
+SWAPPED_NAMES = {
+    "min": "max",
+    "minimum": "maximum",
+    "argmin": "argmax",
+    "any": "all",
+    "floor": "ceil",
+    "sin": "cos",
+}
+SWAPPED_NAMES |= {after: before for before, after in SWAPPED_NAMES.items()}
+
+
+class Fault(NamedTuple):
+    """A change of the source text: the whole lines before and after, the first of them at `line`."""
+
+    file: str  # path below the root of the checkout
+    line: int
+    kind: str
+    before: str
+    after: str
+
+
+# ---------------------------------------------------------------------------------------------------------------- draw
+
+
+def changed_expressions(node: ast.expr):
+    """Yield (kind, changed node) for each fault of one node of an expression."""
+    match node:
+        case ast.BinOp(left, op, right) if type(op) in SWAPPED_OPERATORS and not (
+            is_text(left) or is_text(right)
+        ):
+            yield "operator", with_fields(node, op=SWAPPED_OPERATORS[type(op)]())
+        case ast.UnaryOp(ast.USub() | ast.Not(), operand):
+            yield "sign", operand
+        case ast.BoolOp(op):
+            yield (
+                "boolean",
+                with_fields(node, op=ast.Or() if isinstance(op, ast.And) else ast.And()),
+            )
+        case ast.Compare(ops=ops):
+            for place, op in enumerate(ops):
+                for other in SWAPPED_COMPARISONS[type(op)]:
+                    yield (
+                        "comparison",
+                        with_fields(node, ops=[*ops[:place], other(), *ops[place + 1 :]]),
+                    )
+        case ast.Constant(bool() as value):
+            yield "constant", ast.Constant(not value)
+        case ast.Constant(int() as value):
+            yield from (("constant", ast.Constant(other)) for other in (value + 1, value - 1))
+        case ast.Constant(float() as value):
+            yield from (
+                ("constant", ast.Constant(other))
+                for other in (2 * value, value / 2)
+                if other != value
+            )
+        case ast.Call(ast.Name("range"), args, []) if not any(
+            isinstance(arg, ast.Starred) for arg in args
+        ):
+            stop = min(1, len(args) - 1)
+            for place, step in ((stop, -1), (stop, 1), (0, 1)):
+                shifted = ast.BinOp(args[place], ast.Add(), ast.Constant(step))
+                yield "range", with_fields(node, args=[*args[:place], shifted, *args[place + 1 :]])
+        case ast.Call(func, args) if len(args) > 1 and not any(
+            isinstance(arg, ast.Starred) for arg in args[:2]
+        ):
+            if ast.dump(args[0]) != ast.dump(args[1]) and ast.unparse(func) not in (
+                "min",
+                "max",
+                "isinstance",
+            ):
+                yield "arguments", with_fields(node, args=[args[1], args[0], *args[2:]])
+        case ast.IfExp(test):
+            yield "condition", with_fields(node, test=ast.UnaryOp(ast.Not(), test))
+    match node:
+        case ast.Call(ast.Name(name) as func) if name in SWAPPED_NAMES:
+            yield "minmax", with_fields(node, func=with_fields(func, id=SWAPPED_NAMES[name]))
+        case ast.Call(ast.Attribute(_, name) as func) if name in SWAPPED_NAMES:
+            yield "minmax", with_fields(node, func=with_fields(func, attr=SWAPPED_NAMES[name]))
+
+
+def with_fields(node: ast.AST, **fields):
+    """Return a copy of a node with other fields."""
+    other = copy.copy(node)
+    for name, value in fields.items():
+        setattr(other, name, value)
+    return other
+
+
+def is_text(node: ast.expr) -> bool:
+    """Return whether an operand is visibly a text, which other operators do not take."""
+    return isinstance(node, ast.JoinedStr) or (
+        isinstance(node, ast.Constant) and isinstance(node.value, str)
+    )
+
+
+def faults_of_statement(node: ast.stmt):
+    """Yield (kind, node, changed node) for each fault of a statement without the statements inside it."""
+    roots = []
+    match node:
+        case (
+            ast.Import()
+            | ast.ImportFrom()
+            | ast.Global()
+            | ast.Nonlocal()
+            | ast.Expr(ast.Constant())
+        ):
+            return
+        case ast.Assign([ast.Name("__all__")]):
+            return
+        case ast.Raise():
+            yield "deletion", node, ast.Pass()
+            return
+        case ast.FunctionDef(args=args):
+            roots = [*args.defaults, *filter(None, args.kw_defaults)]
+        case ast.If(test) | ast.While(test):
+            yield "condition", test, ast.UnaryOp(ast.Not(), test)
+            roots = [test]
+        case ast.AugAssign(target, op, value):
+            if type(op) in SWAPPED_OPERATORS and not is_text(value):
+                yield "operator", node, with_fields(node, op=SWAPPED_OPERATORS[type(op)]())
+            yield "deletion", node, ast.Pass()
+            roots = [target, value]
+        case ast.AnnAssign(value=value):
+            roots = [value] if value else []
+        case ast.Break() | ast.Continue():
+            yield "deletion", node, ast.Pass()
+        case ast.Assign() | ast.Expr() | ast.Return() | ast.Delete() | ast.Assert():
+            stores_part = isinstance(node, ast.Assign) and not isinstance(
+                node.targets[0], (ast.Name, ast.Tuple)
+            )
+            if (
+                stores_part
+                or isinstance(node, ast.Expr)
+                or (isinstance(node, ast.Return) and node.value)
+            ):
+                yield "deletion", node, ast.Pass()
+            roots = [child for child in ast.iter_child_nodes(node) if isinstance(child, ast.expr)]
+        case ast.For(target, iterable):
+            roots = [target, iterable]
+        case ast.With(items):
+            roots = [item.context_expr for item in items]
+        case ast.Match(subject):
+            roots = [subject]
+    while roots:
+        expression = roots.pop()
+        if not isinstance(expression, ast.JoinedStr):
+            yield from (
+                (kind, expression, changed) for kind, changed in changed_expressions(expression)
+            )
+            roots += operands(expression)
+
+
+def operands(node: ast.expr):
+    """Yield the expressions directly inside an expression."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.expr):
+            yield child
+        elif isinstance(child, (ast.comprehension, ast.keyword)):
+            yield from operands(child)
+
+
+def statements(body: list):
+    """Yield the statements of a body and of those inside them, without what stands under `if TYPE_CHECKING`."""
+    for node in body:
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.unparse(node.test):
+            continue
+        yield node
+        for name in ("body", "orelse", "finalbody"):
+            yield from statements(getattr(node, name, []))
+        for part in [*getattr(node, "handlers", []), *getattr(node, "cases", [])]:
+            yield from statements(part.body)
+
+
+def faults_of_file(file: str, text: str) -> list[Fault]:
+    """Return all faults of a source that still compile."""
+    lines = text.encode().split(b"\n")
+    faults = []
+    for statement in statements(ast.parse(text).body):
+        for kind, node, changed in faults_of_statement(statement):
+            words = ast.unparse(ast.fix_missing_locations(changed))
+            if isinstance(changed, (ast.BinOp, ast.UnaryOp, ast.BoolOp, ast.Compare, ast.IfExp)):
+                words = f"({words})"
+            first, last = node.lineno - 1, node.end_lineno
+            before = b"\n".join(lines[first:last])
+            tail = lines[last - 1][node.end_col_offset :]
+            after = lines[first][: node.col_offset] + words.encode() + tail
+            faults.append(Fault(file, first + 1, kind, before.decode(), after.decode()))
+    return faults
+
+
+def is_valid(fault: Fault, text: str) -> bool:
+    """Return whether the source with this fault is still a program, and another one."""
+    try:
+        return ast.dump(ast.parse(planted(fault, text))) != ast.dump(ast.parse(text))
+    except SyntaxError:
+        return False
+
+
+def planted(fault: Fault, text: str) -> str | None:
+    """Return a source with the fault, at its line or where the same lines stand now; None if they are gone."""
+    lines, before = text.split("\n"), fault.before.split("\n")
+    places = [place for place in range(len(lines)) if lines[place : place + len(before)] == before]
+    if not places:
+        return None
+    place = min(places, key=lambda place: abs(place - fault.line + 1))
+    return "\n".join([*lines[:place], fault.after, *lines[place + len(before) :]])
+
+
+def draw(root: Path, folders: list[str], seed: int, number: int) -> list[Fault]:
+    """Return faults in random order, as many in each folder as its lines of code ask for, one per line at most.
+
+    Parameters
+    ----------
+    root : Path
+        Checkout of the project.
+    folders : list of str
+        Files or folders of the package; if there are none, all files and folders at its top.
+    seed : int
+    number : int
+        Number of faults.
+    """
+    package = root / PACKAGE
+    tops = [
+        path.name
+        for path in sorted(package.iterdir())
+        if path.suffix == ".py" or (path / "__init__.py").is_file()
+    ]
+    groups = []
+    for folder in folders or tops:
+        place = package / folder
+        by_line = defaultdict(list)
+        for path in sorted(place.rglob("*.py")) if place.is_dir() else [place]:
+            file = str(path.relative_to(root))
+            for fault in faults_of_file(file, path.read_text("utf-8")):
+                by_line[file, fault.line].append(fault)
+        groups.append(by_line)
+    rng = random.Random(seed)
+    chosen = []
+    for by_line, share in zip(
+        groups, shares([len(by_line) for by_line in groups], number), strict=True
+    ):
+        lines = sorted(by_line)
+        rng.shuffle(lines)
+        taken = 0
+        for line in lines:
+            if taken == share:
+                break
+            faults = by_line[line]
+            kind = rng.choice(sorted({fault.kind for fault in faults}))
+            fault = rng.choice([fault for fault in faults if fault.kind == kind])
+            if is_valid(fault, (root / fault.file).read_text("utf-8")):
+                chosen.append(fault)
+                taken += 1
+    rng.shuffle(chosen)
+    return chosen
+
+
+def shares(sizes: list[int], number: int) -> list[int]:
+    """Split a number in proportion to sizes, by the largest remainders."""
+    exact = [number * size / max(1, sum(sizes)) for size in sizes]
+    parts = [int(share) for share in exact]
+    by_remainder = sorted(range(len(sizes)), key=lambda place: parts[place] - exact[place])
+    for place in by_remainder[: number - sum(parts)]:
+        parts[place] += 1
+    return parts
+
+
+# --------------------------------------------------------------------------------------------------------------- reach
+
+
+def watched_lines(root: Path, faults: list[Fault]) -> dict:
+    """Return {file: {line: [numbers of faults]}}: a test that runs a line may notice these faults.
+
+    A fault inside a function has the lines of its statement. A fault outside, which is run at import, has the lines of
+    the functions that mention the names assigned there, or else of all functions of its file. A fault of a compiled
+    kernel has those of the functions in its folder and of the files that name its module.
+    """
+    watched = defaultdict(lambda: defaultdict(list))
+    for number, fault in enumerate(faults):
+        text = planted_text(root, fault)
+        if text is None:
+            continue
+        for file, lines in lines_of_fault(root, fault, text).items():
+            for line in lines:
+                watched[file][line].append(number)
+    return watched
+
+
+def planted_text(root: Path, fault: Fault) -> str | None:
+    """Return the source of a checkout with the fault, None if its lines are gone."""
+    path = root / fault.file
+    return planted(fault, path.read_text("utf-8")) if path.is_file() else None
+
+
+def lines_of_fault(root: Path, fault: Fault, text: str) -> dict:
+    """Return {file: lines} whose run may show one fault."""
+    old = (root / fault.file).read_text("utf-8")
+    line = 1 + next(
+        place
+        for place, (one, other) in enumerate(zip(old.split("\n"), text.split("\n")))
+        if one != other
+    )
+    tree = parsed(root / fault.file)
+    stem = Path(fault.file).stem
+    if stem.endswith("kernels"):
+        folder = str(Path(fault.file).parent)
+        files = [
+            file
+            for file in package_files(root)
+            if file.startswith(folder) or stem in (root / file).read_text("utf-8")
+        ]
+        return {file: function_lines(root / file) for file in files}
+    around = [
+        node
+        for node in ast.walk(tree)
+        if isinstance(node, ast.stmt) and node.lineno <= line <= node.end_lineno
+    ]
+    statement = max(around, key=lambda node: node.lineno)
+    end = statement.body[0].lineno - 1 if getattr(statement, "body", None) else statement.end_lineno
+    if line in function_lines(root / fault.file):
+        return {fault.file: set(range(statement.lineno, max(end, statement.lineno) + 1))}
+    names = {
+        node.id
+        for node in ast.walk(statement)
+        if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
+    }
+    mentions = {}
+    for file in package_files(root) if names and statement in tree.body else ():
+        if any(name in (root / file).read_text("utf-8") for name in names):
+            mentions[file] = lines_that_mention(root / file, names)
+    return mentions if any(mentions.values()) else {fault.file: function_lines(root / fault.file)}
+
+
+@cache
+def package_files(root: Path) -> list[str]:
+    """Return the paths of the package's sources below the root."""
+    return [str(path.relative_to(root)) for path in sorted((root / PACKAGE).rglob("*.py"))]
+
+
+@cache
+def parsed(path: Path) -> ast.Module:
+    """Return the syntax tree of a file."""
+    return ast.parse(path.read_text("utf-8"))
+
+
+@cache
+def function_lines(path: Path) -> set:
+    """Return the lines inside functions."""
+    functions = [node for node in ast.walk(parsed(path)) if isinstance(node, ast.FunctionDef)]
+    return {line for node in functions for line in range(node.body[0].lineno, node.end_lineno + 1)}
+
+
+def lines_that_mention(path: Path, names: set) -> set:
+    """Return the lines inside functions where one of these names stands."""
+    nodes = [node for node in ast.walk(parsed(path)) if isinstance(node, (ast.Name, ast.Attribute))]
+    mentioned = {
+        node.lineno for node in nodes if getattr(node, "id", getattr(node, "attr", "")) in names
+    }
+    return mentioned & function_lines(path)
+
+
+# ------------------------------------------------------------------------------------------- plugin of pytest processes
+
+
+class Reached:
+    """Append the numbers of faults whose lines this process runs to a file, each once until `clear`.
+
+    A file serves all processes that a test starts.
+    """
+
+    def __init__(self, watched: dict, log: str):
+        self.watched, self.log, self.seen = watched, log, set()
+
+    def start(self) -> None:
+        """Trace all functions that are called from now on."""
+        threading.settrace(self.call)
+        sys.settrace(self.call)
+
+    def clear(self) -> set:
+        """Return the numbers that processes have appended since the last call."""
+        self.seen.clear()
+        path = Path(self.log)
+        numbers = {int(word) for word in path.read_text().split()} if path.exists() else set()
+        path.write_text("")
+        sys.settrace(self.call)
+        return numbers
+
+    def call(self, frame, event, argument):
+        """Trace the lines of functions in files with faults."""
+        lines = self.watched.get(frame.f_code.co_filename)
+        if lines is None:
+            return None
+
+        def line(frame, event, argument):
+            numbers = lines.get(frame.f_lineno)
+            if numbers and event == "line" and not self.seen.issuperset(numbers):
+                self.seen.update(numbers)
+                with open(self.log, "a") as file:
+                    file.write("".join(f"{number}\n" for number in numbers))
+            return line
+
+        return line
+
+
+class Plugin:
+    """What a pytest process does that `run` starts: take chosen tests in their order, and record what tests reach."""
+
+    def __init__(self, order: dict):
+        self.order, self.failed = order, False
+        self.reached = (
+            Reached(read_watched(order["watched"]), order["log"]) if "log" in order else None
+        )
+
+    def pytest_collection_modifyitems(self, session, config, items):
+        """Keep the chosen tests, or those that are not recorded yet."""
+        if "tests" in self.order:
+            places = {name: place for place, name in enumerate(self.order["tests"])}
+            kept = sorted(
+                (item for item in items if item.nodeid in places),
+                key=lambda item: places[item.nodeid],
+            )
+        else:
+            done = set(self.order["done"])
+            kept = [item for item in items if item.nodeid not in done]
+        config.hook.pytest_deselected(items=[item for item in items if item not in kept])
+        items[:] = kept
+
+    def pytest_runtest_logstart(self, nodeid, location):
+        """Begin to record a test."""
+        self.failed = False
+        self.began = time.monotonic()
+        if self.reached:
+            self.reached.clear()
+
+    def pytest_runtest_logreport(self, report):
+        """Note a test that does not pass."""
+        self.failed |= not report.passed
+
+    def pytest_runtest_logfinish(self, nodeid, location):
+        """Record a test."""
+        if self.reached:
+            seconds = round(time.monotonic() - self.began, 3)
+            numbers = sorted(self.reached.clear())
+            row = {
+                "test": nodeid,
+                "passed": not self.failed,
+                "seconds": seconds,
+                "reached": numbers,
+            }
+            append(Path(self.order["record"]), row)
+
+
+def read_watched(file: str) -> dict:
+    """Read what `watched_lines` gave, with absolute paths."""
+    return {
+        path: {int(line): numbers for line, numbers in lines.items()}
+        for path, lines in json.loads(Path(file).read_text()).items()
+    }
+
+
+def pytest_configure(config):
+    """Register the plugin in a process that `run` started, and limit its memory."""
+    import resource
+
+    import pytest
+
+    order = json.loads(Path(os.environ["PATCHFEM_FAULT_ORDER"]).read_text())
+    resource.setrlimit(resource.RLIMIT_AS, (MAX_BYTES, MAX_BYTES))
+    pytest.hookimpl(trylast=True)(
+        Plugin.pytest_collection_modifyitems
+    )  # after the conftest has sorted the tests
+    plugin = Plugin(order)
+    config.pluginmanager.register(plugin)
+    if plugin.reached:
+        plugin.reached.start()
+
+
+def trace_child_process() -> None:
+    """Record what a process reaches that a test starts; called by the `sitecustomize` of the copy."""
+    order = json.loads(Path(os.environ["PATCHFEM_FAULT_ORDER"]).read_text())
+    Reached(read_watched(order["watched"]), order["log"]).start()
+
+
+def append(path: Path, row: dict) -> None:
+    """Append a row to a file of JSON lines in one write."""
+    with path.open("a") as file:
+        file.write(json.dumps(row) + "\n")
+
+
+def rows_of(path: Path) -> list[dict]:
+    """Read a file of JSON lines; none if there is no file."""
+    return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
+
+
+# ----------------------------------------------------------------------------------------------------------------- run
+
+
+class Copy:
+    """A copy of the checkout in which tests run, with its own bytecode and folder of compiled code."""
+
+    def __init__(self, root: Path, work: Path, warm: Path):
+        self.tree, self.work, self.warm = work / "tree", work, warm
+        shutil.copytree(root, self.tree, ignore=shutil.ignore_patterns(*NOT_COPIED), symlinks=True)
+        (work / "plugin").mkdir()
+        shutil.copy(__file__, work / "plugin" / "mutations.py")
+        (work / "child").mkdir()
+        (work / "child" / "sitecustomize.py").write_text(
+            "import mutations\nmutations.trace_child_process()\n"
+        )
+
+    def write(self, file: str, text: str) -> None:
+        """Write a source with a time of modification that it never had before."""
+        path = self.tree / file
+        path.write_text(text, "utf-8")
+        moment = next(CLOCK)
+        os.utime(path, (moment, moment))
+
+    def pytest(
+        self, arguments: list[str], order: dict, seconds: float, cache_folder: Path
+    ) -> int | None:
+        """Run pytest and return its exit status, None if it took longer than some seconds."""
+        order_file = self.work / "order.json"
+        order_file.write_text(json.dumps(order))
+        paths = [self.work / "plugin", self.tree]
+        if "log" in order:
+            paths.append(self.work / "child")
+        environment = os.environ | {
+            "PYTHONPATH": os.pathsep.join(map(str, paths)),
+            "PYTHONPYCACHEPREFIX": str(self.work / "bytecode"),
+            "PATCHFEM_CACHE": str(cache_folder),
+            "PATCHFEM_FAULT_ORDER": str(order_file),
+        }
+        environment.pop("PYTHONDONTWRITEBYTECODE", None)
+        base = self.work / "tmp"
+        words = [
+            "-m",
+            "pytest",
+            "-p",
+            "mutations",
+            "-p",
+            "no:cacheprovider",
+            "-q",
+            "-n",
+            "0",
+            "--tb=line",
+        ]
+        with (self.work / "output").open("w") as output:
+            process = subprocess.Popen(
+                [sys.executable, "-P", *words, f"--basetemp={base}", *arguments],
+                cwd=self.tree, env=environment, stdout=output, stderr=output, start_new_session=True,
+            )  # fmt: skip
+            try:
+                return process.wait(seconds)
+            except subprocess.TimeoutExpired:
+                return None
+            finally:
+                if process.poll() is None:
+                    os.killpg(process.pid, signal.SIGKILL)
+                    process.wait()
+                shutil.rmtree(base, ignore_errors=True)
+
+    def reach(self, test_path: str, watched: dict, record: Path) -> None:
+        """Run tests without a fault and record what they reach."""
+        watched_file = self.work / "watched.json"
+        watched_file.write_text(
+            json.dumps({str(self.tree / file): lines for file, lines in watched.items()})
+        )
+        done = [row["test"] for row in rows_of(record)]
+        order = {
+            "watched": str(watched_file),
+            "log": str(self.work / "log"),
+            "record": str(record),
+            "done": done,
+        }
+        self.pytest([test_path], order, 1e5, self.warm)
+
+    def outcome(self, fault: Fault, stages: list[list[str]], seconds: dict) -> str:
+        """Plant a fault, run tests stage by stage until one fails, and say how it ended."""
+        text = planted_text(self.tree, fault)
+        if text is None:
+            return "gone"
+        old = (self.tree / fault.file).read_text("utf-8")
+        cache_folder = self.work / "cache"
+        try:
+            shutil.copytree(self.warm, cache_folder, copy_function=link)
+            self.write(fault.file, text)
+            for stage in stages:
+                limit = HANG_SECONDS + HANG_FACTOR * sum(seconds[test] for test in stage)
+                files = list(dict.fromkeys(test.partition("::")[0] for test in stage))
+                status = self.pytest(["-x", *files], {"tests": stage}, limit, cache_folder)
+                if status is None:
+                    return "hangs"
+                if status != 0:
+                    return "caught"
+            return "survives"
+        finally:
+            self.write(fault.file, old)
+            shutil.rmtree(cache_folder, ignore_errors=True)
+
+    def failed_test(self) -> str:
+        """Return the line of the last output that names the failure."""
+        lines = (self.work / "output").read_text(errors="replace").splitlines()
+        return next(
+            (line[:200] for line in lines if line.startswith(("FAILED", "ERROR", "E  "))), ""
+        )
+
+
+def link(source: str, target: str) -> None:
+    """Link a file of compiled code, which is replaced as a whole and never edited; copy it on other file systems."""
+    try:
+        os.link(source, target)
+    except OSError:
+        shutil.copy2(source, target)
+
+
+def stages_of(number: int, fault: Fault, rows: list[dict], max_seconds: float) -> list[list[str]]:
+    """Return the tests for a fault in two stages, the quick tests of its own folder first.
+
+    The second stage ends with the other tests of the same files, because the first test of a file may have set up, and
+    so reached, what they all ask about.
+    """
+    own_folder = f"tests/{Path(fault.file).parts[1]}/"
+    reaching = [row for row in rows if number in row["reached"]]
+    files = {row["test"].partition("::")[0] for row in reaching}
+    beside = [
+        row
+        for row in rows
+        if row["test"].partition("::")[0] in files and number not in row["reached"]
+    ]
+    if not reaching:
+        beside = [row for row in rows if row["test"].startswith(own_folder)]
+
+    def rank(row: dict) -> tuple:
+        return not row["test"].startswith(own_folder), row["seconds"]
+
+    ordered = [*sorted(reaching, key=rank), *sorted(beside, key=rank)]
+    first, second, spent = [], [], 0.0
+    for row in ordered:
+        spent += row["seconds"]
+        if spent <= FIRST_SECONDS or not first:
+            first.append(row["test"])
+        elif spent <= max_seconds:
+            second.append(row["test"])
+    return [by_file(stage) for stage in (first, second) if stage]
+
+
+def by_file(tests: list[str]) -> list[str]:
+    """Bring tests of a file together, so that what a file sets up is set up once."""
+    places = {
+        file: place
+        for place, file in reversed(list(enumerate(test.partition("::")[0] for test in tests)))
+    }
+    return sorted(tests, key=lambda test: places[test.partition("::")[0]])
+
+
+def seed_cache(root: Path, warm: Path) -> None:
+    """Link the compiled code and condensed pieces that the user has of this checkout, so that nothing compiles anew."""
+    code = "import pathlib; from patchfem.compiled import cache_folder; print(cache_folder())"
+    environment = os.environ | {"PYTHONPATH": str(root)}
+    found = subprocess.run(
+        [sys.executable, "-P", "-c", code],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    folder = Path(found.stdout.strip())
+    for part in (folder, folder.parent / "operators"):
+        target = warm / PACKAGE / part.name
+        if part.is_dir():
+            without = shutil.ignore_patterns("bytecode", "*.lock")
+            with suppress(
+                shutil.Error
+            ):  # another process replaces files meanwhile; they are made again here
+                shutil.copytree(part, target, copy_function=link, ignore=without)
+            target.chmod(0o700)
+
+
+def run(faults: list[Fault], results: Path, options: argparse.Namespace) -> None:
+    """Record what the tests reach, then run each fault that has no outcome yet."""
+    results.mkdir(parents=True, exist_ok=True)
+    record, outcomes = results / "tests.jsonl", results / "outcomes.jsonl"
+    (results / "faults.json").write_text(
+        json.dumps([fault._asdict() for fault in faults], indent=1)
+    )
+    root = options.root.resolve()
+    copies = SimpleQueue()
+    with (
+        tempfile.TemporaryDirectory(prefix="patchfem-faults-") as work,
+        ThreadPoolExecutor(options.jobs) as pool,
+    ):
+        warm = Path(work) / "warm"
+        warm.mkdir()
+        seed_cache(root, warm)
+        for job in range(options.jobs):
+            (Path(work) / str(job)).mkdir()
+            copies.put(Copy(root, Path(work) / str(job), warm))
+
+        def with_copy(action, *arguments) -> None:
+            own = copies.get()
+            try:
+                action(own, *arguments)
+            finally:
+                copies.put(own)
+
+        def reach(own: Copy, path: str) -> None:
+            own.reach(path, watched, record)
+            append(results / "recorded.jsonl", {"path": path})
+            say(f"{path} is recorded")
+
+        def plant(own: Copy, number: int) -> None:
+            began = time.monotonic()
+            stages = stages_of(number, faults[number], rows, options.seconds)
+            outcome = own.outcome(
+                faults[number], stages, {row["test"]: row["seconds"] for row in rows}
+            )
+            row = {
+                "number": number,
+                "outcome": outcome,
+                "seconds": round(time.monotonic() - began, 1),
+            }
+            row["tests"] = sum(map(len, stages))
+            row["reached_by"] = sum(number in row["reached"] for row in rows)
+            row["by"] = own.failed_test() if outcome == "caught" else ""
+            append(outcomes, row)
+            say(
+                f"{outcome:9}{row['seconds']:7.1f} s  {faults[number].file}:{faults[number].line}  {row['by'][:90]}"
+            )
+
+        watched = watched_lines(root, faults)
+        recorded = {row["path"] for row in rows_of(results / "recorded.jsonl")}
+        paths = [path for path in test_paths(root, options.tests) if path not in recorded]
+        list(pool.map(lambda path: with_copy(reach, path), paths))
+        rows = [row for row in rows_of(record) if row["passed"]]
+        done = {row["number"] for row in rows_of(outcomes)}
+        waiting = [number for number in range(len(faults)) if number not in done]
+        list(pool.map(lambda number: with_copy(plant, number), waiting))
+
+
+def test_paths(root: Path, given: list[str]) -> list[str]:
+    """Return the test folders and files to record, one process each."""
+    paths = []
+    for place in given:
+        inside = sorted((root / place).iterdir()) if place.strip("/") == "tests" else [root / place]
+        paths += [
+            str(path.relative_to(root))
+            for path in inside
+            if path.name.startswith("test_") or any(path.rglob("test_*.py"))
+        ]
+    return paths
+
+
+def say(text: str) -> None:
+    """Print a line at once."""
+    print(time.strftime("%H:%M:%S"), text, flush=True)
+
+
+# ------------------------------------------------------------------------------------------------------------- outcomes
+
+
+def read_faults(path: Path) -> list[Fault]:
+    """Read faults that were drawn."""
+    return [Fault(**row) for row in json.loads(path.read_text())]
+
+
+def read_outcomes(results: Path) -> dict:
+    """Return {fault: outcome} of a run, finished or not."""
+    faults = read_faults(results / "faults.json")
+    return {faults[row["number"]]: row["outcome"] for row in rows_of(results / "outcomes.jsonl")}
+
+
+def show(results: Path) -> None:
+    """Print the fraction of caught faults by folder, and each survivor."""
+    outcomes = read_outcomes(results)
+    by_folder = defaultdict(Counter)
+    for fault, outcome in outcomes.items():
+        by_folder[Path(fault.file).parts[1]][outcome] += 1
+        by_folder["all"][outcome] += 1
+    for folder, counts in sorted(by_folder.items()):
+        judged = sum(counts.values()) - counts["gone"]
+        print(
+            f"{folder:14} {counts['caught'] + counts['hangs']} of {judged} caught, {counts['gone']} gone"
+        )
+    for fault, outcome in outcomes.items():
+        if outcome == "survives":
+            print(
+                f"\n{fault.file}:{fault.line} ({fault.kind})\n- {fault.before.strip()}\n+ {fault.after.strip()}"
+            )
+
+
+def compare(before: Path, after: Path) -> None:
+    """Print how often the outcome is the same, and each fault that only the first run caught."""
+    first, second = read_outcomes(before), read_outcomes(after)
+    pairs = {fault: (first[fault], second[fault]) for fault in first if fault in second}
+    for (old, new), number in sorted(Counter(pairs.values()).items()):
+        print(f"{old} -> {new}: {number}")
+    for fault, (old, new) in pairs.items():
+        if old in ("caught", "hangs") and new == "survives":
+            print(
+                f"\nescapes now: {fault.file}:{fault.line}\n- {fault.before.strip()}\n+ {fault.after.strip()}"
+            )
+
+
+def main() -> None:
+    """Read the command line."""
+    parser = argparse.ArgumentParser(
+        description="plant random faults and find those that no test catches"
+    )
+    verbs = parser.add_subparsers(dest="verb", required=True)
+    words = verbs.add_parser("draw", help="draw faults")
+    words.add_argument("faults", type=Path)
+    words.add_argument(
+        "--folders", nargs="*", default=[], help="of the package; all if none are given"
+    )
+    words.add_argument("--seed", type=int, required=True)
+    words.add_argument("--count", type=int, default=20)
+    words.add_argument("--root", type=Path, default=ROOT)
+    words = verbs.add_parser("run", help="run the tests on each fault")
+    words.add_argument("faults", type=Path)
+    words.add_argument("results", type=Path)
+    words.add_argument("--tests", nargs="+", default=["tests"])
+    words.add_argument(
+        "--seconds", type=float, default=120.0, help="of tests without fault that a fault may cost"
+    )
+    words.add_argument("--jobs", type=int, default=1)
+    words.add_argument("--root", type=Path, default=ROOT)
+    verbs.add_parser("show", help="list the outcomes").add_argument("results", type=Path)
+    words = verbs.add_parser("compare", help="compare two runs of the same faults")
+    words.add_argument("before", type=Path)
+    words.add_argument("after", type=Path)
+    given = parser.parse_args()
+    if given.verb == "draw":
+        faults = draw(given.root.resolve(), given.folders, given.seed, given.count)
+        given.faults.write_text(json.dumps([fault._asdict() for fault in faults], indent=1))
+    elif given.verb == "run":
+        run(read_faults(given.faults), given.results, given)
+    elif given.verb == "show":
+        show(given.results)
+    else:
+        compare(given.before, given.after)
+
+
+if __name__ == "__main__":
+    main()
