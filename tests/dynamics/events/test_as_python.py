@@ -7,7 +7,7 @@ from event_reference import random_basis
 from patchfem import compiled
 from patchfem.compiled.plain import plain
 from patchfem.core import BaseSine
-from patchfem.dynamics.events import cost, histories, period
+from patchfem.dynamics.events import cost, histories
 from patchfem.dynamics.events.elements import coulomb, elements_of
 from patchfem.structure import drives
 
@@ -63,24 +63,6 @@ def test_exact_a_function_is_compiled_from_where_its_work_is_long(tmp_path, monk
     entry.expect(0.2)
     assert entry(segment, 2.0, 0.25, 1.5) == 7.0 and len(calls) == 2
     compiled.UNKEPT.clear()
-
-
-def test_exact_the_map_of_a_period_as_python(monkeypatch):
-    rng = np.random.default_rng(3)
-    modes, groups = random_basis(rng, 2, 1), [springs(rng, 4)]
-    one = period.PeriodMap(modes, groups)
-    start = one.rest()
-    fast = one(SINE, start, True)
-    for _ in range(3):
-        start, fast = fast.end, one(SINE, fast.end, True)
-    kernels = plain("patchfem.dynamics.events.slope_kernels")
-    one.follow = type("Python", (), {"expect": lambda seconds: None, "held": lambda *held: held, "held_call":
-                                     lambda held, *first: kernels.follow(*first, *held)})
-    one.held.clear()
-    slow = one(SINE, start, True)
-    np.testing.assert_allclose(slow.end.numbers, fast.end.numbers, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(slow.slope, fast.slope, rtol=0, atol=1e-11)
-    assert slow.pieces == fast.pieces
 
 
 def test_always_the_cost_as_python_rises_with_what_there_is_to_do():

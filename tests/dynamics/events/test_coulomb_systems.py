@@ -1,18 +1,17 @@
 """The exact engine for any basis, start, drive and number of interfaces: against DOP853, a Moreau march, closed forms
 and the conservation of energy."""
 
-from math import atan, cos, exp, pi, sin, sqrt
+from math import atan, cos, pi, sin, sqrt
 
-import mpmath
 import numpy as np
 import pytest
 from event_reference import basis_of, march_reference, random_basis, run_reference
-from event_run import combine, rows_of, run, simulate, starts
+from event_run import rows_of, run, simulate, starts
 from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.core import BaseSine, NotConverged, Outcome, PatchfemError, Segment, Start
-from patchfem.dynamics.events.event_list import BORDER, RELEASE, REVERSAL, STOP
+from patchfem.dynamics.events.event_list import BORDER, RELEASE, STOP
 from patchfem.response.measures import energy_balance
 from patchfem.structure import drives
 
@@ -210,19 +209,13 @@ def choice_at_rest(seed, n, faces, ratio):
 
 
 @given(st.integers(0, 10**6), st.integers(5, 16), st.floats(0.3, 1.0))
-def test_always_many_interfaces_that_rest_at_once_satisfy_the_law(seed, faces, ratio):
-    """Independent ones: no more of them than modes."""
-    choice_at_rest(seed, max(8, faces), faces, ratio)
+def test_always_interfaces_that_rest_at_once_satisfy_the_law(seed, faces, ratio):
+    """Up to 16 independent interfaces; up to 8 that depend on each other, of which every combination is tried."""
+    choice_at_rest(seed, max(8, faces) if faces > 8 or seed % 2 else 4, faces, ratio)
 
 
-@given(st.integers(0, 10**6), st.integers(5, 8), st.floats(0.3, 1.0))
-def test_always_dependent_interfaces_that_rest_at_once_satisfy_the_law(seed, faces, ratio):
-    """Up to eight, of which every choice is tried."""
-    choice_at_rest(seed, 4, faces, ratio)
-
-
-def test_always_a_choice_that_is_not_found_is_said():
-    """Sixteen interfaces of eight modes: found and right, or refused with what to use."""
+def test_always_a_combination_that_is_not_found_is_refused():
+    """Sixteen interfaces of eight modes: a right answer, or a refusal that names the method to use."""
     refused = 0
     for seed in range(10):
         try:
@@ -238,31 +231,6 @@ def test_always_a_choice_that_is_not_found_is_said():
 FREE = drives.release(2 * pi)
 
 
-@pytest.mark.parametrize("x0, rest, halves", [(11.5, -0.5, 6), (11.0, -1.0, 5), (11 + 1e-9, -0.999999999, 6)])
-def test_exact_free_decay(x0, rest, halves):
-    *moves, last = run(basis_of(1.0), FREE, 1.0, 1.0, 100.0, Start(np.array([x0]), np.zeros(1)))
-    assert len(moves) == halves and last.direction == 0
-    condition = 1 / (x0 - 11) if x0 > 11 else 1.0  # the last swing's time is round-off over its size
-    assert last.time == pytest.approx(halves * pi, abs=1e-13 + 2e-16 * condition)
-    assert last.modal[0](0.0) == pytest.approx(rest, abs=2e-14)
-    assert last.modal[0](80.0) == last.modal[0](0.0)
-
-
-@pytest.mark.parametrize("omega, force, x, halves", [(1.0, 0.125, 0.0, 4), (1.0, 0.13, -0.04, 4),
-                                                     (2.0, 4 / 15, -1 / 15, 7)])
-def test_table_check_16_rests(omega, force, x, halves):
-    last = list(run(basis_of(omega), FREE, force, force, 40.0, Start(np.ones(1), np.zeros(1))))[-1]
-    assert last.direction == 0 and last.modal[0](0.0) == pytest.approx(x, abs=1e-14)
-    rest = halves * pi / omega
-    assert last.time == pytest.approx(rest, abs=1e-13)
-
-
-def test_exact_hold_does_not_creep():
-    done = simulate(basis_of(1.0), drives.step(0.5, 2 * pi), 1.0, 1.0, 80 / (2 * pi))
-    assert not done.response.slide.any() and not done.response.slide_rate.any() and done.log.count == 0
-    np.testing.assert_allclose(done.window.force, -0.5, rtol=1e-15)
-
-
 def test_exact_belt():
     """Mass on a spring on a belt of speed 0.1, static 1, kinetic 0.6; the belt is a coordinate of near endless mass."""
     tiny, speed = 1e-8, 0.1
@@ -274,55 +242,6 @@ def test_exact_belt():
     assert 8 + 2 * (pi - atan(4)) == pytest.approx(11.6315499798, abs=1e-10)
     assert done.amplitudes[-5:, 1].max() == pytest.approx(0.6 + sqrt(0.17), abs=1e-10)
     assert done.amplitudes[-5:, 0].min() == pytest.approx(0.6 - sqrt(0.17), abs=1e-10)
-
-
-@pytest.mark.parametrize("friction", [1e6, 1e-9])
-def test_exact_extreme_friction(friction):
-    drive, modes = BaseSine(1.0, 1.0), basis_of(1.0, 0.01)
-    done = simulate(modes, drive, friction, friction, 40)
-    assert energy_balance(done.ledger) < 1e-10
-    if friction > 1:
-        assert not done.response.slide.any()
-    else:
-        bare = simulate(modes, drive, 0.0, 0.0, 40)
-        np.testing.assert_allclose(done.amplitudes[1:], bare.amplitudes[1:], rtol=1e-7)
-        assert done.ledger["friction"] > 0
-
-
-def test_exact_start_that_slides_into_rest():
-    """A rigid block with speed v stops after v/f at v^2/2f; overdamped and resonant ones meet their closed forms."""
-    *_, last = run(basis_of(0.0), FREE, 0.5, 0.3, 20.0, Start(np.zeros(1), np.array([2.0])))
-    assert (last.direction, last.time) == (0, pytest.approx(2 / 0.3, rel=1e-14))
-    assert last.modal[0](0.0) == pytest.approx(4 / 0.6, rel=1e-14)
-    modes = basis_of(1.0, 20.0)
-    done = next(iter(run(modes, FREE, 0.0, 0.0, 3.0, Start(np.ones(1), np.zeros(1)))))
-    fast, slow = -20 - sqrt(399), -1 / (20 + sqrt(399))
-    t = np.linspace(0, 3, 40)
-    exact = (fast * np.exp(slow * t) - slow * np.exp(fast * t)) / (fast - slow)
-    np.testing.assert_allclose(done.modal[0].many(t), exact, rtol=1e-12)
-
-
-def test_exact_stuck_structure_in_resonance_without_damping():
-    """Second mass held by friction, the first one on its spring to it: t sin t grows until the limit is reached."""
-    h = sqrt(0.5)
-    modes = basis_of([0.0, sqrt(2)], 0.0, [[h, -h]], (-h, -h), (h, h))  # masses h(z1 +- z2), the second one rubs
-    first = next(iter(run(modes, BaseSine(1.0, 1.0), 30.0, 30.0, 400.0)))
-    t = np.linspace(0, first.span, 500)
-    mass = h * (first.modal[0].many(t) + first.modal[1].many(t))
-    np.testing.assert_allclose(mass, (np.sin(t) - t * np.cos(t)) / 2, atol=1e-11)
-    assert np.abs(slides(modes, first, t)).max() < 1e-13
-    limit = abs(sin(first.span) - first.span * cos(first.span)) / 2
-    assert limit == pytest.approx(30.0, rel=1e-12) and first.span > 55
-
-
-def test_exact_defective_system():
-    """Coupled damping with a double root that has one eigenvector: (A + t B) exp(-t)."""
-    modes = basis_of([1.0, 1.0], 0.0, [[1.0, 0.0]], (0, 0), (1, 0), 1.0, np.array([[2.0, 0.0], [1.0, 2.0]]))
-    phase = next(iter(run(modes, FREE, 0.0, 0.0, 12.0, Start(np.array([1.0, 0.0]), np.zeros(2)))))
-    t = np.linspace(0, 12, 60)
-    np.testing.assert_allclose(phase.modal[0].many(t), (1 + t) * np.exp(-t), atol=1e-14)
-    # z2'' + 2 z2' + z2 = -z1' = t exp(-t)
-    np.testing.assert_allclose(phase.modal[1].many(t), t**3 / 6 * np.exp(-t), atol=1e-14)
 
 
 @pytest.mark.parametrize("d, peak", [(1.0, 0.0), (0.9999, 4.38443200739e-8), (0.99, 2.32402008463e-4)])
@@ -356,35 +275,6 @@ def test_exact_phase_after_a_million_cycles():
     np.testing.assert_allclose(late[:, 8:], early[:, 8:], rtol=0, atol=1e-14)
 
 
-def test_exact_phase_of_a_drive_that_does_not_repeat_with_the_cycle():
-    """A sine of an odd number of turns per cycle keeps its phase over a million cycles, to what 40 digits say."""
-    drive, modes = drives.Piecewise((Segment(0.0, 0.0, 0.5, 1.7, 0.4),), 5.0), basis_of(1.0, 0.003)
-    _, late = rows_of(modes, drive, 1.0, 1.0, 10**6 + 1, begin=10**6)
-    with mpmath.workdps(40):
-        turns = mpmath.mpf(1.7 * 5.0 / (2 * pi))
-        phase = float((mpmath.mpf(0.4) + 2 * mpmath.pi * (10**6 * turns % 1)) % (2 * mpmath.pi))
-    assert late[0, 2] == pytest.approx(phase, abs=1e-14)
-
-
-@pytest.mark.slow
-def test_exact_hundred_thousand_stuck_cycles():
-    rate = 2 * pi * 0.37
-    drive, modes = drives.levels([0.5, 1.25], rate, 10**5), basis_of(rate, 0.003)
-    late = simulate(modes, drive, 1.0, 1.0, 10**5 + 4, 4)
-    early = simulate(modes, BaseSine(1.25, rate), 1.0, 1.0, 4, 4)
-    np.testing.assert_allclose(late.amplitudes[-4:], early.amplitudes, atol=1e-14)
-    np.testing.assert_allclose(late.log.phase[-10:], early.log.phase[-10:], atol=1e-13)
-
-
-def test_exact_levels_carry_the_state_over():
-    drive = drives.levels([1.2, 1.6], 1.0, 10)
-    done = simulate(basis_of(1.0, 0.003), drive, 1.0, 1.0, 20, 5)
-    low = simulate(basis_of(1.0, 0.003), BaseSine(1.2, 1.0), 1.0, 1.0, 10, 5)
-    np.testing.assert_allclose(done.amplitudes[:10], low.amplitudes, rtol=1e-12)
-    assert np.abs(done.amplitudes[-1]).max() > 1.5 * np.abs(low.amplitudes[-1]).max()
-    assert energy_balance(done.ledger) < 1e-10
-
-
 def test_exact_force_drive_leaves_the_frame_at_rest():
     modes = basis_of(1.0, 0.05)
     base, force = (simulate(modes, BaseSine(1.0, 0.8, moving), 0.5, 0.5, 20) for moving in (True, False))
@@ -394,29 +284,6 @@ def test_exact_force_drive_leaves_the_frame_at_rest():
                                atol=1e-11)
     assert base.acceleration == pytest.approx(np.abs(base.window.acceleration).max(), rel=1e-3)
     assert force.acceleration == pytest.approx(np.abs(force.window.acceleration).max(), rel=1e-3)
-
-
-def test_exact_log_of_a_stick_slip_run():
-    done = simulate(basis_of(1.0, 0.003), BaseSine(1.0, 1.0), 0.8, 0.8, 200)
-    log = done.log
-    assert log.count == log.time.size == 800
-    assert np.all(np.diff(log.time) > 0) and set(log.interface) == {0}
-    kinds = np.abs(log.what)
-    assert np.all(kinds[::2] == RELEASE) and np.all(kinds[1::2] == STOP)
-    np.testing.assert_allclose(log.phase[-8::2] % pi, 0.538622, atol=5e-7)
-    sliding = simulate(basis_of(1.0, 0.003), BaseSine(1.0, 1.0), 0.5, 0.5, 200)
-    assert np.count_nonzero(np.abs(sliding.log.what) == REVERSAL) > 390
-
-
-@pytest.mark.share(0, 3)
-@pytest.mark.parametrize("hertz, level, size, top", [(143, 5, 0.52651, 7.8194), (143, 6, 0.72533, 9.3193),
-                                                     (143, 7, 0.89714, 10.6154), (155, 8, 1.13683, 12.4237)])
-def test_table_check_15_bonded_spring(hertz, level, size, top):
-    own = sqrt(1 + 6.5439)
-    done = simulate(basis_of(own, 0.003 / own), BaseSine(level, hertz / 143), 3.8475, 3.8475, 400)
-    tail = done.amplitudes[-10:]
-    assert (tail[:, 1].max() - tail[:, 0].min()) / 2 == pytest.approx(size, rel=1e-4)
-    assert done.acceleration == pytest.approx(top, rel=1e-4)
 
 
 def test_table_check_9_waveform():
@@ -433,27 +300,6 @@ def test_table_check_9_waveform():
     assert done.loops[0].stuck / (w.time[-1] - w.time[0]) == pytest.approx(0.3256, abs=1e-3)
 
 
-def test_table_check_11_and_18():
-    h = sqrt(0.5)
-    modes = basis_of([0.0, sqrt(2)], 0.0, [[h, -h]], (-h, -h))
-    last = list(run(modes, BaseSine(1.0, 1.14), 3.0, 3.0, 100.0))[-1]
-    assert slides(modes, last, np.array([last.span]))[0, 0] == pytest.approx(0.5676, abs=1e-4)
-    for ratio in (0.2, 1.0, 3.0):
-        assert not simulate(basis_of(1.0, 0.003), BaseSine(0.999, ratio), 1.0, 1.0, 10).response.slide.any()
-
-
-@pytest.mark.share(0)
-@pytest.mark.parametrize("end", [1400, 3900])
-def test_exact_figure_16_never_drifts(end):
-    """The steady range of the second mass over the last 40 periods before this time."""
-    h = sqrt(0.5)
-    modes = basis_of([0.0, sqrt(2)], 0.0, [[h, -h]], (-h, -h), (h, -h))
-    drive = BaseSine(1.0, 1.14)
-    done = simulate(modes, drive, 3.0, 3.0, end / drive.period, 40)
-    assert done.window.slide.max() == pytest.approx(0.69867878, abs=2e-8)
-    assert done.window.slide.min() == pytest.approx(-0.39299347, abs=2e-8)
-
-
 def test_refuses_a_start_beyond_the_travel():
     with pytest.raises(PatchfemError, match=r"structure\.travel"):
         simulate(basis_of(1.0), FREE, 1.0, 1.0, 3, travel=2.0, start=Start(np.array([-3.0]), np.zeros(1)))
@@ -468,23 +314,6 @@ def test_refuses_a_start_beyond_the_travel():
 def test_refuses_kinetic_friction_out_of_range(kinetic):
     with pytest.raises(PatchfemError, match=r"friction\.kinetic"):
         simulate(basis_of(1.0), BaseSine(1.0, 1.0), 1.0, kinetic, 3)
-
-
-def test_exact_slow_rate_beside_a_fast_one():
-    """A first-order creep of rate 1e-3 in an overdamped mode is exact next to a rate of 1e3."""
-    modes = basis_of(1.0, 500.0)
-    phase = next(iter(run(modes, FREE, 0.0, 0.0, 2.0, Start(np.ones(1), np.zeros(1)))))
-    slow = -1 / (500 + sqrt(500**2 - 1))
-    fast = -500 - sqrt(500**2 - 1)
-    assert phase.modal[0](2.0) == pytest.approx((fast * exp(slow * 2) - slow * exp(fast * 2)) / (fast - slow),
-                                                rel=1e-12)
-
-
-def test_exact_combined_signal_is_the_slide():
-    modes = basis_of([1.0, 2.0], 0.1, [[1.0, 0.3]])
-    phase = next(p for p in run(modes, BaseSine(1.0, 1.0), 0.3, 0.3, 10.0) if p.direction)
-    t = np.linspace(0, phase.span, 5)
-    np.testing.assert_allclose(combine(phase.modal, modes.slide).many(t), slides(modes, phase, t)[0], atol=1e-15)
 
 
 def test_exact_coordinates_stay_on_the_stuck_slide():
@@ -511,10 +340,3 @@ def test_exact_interface_without_friction_among_others():
     force = np.interp(one.window.time[away], two.window.time, two.window.extra["forces"][:, 1])
     np.testing.assert_allclose(force, one.window.force[away], atol=1e-11)
     assert two.ledger["friction"] == pytest.approx(one.ledger["friction"], rel=1e-13)
-
-
-def test_exact_log_has_a_limit(monkeypatch):
-    monkeypatch.setattr("patchfem.dynamics.events.histories.ROOM", 30)
-    log = simulate(basis_of(1.0, 0.003), BaseSine(1.0, 1.0), 0.8, 0.8, 20).log
-    assert log.time.size == log.slide.size == 30 and log.count == 80
-    assert not log.time.flags.writeable

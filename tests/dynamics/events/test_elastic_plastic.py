@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from support.jenkins_reference import Reference
 
-from patchfem.core import BaseSine, ModalBasis, Outcome, PatchfemError, Start
+from patchfem.core import BaseSine, ModalBasis, Outcome
 from patchfem.dynamics.events.elements import elements_of
 from patchfem.dynamics.events.histories import simulate
 from patchfem.response.measures import energy_balance
-from patchfem.structure.drives import Recorded, Sweep, levels, release
+from patchfem.structure.drives import Recorded, Sweep, levels
 
 
 def basis(omega, zeta, slide, base, output, damping=None, faces=None):
@@ -35,24 +35,15 @@ def random_rig(seed, most):
             y * np.exp(r.uniform(-1, 0.5)))
 
 
-def against_reference(seed, most, cycles):
+@pytest.mark.share(0, 1, 2)
+@pytest.mark.parametrize(("seed", "most"), [(2, 20), (3, 20), (4, 20), *((seed, 200) for seed in range(100, 115))])
+def test_exact_random_rigs_against_dop853(seed, most):
     modes, drive, k, y = random_rig(seed, most)
-    done = simulate(modes, drive, [elements_of(k, y)], cycles, window=1)
-    want = Reference(modes, drive, [(k, y)]).go(cycles * drive.period)
+    done = simulate(modes, drive, [elements_of(k, y)], 2, window=1)
+    want = Reference(modes, drive, [(k, y)]).go(2 * drive.period)
     found = np.concatenate([done.response.modal[-1], done.response.modal_rate[-1]])
     assert np.abs(found - want).max() <= 1e-9 * np.abs(want).max()
     assert energy_balance(done.ledger) <= 1e-10
-
-
-@pytest.mark.parametrize("seed", (2, 3, 4))
-def test_exact_random_rigs_against_dop853(seed):
-    against_reference(seed, 20, 2)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(100, 130))
-def test_exact_thirty_rigs_against_dop853(seed):
-    against_reference(seed, 200, 2)
 
 
 @pytest.mark.parametrize(("stiffness", "amplitude"), [(10, 0.249538145), (100, 0.285786312), (1000, 0.288449682)])
@@ -84,33 +75,6 @@ def test_exact_an_output_that_turns_with_a_slide():
     for run in runs[1:]:
         np.testing.assert_allclose(run.response.modal[-1], runs[0].response.modal[-1], rtol=1e-10)
     assert runs[1].swing == pytest.approx(2.5 * runs[0].swing, rel=1e-12)
-
-
-def test_exact_equal_elements_are_one():
-    drive = BaseSine(1.0, 0.8)
-    many = simulate(ONE, drive, [elements_of(np.full(50, 0.2), np.full(50, 0.05))], 20)
-    one = simulate(ONE, drive, [elements_of([10.0], [0.05])], 20)
-    np.testing.assert_allclose(many.window.modal, one.window.modal, atol=1e-12)
-    assert many.events == one.events
-
-
-def test_exact_soft_elements_that_never_yield_are_a_spring():
-    done = simulate(ONE, BaseSine(1.0, 1.0), [elements_of([3.0], [1e3])], 30)
-    held = simulate(basis([2.0], [0.0015], [1.0], [1.0], [1.0]), BaseSine(1.0, 1.0), [elements_of([0.0], [1.0])], 30)
-    np.testing.assert_allclose(done.response.modal[-1], held.response.modal[-1], atol=1e-12)
-    assert done.loops[0].stuck == pytest.approx(10 * 2 * np.pi)  # stuck all the time
-    assert done.loops[0].slip == 0.0
-
-
-def test_exact_release_comes_to_rest_where_the_energy_says():
-    """A mass without damping released: what it loses to friction is what it had less what is stored."""
-    modes = basis([1.0], [0.0], [1.0], [1.0], [1.0])
-    done = simulate(modes, release(2 * np.pi), [elements_of([20.0], [0.01])], 30, start=Start(np.array([2.0]),
-                                                                                          np.array([0.0])))
-    assert done.ledger["work_in"] == 0.0
-    assert done.ledger["friction"] == pytest.approx(-done.ledger["stored"], rel=1e-13)
-    # every half swing loses twice the limit over the stiffness of the mode, until the springs hold it
-    assert done.amplitudes[-1].max() < 0.25 + 0.02
 
 
 def test_exact_grazing_yield():
@@ -189,12 +153,6 @@ def test_exact_sweeps_and_records_against_dop853(drive):
     assert np.abs(found - want).max() <= 1e-9 * np.abs(want).max()
     assert energy_balance(done.ledger) <= 1e-12
     np.testing.assert_allclose(done.window.base_acceleration, drive.values(done.window.time), atol=1e-11)
-
-
-def test_refuses_a_start_beyond_the_travel():
-    with pytest.raises(PatchfemError, match="travel"):
-        simulate(ONE, BaseSine(1.0, 1.0), [elements_of([1.0], [1.0])], 5, travel=0.1,
-                 start=Start(np.array([1.0]), np.array([0.0])))
 
 
 @pytest.mark.parametrize("mirrored", [False, True])

@@ -55,12 +55,6 @@ def test_exact_the_last_events_are_kept_and_all_counted(monkeypatch):
     assert few.time == pytest.approx(every.time[-50:]) and few.what.tolist() == every.what[-50:].tolist()
 
 
-def test_exact_the_list_ends_where_the_travel_does():
-    modes, drive = one_mode(0.0), BaseSine(1.0, 1.0)
-    done = event_run.simulate(modes, drive, 0.3, 0.3, 100, 2, travel=5.0)
-    assert done.log.time[-1] <= done.response.time[-1] and done.log.count == len(done.log.time) > 4
-
-
 def test_exact_events_of_the_drive_at_the_onset():
     """phase 0.538622 of the release and 2.472613 of the slip at D = 0.8 and damping 0.003."""
     log = event_run.simulate(one_mode(), BaseSine(1.0, 1.0), 0.8, 0.8, 200, 2).log

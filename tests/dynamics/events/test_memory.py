@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from patchfem.compiled.inner import Inner
 from patchfem.core import PatchfemError
-from patchfem.dynamics.events import march_kernels
 from patchfem.dynamics.events import memory_kernels as kernels
 from patchfem.dynamics.events.elements import elements_of, stretches, table_of, virgin
 from patchfem.slip.shear_modes import jenkins_set
@@ -61,19 +59,6 @@ def test_exact_memory_is_that_of_elements_one_by_one(seed):
     assert one.depth <= one.group.yield_slide.size + 1  # a turning point that says nothing more is forgotten
 
 
-def test_exact_iwan_100_wipes_out_minor_loops():
-    """H11: 100 elements with F(0.8) = 0.48, a minor loop in between wiped out exactly."""
-    phi = (np.arange(100) + 0.5) / 100
-    one = Follower(np.full(100, 0.01), phi)
-    found = [one.to(slide) for slide in (0.8, 0.2, 0.6, 0.2, 0.8, -0.8, 0.8)]
-    np.testing.assert_allclose(found, [0.48, -0.03, 0.33, -0.03, 0.48, -0.48, 0.48], atol=1e-14)
-    before = one.lost
-    one.to(-0.8)
-    one.to(0.8)
-    masing = sum(4 * 0.01 * y * (0.8 - y) for y in phi[phi < 0.8])  # of every element that slips, 4 k y (a - y)
-    assert one.lost - before == pytest.approx(masing, rel=1e-13)
-
-
 @pytest.mark.parametrize("count", (100, 400))
 def test_exact_rod_on_a_friction_bed(count):
     """H14: EA = tau = P = 1, tip 0.5 and loss 2/3 a cycle in the limit, 2/3 (1 - 1/n^2) of n points."""
@@ -93,9 +78,3 @@ def test_refuses_elements_that_are_none():
         elements_of([1.0, -1.0], [1.0, 1.0])
     with pytest.raises(PatchfemError, match="finite"):
         elements_of([1.0], [np.inf])
-
-
-@pytest.mark.parametrize("name", ["march", "stored"])
-def test_exact_what_python_calls_is_kept_without_numba(name):
-    """A function for compiled callers alone cannot be kept: every run would bring up numba's compiler for it."""
-    assert not isinstance(getattr(march_kernels, name), Inner)

@@ -1,13 +1,12 @@
 """What the last cycles show, against the same series sampled at Gauss points, closed forms and fits to samples."""
 
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from patchfem.compiled.plain import plain
 from patchfem.core import BaseSine, ModalBasis
-from patchfem.dynamics.events import histories, reading
+from patchfem.dynamics.events import histories
 from patchfem.dynamics.events import names_kernels as at
 from patchfem.dynamics.events.elements import elements_of
 from patchfem.response.loops import half_range, secant_stiffness, turns_of
@@ -89,21 +88,6 @@ def test_exact_releases_are_those_of_the_log():
     assert done.reading.start == pytest.approx(wanted, abs=1e-12)
 
 
-def test_exact_a_slip_that_turns_at_its_limit_starts_no_slip():
-    """Two slips a cycle start at one phase modulo pi. Stop, release and stop again at one time are no start: they moved
-    the phase of a random rig by 0.035."""
-    time, way = np.array([0.5, 1.0, 1.4, 1.5, 1.9, 1.9, 1.9, 2.0]), np.array([0, 1, 0, -1, 0, 1, 0, 1])
-    plant = SimpleNamespace(square=np.zeros((1, 1)), reach=np.zeros(1))
-    at_face, out = read.first_of(0, plant), np.zeros(at.OF_RUN)
-    rows = np.zeros((len(time) + 1, at_face + read.EACH))
-    rows[:-1, 0], rows[:-1, 2], rows[:-1, at_face + read.WAY], rows[:, at_face + read.SHARE] = (
-        time, 2 * np.pi * time, way, 1.0)
-    rows[-1, 0], rows[:, at_face + read.SPRING] = 2.5, read.RIGID
-    read.changes(rows, len(time), plant, SimpleNamespace(period=np.ones(1), segments=np.zeros((1, 1))), out)
-    assert out[at.STARTS] == 3 and out[at.START_COS] == pytest.approx(3.0, abs=1e-12)
-    assert out[at.START_SIN] == pytest.approx(0.0, abs=1e-12)
-
-
 def test_exact_a_run_in_brief_shows_what_the_run_shows():
     """One that has not settled to the last bit; one that repeats, of which few cycles are read, to round-off."""
     for modes, groups in (several(), (basis(1.0, 0.05), [elements_of([1.0], [0.3])])):
@@ -139,20 +123,3 @@ def test_exact_ring_of_an_element_that_holds():
 def test_exact_nothing_rings_where_sticks_are_short():
     done = histories.simulate(basis(1.0, 0.02), BaseSine(1.0, 1.0), [elements_of([3.0], [0.1])], 20, window=4)
     assert done.ring[0] == 0.0
-
-
-@pytest.mark.parametrize("push", [0.8, 8.0])
-def test_exact_angle_of_what_rings_among_elements_that_yield(push):
-    """The sum of own frequency times length over the pieces of a stick, which decides whether its samples have to tell
-    a ring: by hand from the rows, and no ring is found where it says none."""
-    modes, drive = basis(1.0, 0.02), BaseSine(push, 0.31)
-    groups = [elements_of([30.0, 15.0, 10.0, 5.0], [0.003, 0.004, 0.005, 0.006])]
-    run, rows, done = run_of(modes, drive, groups, 20, 4)
-    own = np.sqrt(1.0 + rows[:, run._at(0, 1)] - 0.02**2) * rows[:, 1]
-    held = rows[:, run._at(0, 2)] < 0.5
-    parts = np.split(own, np.flatnonzero(np.diff(held)) + 1)
-    sticks = [part.sum() for part, still in zip(parts, np.split(held, np.flatnonzero(np.diff(held)) + 1)) if still[0]]
-    assert done.reading.run[at.SWING] == pytest.approx(max(sticks), rel=1e-12)
-    assert (done.ring is None) == (max(sticks) >= reading.RINGS)
-    if done.ring is not None:
-        assert done.ring[0] == 0.0 and rings(done.window, modes, drive, done.log) == ({}, {})

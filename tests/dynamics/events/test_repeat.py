@@ -3,15 +3,11 @@
 import numpy as np
 import pytest
 
-from patchfem.compiled import load
 from patchfem.core import BaseSine, ModalBasis
 from patchfem.dynamics.events import histories
-from patchfem.dynamics.events.elements import elements_of, table_of, virgin
-from patchfem.dynamics.events.plant import clock_of, past_of, plant_of
+from patchfem.dynamics.events.elements import elements_of
 from patchfem.response.measures import energy_balance
 from patchfem.structure.drives import levels
-
-REPEATS = 2  # of `Past.about`
 
 
 def case(modes: int, faces: int, elements: int) -> tuple:
@@ -86,23 +82,6 @@ def test_exact_a_push_that_grows_by_a_billionth_ends_it():
     grown = histories.simulate(modes, levels([1.5, 1.5 * (1 + 1e-9)], 1.3, 300, True), groups, 600, 5)
     assert np.all(np.ptp(grown.amplitudes[290:300], axis=0) == 0)
     assert 1e-10 < np.ptp(grown.amplitudes[[299, -1], 1]) / grown.amplitudes[-1, 1] < 1e-8
-
-
-def test_exact_states_a_last_digit_apart_are_one_and_others_not():
-    """By the distance of a state from that a cycle before, and by how fast it fell; so does a turning place."""
-    come_back = load("dynamics.events.repeat_kernels").come_back
-    modes, drive, _ = case(1, 1, 1)
-    plant, table = plant_of(modes), table_of([elements_of([1.0, 2.0], [0.1, 0.3])])
-    for apart, fell, place, same in ((1e-15, 50, 0.0, True), (1e-15, 50, 1e-13, False), (1e-13, 50, 0.0, False),
-                                     (1e-15, 9200, 0.0, False), (1e-15, 50, 1e-15, True)):
-        memory, clock, past = virgin(table, np.array([0.5])), clock_of(drive, 1), past_of(plant, table)
-        motion = np.array([[1.0], [0.3]])
-        assert not come_back(motion, plant, memory, clock, past)  # the first state of all
-        clock.now[0], motion[0, 0] = fell, 1 + apart
-        memory.at[0, 0] += place
-        assert come_back(motion, plant, memory, clock, past) == same
-        assert past.about[REPEATS] == same and (motion[0, 0] == 1.0) == same
-        assert (memory.at[0, 0] == 0.5) == (same or place == 0.0)
 
 
 def test_exact_a_run_that_stops_for_want_of_rows_is_the_run(monkeypatch):

@@ -5,13 +5,11 @@ import event_run
 import numpy as np
 import pytest
 from event_reference import basis_of, random_basis
-from scipy.linalg import null_space
 
-from patchfem.compiled.plain import plain
 from patchfem.core import BaseSine, ModalBasis, Segment
 from patchfem.dynamics.events import histories
 from patchfem.dynamics.events.elements import elements_of
-from patchfem.dynamics.events.plant import plant_of, room_of
+from patchfem.dynamics.events.plant import plant_of
 from patchfem.response.measures import energy_balance
 from patchfem.structure.drives import Piecewise, Recorded, Sweep
 
@@ -53,14 +51,6 @@ def test_exact_long_pieces_are_the_short_ones(monkeypatch, ratio, friction):
     same(*both(monkeypatch, TWO, BaseSine(1.0, 0.0005), groups, 2, 1), fewer=1 / 2 if ratio == 1 else 2 / 3)
 
 
-@pytest.mark.parametrize("zeta, friction, ratio, constant", [(0.05, 0.8, 1.0, -0.4), (1.0, 0.3, 0.9, 0.7),
-                                                             (3.0, 0.5, 1.0, 0.2)])
-def test_exact_long_pieces_of_one_mode_are_the_short_ones(monkeypatch, zeta, friction, ratio, constant):
-    modes, omega = basis_of(1.0, zeta), 0.0005
-    drive = Piecewise((Segment(0.0, constant, 1.0, omega, 0.3),), 2 * np.pi / omega)
-    same(*both(monkeypatch, modes, drive, event_run.groups_of(modes, friction, ratio * friction), 2, 1))
-
-
 def test_exact_long_pieces_of_two_faces_and_of_segments(monkeypatch):
     modes = random_basis(np.random.default_rng(5), 3, 2)
     drive = Piecewise((Segment(0.0, 0.3, 1.0, 0.0007, 0.2), Segment(5000.0, -0.2, 0.7, 0.001, 1.0)), 12e3)
@@ -84,43 +74,6 @@ def test_always_pieces_do_not_grow_with_the_cycles_of_the_mode(zeta):
     for modes in (basis_of(1.0, zeta), basis_of([1.0, 1.7], [zeta, zeta], [[1.0, 0.5]])):
         few = [event_run.simulate(modes, BaseSine(1.0, omega), 0.3, 0.3, 2, 1).events for omega in (1e-5, 1e-7, 1e-9)]
         assert max(few) < 60_000 and few[2] < 1.1 * few[0], few
-
-
-@pytest.mark.parametrize("held", [(), (0,), (1,), (0, 1)])
-def test_exact_forced_motion_solves_the_equation_of_motion(held):
-    """The series in the kernels without a compiler, held slides resting at 0 and springs behind the others, is the
-    closed form of the motion under a constant and a sine; with the reactions it leaves nothing over."""
-    slow, stick, drives = (plain(f"patchfem.dynamics.events.{name}_kernels") for name in ("slow", "stick", "drive"))
-    modes, omega, theta, constant = random_basis(np.random.default_rng(2), 4, 2), 0.002, 0.4, 0.3
-    plant, springs, first = plant_of(modes), np.array([40.0, 0.7]), np.array([0.2, -0.3])
-    springs[list(held)], first[list(held)] = 0.0, 0.0
-    given = np.where(np.isin([0, 1], held), np.inf, springs)
-    faces, room, h = modes.interfaces, room_of(plant), 2 / omega
-    room.mask[list(held)] = 1.0
-    stick.constrain(plant, room)
-    inside = null_space(faces[list(held)]) if held else np.eye(4)
-    stiffness = np.diag(plant.square) + faces.T @ (springs[:, None] * faces) / modes.mass
-    stiff, damp = (inside.T @ part @ inside for part in (stiffness, plant.damping))
-    dynamic = stiff - omega**2 * np.eye(len(stiff)) + 1j * omega * damp
-    wave = inside @ np.linalg.solve(dynamic, -1.3 * inside.T @ plant.base)
-    still = inside @ np.linalg.solve(stiff, inside.T @ (-plant.base * constant - faces.T @ first / modes.mass))
-
-    def motion(u):
-        turn = wave * np.exp(1j * (theta + omega * h * u))
-        return still + turn.imag, omega * turn.real, -omega**2 * turn.imag
-
-    begin = np.array(motion(0.0)[:2])
-    force = first + springs * (faces @ begin[0])
-    segment = np.array([0, 0, drives.SINE, constant, 1.3, omega, theta, 0, 0, omega, 0, 0])
-    drives.drive_series(segment, 0.0, 0.0, 2 * np.pi / omega, h, 24, room.waves)
-    assert slow.slow_series(*begin + 1e-3, force, given, plant, h, 24, room) > 1e-5  # it rings
-    assert slow.slow_series(*begin, force, given, plant, h, 24, room) < 1e-14
-    for u in (0.0, 0.3, 1.0):
-        power, (z, v, a) = u**np.arange(25), motion(u)
-        np.testing.assert_allclose(power @ room.coefs[:25], z, rtol=0, atol=1e-13 * np.abs(z).max())
-        pull = np.where(np.isinf(given), room.reactions[:, :25] @ power, force + springs * (faces @ (z - begin[0])))
-        over = a + plant.damping @ v + plant.square * z + plant.base * (power @ room.waves[0, :25])
-        np.testing.assert_allclose(over + faces.T @ pull / modes.mass, 0, atol=1e-12)
 
 
 def test_always_what_does_not_die_out_is_not_left_out():
