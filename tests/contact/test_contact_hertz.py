@@ -68,14 +68,3 @@ def test_exact_hertz_gap_outside_the_contact():
     opened = peak * A / HALF_SPACE["strain"] * 2 * (x * np.sqrt(x**2 - 1) - np.log(x + np.sqrt(x**2 - 1)))
     found = state.gap[(grid.x > 1.1 * A) & (grid.x < 1.5 * A)]
     assert np.abs(found / opened - 1).max() <= 1e-2
-
-
-def test_always_more_load_never_shrinks_the_contact_of_a_convex_gap():
-    grid = refined_middle(1.5 * A, A / 8, 12.7e-3, 6e-3, 1.1)
-    pair = pair_of(grid, bare(TITANIUM), width=1.0)
-    gap = crown(grid.x, radius("strain"))
-    before = np.zeros(grid.x.size, bool)
-    for load in LOAD * np.array([0.01, 0.1, 0.3, 1.0, 1.7]):
-        now = press(pair, gap, load).sigma_n > 0
-        assert np.all(now[before])
-        before = now

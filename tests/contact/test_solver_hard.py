@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
 
 from patchfem.contact import unilateral
-from patchfem.contact.active_set import Ask, Operator, rest, settle
+from patchfem.contact.active_set import Ask, Operator, settle
 from patchfem.contact.gaps import crown, tilt
-from patchfem.contact.gradients import descend, gradients, nearest
 from patchfem.contact.unilateral import SOLVED, press, press_by, solve, undetermined
 from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
 
@@ -67,27 +66,6 @@ def test_exact_the_only_subset_of_nodes_that_obeys_contact(size, seed, control):
         wanted, *motion = by_enumeration(c, x, gap, 100.0, moment, spring if control == "spring" else 0.0)
         assert state.approach == pytest.approx(motion[0], rel=1e-9, abs=1e-8)
     assert np.abs(forces(pair, state) - wanted).max() <= 1e-9 * wanted.sum()
-
-
-def test_exact_two_nodes():
-    """Held: both touch when N (C_11 - C_12) exceeds the step; free: statics alone."""
-    x, c = np.array([-1e-3, 1e-3]), 1e-9 * np.array([[3.0, 1.0], [1.0, 2.0]])
-    pair, gap = pair_on(x, c), np.array([0.0, 4e-9])
-    assert forces(pair, press(pair, gap, 1.0)) == pytest.approx([1.0, 0.0])
-    first = (10 * (c[1, 1] - c[0, 1]) + gap[1]) / (c[0, 0] + c[1, 1] - 2 * c[0, 1])
-    assert forces(pair, press(pair, gap, 10.0)) == pytest.approx([first, 10 - first], rel=1e-13)
-    free = press(pair, gap, 10.0, 4e-3)
-    assert forces(pair, free) == pytest.approx([3.0, 7.0], rel=1e-13)
-    assert free.rotation == pytest.approx(-(gap[1] - gap[0] + c[1] @ [3, 7] - c[0] @ [3, 7]) / 2e-3, rel=1e-12)
-
-
-def test_exact_three_flat_nodes():
-    x, c = np.array([-1e-3, 0.0, 1e-3]), 1e-9 * np.array([[3.0, 1.0, 0.5], [1.0, 2.0, 1.0], [0.5, 1.0, 3.0]])
-    pair = pair_on(x, c)
-    share = np.linalg.solve(c, np.ones(3))
-    for state in (press(pair, np.zeros(3), 5.0), press(pair, np.zeros(3), 5.0, 0.0)):
-        assert forces(pair, state) == pytest.approx(5 * share / share.sum(), rel=1e-13)
-        assert state.approach == pytest.approx(5 / share.sum(), rel=1e-13) and abs(state.rotation) <= 1e-20
 
 
 # ---- one node touching
@@ -171,17 +149,6 @@ def test_exact_spikes_of_a_metre_are_as_if_their_nodes_were_not_there(control):
     assert max(state.residuals.values()) <= SOLVED and not state.sigma_n[spikes].any()
 
 
-def test_exact_two_spikes_downward_carry_the_load_by_statics():
-    pair = coated_pair(100)
-    x, gap = pair.interface.x, np.zeros(101)
-    gap[[20, 70]] = -1.0, -0.5
-    state = press(pair, gap, LOAD, LOAD * 1e-3)
-    share = (1e-3 - x[20]) / (x[70] - x[20])
-    force = forces(pair, state)
-    assert force[70] == pytest.approx(share * LOAD, rel=1e-12) and force[20] == pytest.approx((1 - share) * LOAD)
-    assert np.count_nonzero(force) == 2 and state.rotation == pytest.approx(-0.5 / (x[70] - x[20]), rel=1e-6)
-
-
 @pytest.mark.parametrize("offset", [1e3, -1e3, 1e6])
 @pytest.mark.parametrize("moment", [None, LOAD * 2e-3])
 def test_exact_a_gap_a_kilometre_away(offset, moment):
@@ -255,15 +222,6 @@ def test_exact_equal_heights_share_as_their_compliance_says(moment):
     assert state.approach == pytest.approx(LOAD / share.sum(), rel=1e-12)
 
 
-def test_exact_flat_faces_under_no_moment_do_not_turn():
-    pair = coated_pair(200)
-    share = np.linalg.solve(pair.normal, np.ones(201))
-    state = press(pair, np.zeros(201), LOAD, 0.0)
-    assert np.abs(forces(pair, state) - LOAD * share / share.sum()).max() <= 1e-12 * LOAD
-    assert abs(state.rotation) <= 1e-13 * state.approach / LENGTH
-    assert np.abs(state.sigma_n - state.sigma_n[::-1]).max() <= 1e-11 * state.sigma_n.max()
-
-
 @given(seed=st.integers(0, 2**32 - 1), levels=st.integers(1, 4), line=st.sampled_from([None, 0.0, 1e-3]))
 def test_always_steps_of_equal_height_are_solved(seed, levels, line):
     """Duplicated values are mirrored exactly with their gap."""
@@ -292,25 +250,6 @@ def test_exact_sets_that_come_back_are_left_to_the_gradients():
 
 CONTROLS = {"load": (LOAD, None, 0.0), "line": (LOAD, 2e-3 * LOAD, 0.0), "spring": (LOAD, 2e-3 * LOAD, 1e4),
             "soft spring": (LOAD, 2e-3 * LOAD, 1.0), "by": (None, None, 0.0)}
-SHAPES = {"flat": lambda x: 0 * x, "tilt": lambda x: 1e-4 * x, "crown": lambda x: crown(x, 1.0),
-          "rough": lambda x: rough(np.random.default_rng(3), x, 1e-6),
-          "noise": lambda x: 1e-6 * np.random.default_rng(3).normal(size=x.size)}
-
-
-@pytest.mark.parametrize("control", CONTROLS.values(), ids=CONTROLS.keys())
-@pytest.mark.parametrize("shape", SHAPES.values(), ids=SHAPES.keys())
-def test_exact_gradients_and_descent_reach_the_same_forces_in_every_control(shape, control):
-    pair = coated_pair(100)
-    gap = shape(pair.interface.x)
-    ask = Ask(pair.interface.x, gap - (0.0 if control[0] else gap.min() + 1e-7), *control)
-    operator = Operator(pair.normal)
-    wanted = solve(operator, ask)
-    near, count = gradients(operator, ask)
-    assert np.abs(near - wanted.force).max() <= 1e-8 * wanted.force.sum() and count <= 400
-    start = np.zeros(101) if ask.load is None else nearest(np.full(101, LOAD / 101), np.stack(
-        [np.ones(101), ask.x], axis=1), np.array([LOAD, (ask.moment or 0.0)]))
-    found, _ = descend(operator, ask, start)
-    assert np.abs(found.force - wanted.force).max() <= 1e-10 * wanted.force.sum()
 
 
 @pytest.mark.parametrize("control", CONTROLS.values(), ids=CONTROLS.keys())
@@ -334,31 +273,7 @@ def test_refuses_to_return_what_did_not_converge(monkeypatch):
             press(pair, np.zeros(101), LOAD)
 
 
-@given(seed=st.integers(0, 2**32 - 1), size=st.integers(2, 60))
-def test_exact_nearest_forces_are_a_projection(seed, size):
-    """f - y = rigid q on f > 0 and y + rigid q <= 0 elsewhere: the conditions of the nearest point."""
-    rng = np.random.default_rng(seed)
-    rigid = np.stack([np.ones(size), np.linspace(-1, 1, size)], axis=1)
-    y, sums = rng.normal(size=size) * 10.0**rng.uniform(-3, 3), np.array([1.0, rng.uniform(-0.99, 0.99)])
-    f = nearest(y, rigid, sums)
-    assert np.abs(rigid.T @ f - sums).max() <= 1e-12 and f.min() >= 0
-    if np.count_nonzero(f) > 1:
-        q = np.linalg.lstsq(rigid[f > 0], (f - y)[f > 0], rcond=None)[0]
-        size = np.abs(y).max() + np.abs(rigid @ q).max()
-        assert np.abs(f - np.maximum(y + rigid @ q, 0)).max() <= 1e-9 * size
-
-
 # ---- parts of the start
-
-@given(seed=st.integers(0, 2**32 - 1), line=st.floats(-0.49, 0.49), power=st.floats(-4, 4), held=st.booleans())
-def test_exact_the_rest_position_of_a_rigid_piece(seed, line, power, held):
-    """Its lowest points straddle the load line, or with a spring balance what the spring leaves of the moment."""
-    rng = np.random.default_rng(seed)
-    x, gap, spring = np.linspace(-1, 1, 40), rng.normal(size=40), 10.0**power if held else 0.0
-    theta = rest(x, gap, 1.0, 2 * line, spring)
-    height = gap + theta * x
-    low = x[height <= height.min() + 1e-12]
-    assert low[0] - 1e-9 <= 2 * line + spring * theta <= low[-1] + 1e-9
 
 
 # ---- random gaps on random operators, every control

@@ -82,14 +82,6 @@ def test_exact_strips_without_roll_are_one_patch(skin, control, angle):
     assert state.fraction == pytest.approx(weight[force > 0].sum() * 8 / AREA, rel=1e-12)
 
 
-@each_skin
-def test_exact_one_strip_does_not_feel_the_roll(skin):
-    c, x, weight, y = real(1)
-    flat, rolled = (press_strips(c, x, weight, y, 1e-5 * x, roll, load=LOAD, skin=skin) for roll in (0.0, 1e-3))
-    assert y.tolist() == [0.0] and rolled.centre_y == 0.0
-    assert np.array_equal(flat.force, rolled.force) and flat.delta == rolled.delta
-
-
 # ------------------------------------------------------------------------------- against one dense problem of all nodes
 def dense_cases(number):
     rng = np.random.default_rng(20)
@@ -135,18 +127,6 @@ def test_exact_rigid_pad_in_full_contact_has_the_centre_of_the_wedge_less_one_ov
     assert state.centre_y == pytest.approx(centre * (1 - 1 / count**2), rel=1e-12) and centre < 0
 
 
-@pytest.mark.parametrize("count", [2, 8, 64, 256])
-def test_exact_rigid_pad_that_is_half_open(count):
-    """Rolled to f = 1/2 the edge lies between strips; n of them under a triangle have their centre n/3 + 1/(6 n) strips
-    from the closed edge, so that of the pad is short by 1/count^2 again."""
-    roll = 4 * wedge_opening(LOAD, WIDTH, LENGTH, 1e13)
-    fraction, centre, _, _ = wedge_linear(roll, LOAD, WIDTH, LENGTH, 1e13)
-    assert fraction == pytest.approx(0.5, rel=1e-14)
-    state = press_strips(*rigid(count), np.zeros(1), roll, load=LOAD, skin=LinearSkin(1e13))
-    assert state.fraction == 0.5
-    assert state.centre_y == pytest.approx(centre * (1 - 1 / count**2), rel=1e-10)
-
-
 def test_order_two_rigid_pad_of_any_opening():
     """The edge lies a third into a strip at every count: one strip more than a multiple of three, f = 1/3."""
     roll = 9 * wedge_opening(LOAD, WIDTH, LENGTH, 1e13)
@@ -181,33 +161,6 @@ def test_figure_yaw_moment_of_a_rolled_pad_on_a_linear_skin(roll, yaw):
     assert state.yaw_moment(0.4) == pytest.approx(0.4 * state.load * state.centre_y, rel=1e-14)
 
 
-@pytest.mark.parametrize("roll", [1e-5, 1e-4, 1e-3])
-def test_exact_flat_pieces_are_a_rigid_pad_on_their_own_stiffness(roll):
-    """Without tilt a strip touches all along or not at all: a foundation of dN/d(approach) per area, and its wedge."""
-    stiffness = tangential_stiffness(coated_pair(60).normal, np.ones(61, bool)) / AREA
-    fraction, centre, _, _ = wedge_linear(roll, LOAD, WIDTH, LENGTH, stiffness)
-    for count in (7, 16, 256):
-        c, x, weight, y = real(count)
-        state = press_strips(c, x, weight, y, np.zeros(61), roll, load=LOAD)
-        pad = press_strips(*rigid(count), np.zeros(1), roll, load=LOAD, skin=LinearSkin(stiffness))
-        assert state.centre_y == pytest.approx(pad.centre_y, rel=1e-10)
-        assert state.delta == pytest.approx(pad.delta, rel=1e-10)
-        assert state.fraction == pytest.approx(pad.fraction, rel=1e-12)
-    assert abs(state.centre_y - centre) <= 3e-5 * WIDTH and fraction < 1
-
-
-def test_order_two_centre_of_tilted_and_rolled_pieces():
-    """Against 243 strips the error of the centre falls by nine for strips a third as wide."""
-    def centre(count):
-        c, x, weight, y = real(count)
-        return press_strips(c, x, weight, y, 3e-5 * x, 2e-5, load=LOAD).centre_y
-
-    best = centre(243)
-    off = [abs(centre(count) - best) for count in (3, 9, 27)]
-    assert off[-1] <= 2e-3 * abs(best)
-    assert np.log(off[0] / off[2]) / np.log(9) == pytest.approx(2, abs=0.25)
-
-
 # ------------------------------------------------------------------------------------------------------------- mirrors
 @each_skin
 @each_control
@@ -224,13 +177,6 @@ def test_exact_mirrors(skin, control):
     assert np.abs(turned.force[:, ::-1] - state.force).max() <= 1e-11 * LOAD
     assert turned.centre_x == pytest.approx(-state.centre_x, rel=1e-9)
     assert turned.theta == pytest.approx(-state.theta, rel=1e-9, abs=1e-18)
-
-
-@each_skin
-def test_always_roll_to_plus_y_moves_the_centre_to_minus_y(skin):
-    centres = [press_strips(*real(8), np.zeros(61), roll, LOAD, skin=skin).centre_y
-               for roll in (1e-6, 1e-5, 1e-4, 1e-3)]
-    assert 0 > centres[0] and all(a > b for a, b in pairwise(centres)) and centres[-1] >= -WIDTH / 2
 
 
 # ------------------------------------------------------------------------------------------- the definitions themselves
@@ -293,22 +239,6 @@ def test_always_any_gap_in_every_strip_is_solved(count, size, roll, load, where,
     check(state, skin, c, x, weight, gap, roll, load, moment, spring)
 
 
-@pytest.mark.slow
-def test_always_a_thousand_random_strips_are_solved():
-    rng = np.random.default_rng(77)
-    for _ in range(1000):
-        count = int(rng.integers(1, 17))
-        c, x, weight, y = real(count, 40)
-        gap = random_gaps(rng, x, count, 10**rng.uniform(-9, -5)) + 10**rng.uniform(-9, -6) * rng.normal(size=x.size)
-        roll, load = 10**rng.uniform(-7, -2) * rng.choice([-1, 1]), LOAD * 10**rng.uniform(-3, 2)
-        moment = None if rng.random() < 0.3 else load * LENGTH / 2 * rng.uniform(-0.99, 0.99)
-        spring = 0.0 if rng.random() < 0.5 or moment is None else 10**rng.uniform(0, 6)
-        skin = [None, LinearSkin(10**rng.uniform(10, 17)), ExponentialSkin(10**rng.uniform(-8, -5.5)),
-                HertzSkin(10e-6, 10**rng.uniform(8, 11), 10**rng.uniform(-7.3, -5.5), 1.3e11)][rng.integers(4)]
-        state = press_strips(c, x, weight, y, gap, roll, load, moment, spring=spring, skin=skin)
-        check(state, skin, c, x, weight, gap, roll, load, moment, spring)
-
-
 @pytest.mark.share(0, 1, 2, 4, 5, 6, 8, 9, 10, 11)
 @each_skin
 @each_control
@@ -347,15 +277,6 @@ def test_exact_a_great_roll_presses_the_edge_strip_alone(skin):
     assert np.abs(state.pressure[0] - alone.sigma_n).max() <= 1e-10 * alone.sigma_n.max()
     assert state.centre_y == pytest.approx(y[0], rel=1e-12)
     assert state.fraction == pytest.approx(weight[alone.sigma_n > 0].sum() / AREA, rel=1e-12)
-
-
-def test_exact_strips_that_never_touch_do_not_count():
-    c, x, weight, y = real(4)
-    gap = np.array([[0.0], [1.0], [0.0], [1.0]]) + np.zeros((4, x.size))
-    state = press_strips(c, x, weight, y, gap, load=LOAD, moment=1e-3 * LOAD)
-    two = press_strips(c, x, weight, y[::2], np.zeros(x.size), load=LOAD, moment=1e-3 * LOAD)
-    assert not state.force[1::2].any()
-    assert np.abs(state.force[::2] - two.force).max() <= 1e-13 * LOAD
 
 
 @each_skin
@@ -466,18 +387,6 @@ def test_exact_a_free_roll_under_the_moment_of_a_held_one_is_that_roll(skin, con
         assert np.abs(free.force - held.force).max() <= 1e-9 * LOAD
         other = press_strips(c, x, weight, y, gap, 0.5 * roll, LOAD, skin=skin, lateral=held.roll_moment, **control)
         assert other.roll == pytest.approx(roll, rel=1e-8)
-
-
-@each_skin
-def test_exact_a_free_roll_of_even_pieces_is_none_and_mirrors_with_its_load_line(skin):
-    c, x, weight, y = real(8, 30)
-    middle = press_strips(c, x, weight, y, 2e-5 * x, load=LOAD, skin=skin, lateral=0.0)
-    assert abs(middle.roll) <= 1e-15 and abs(middle.roll_moment) <= 1e-12 * LOAD * WIDTH
-    one, other = (press_strips(c, x, weight, y, 2e-5 * x, load=LOAD, skin=skin, lateral=side * 1e-3 * LOAD)
-                  for side in (1, -1))
-    assert one.roll < 0 and one.centre_y == pytest.approx(1e-3, rel=1e-9)
-    assert other.roll == pytest.approx(-one.roll, rel=1e-9)
-    assert other.force[::-1] == pytest.approx(one.force, rel=1e-8, abs=1e-12 * LOAD)
 
 
 def test_exact_a_free_roll_closes_a_lateral_wedge():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchfem.dynamics.curve_points import adapted, coarse
+from patchfem.dynamics.curve_points import adapted
 
 
 def mode(f, zeta):
@@ -36,26 +36,7 @@ def test_always_a_smaller_share_is_kept_too(share):
     assert places.size < 3 * np.sum(np.sqrt(bend / (8 * share * true))) * (fine[1] - fine[0])
 
 
-def test_exact_every_place_is_found_once_from_the_one_before_it():
-    seen = []
-
-    def find(f, near):
-        assert near is None or near[1] < f
-        seen.append(f)
-        return mode(f, 0.01), f
-
-    places, _ = adapted(find, np.linspace(100, 200, 21))
-    assert sorted(seen) == list(places) and len(set(seen)) == len(seen)
-
-
 def test_always_a_jump_and_a_hole_end():
     """Neither is a bend: a jump is followed to a millionth of its place, nan (no motion is bounded) not at all."""
     places = adapted(lambda f, near: (1.0 if f < 101.3 else np.nan if f > 150 else 5.0,), np.linspace(60, 210, 31))[0]
     assert places.size < 100 and np.diff(places).min() < 1e-3
-
-
-def test_exact_a_parabola_is_halved_where_it_has_to_be():
-    """x^2 over [0, 2] misses its straight line by h^2/4 in the middle, 0.0025 at h = 0.1, of the largest at hand."""
-    x = np.linspace(1, 2, 11)
-    assert coarse(x, x**2, 0.0025 / 0.75 / 1.55**2).tolist() == [0, 1, 2, 3, 4]
-    assert coarse(x[:2], x[:2], 0.0).size == 0

@@ -81,43 +81,6 @@ def test_exact_step_against_dop853(kind, drive, steps):
     assert moved == pytest.approx(modes.slide @ (want[:n] - state[:n]), rel=1e-8, abs=1e-14)
 
 
-def test_exact_step_closed_forms():
-    om, a = 2 * pi * 150, 5 * G_N
-    drive = BaseSine(a, om)
-    rigid, resonant, dead = (propagator(basis(*m), drive, 64) for m in ((0.0, 0.0), (om, 0.0), (W, 3.0)))
-    dt, t = rigid.dt, om * rigid.dt
-    np.testing.assert_allclose(np.concatenate([rigid.free[:, 0], rigid.push[:, 0]]), [1, dt, 0, 1, dt**2 / 2, dt],
-                               rtol=1e-12, atol=1e-18)
-    added = rigid.tables(drive, 0, 1)[0]
-    np.testing.assert_allclose(added[:2], [-a * (t - np.sin(t)) / om**2, -a * (1 - np.cos(t)) / om], rtol=1e-11)
-    added = resonant.tables(drive, 0, 1)[0]
-    np.testing.assert_allclose(added[:2], [-a * (np.sin(t) - t * np.cos(t)) / (2 * om**2),
-                                           -a * t * np.sin(t) / (2 * om)], rtol=1e-11)
-    fast, slow = -W * (3 + np.sqrt(8)), -W * (3 - np.sqrt(8))
-    e, g = np.exp(fast * dt), np.exp(slow * dt)
-    want = np.array([fast * g - slow * e, e - g, fast * slow * (g - e), fast * e - slow * g]) / (fast - slow)
-    np.testing.assert_allclose(dead.free[:, 0], want, rtol=1e-11)
-
-
-def test_exact_two_half_steps_are_one():
-    drive = BaseSine(5 * G_N, W)
-    for modes in (basis([W, 0.0, W], [0.003, 0.0, 1.5], (1.0, 0.5, 0.2), (1.0, 0.0, 0.0)), coupled()):
-        one, half = propagator(modes, drive, 50), propagator(modes, drive, 100)
-        state = 1e-5 * np.arange(1.0, 2 * modes.omega.size + 1)
-        whole = by_step(modes, one, drive, 3, state, 5.0)
-        first = by_step(modes, half, drive, 6, state, 5.0)
-        second = by_step(modes, half, drive, 7, first[0], 5.0)
-        np.testing.assert_allclose(second[0], whole[0], rtol=1e-11, atol=1e-17)
-        for k in (1, 2, 3):
-            assert first[k] + second[k] == pytest.approx(whole[k], rel=1e-10, abs=1e-18)
-
-
-def test_exact_a_periodic_table_repeats():
-    drive = BaseSine(5 * G_N, W)
-    prop = propagator(coupled(), drive, 60)
-    np.testing.assert_allclose(prop.tables(drive, 60, 60), prop.tables(drive, 0, 60), rtol=0, atol=1e-12)
-
-
 def test_exact_recorded_line_and_levels():
     """A straight recorded signal pushes a rigid mode by a t^3/6; a level scales the sine's own table."""
     rigid = basis(0.0, 0.0, mass=1.0)
@@ -157,24 +120,6 @@ def test_exact_energy_of_a_step_that_is_long_beside_stiff_modes(modes):
     work[2 * n:] = modes.mass * (step[:n] - np.eye(2 * n, 3 * n)[:n])
     miss = step.T @ energy @ step - begun + (loss + loss.T) / 2 - (work + work.T) / 2
     assert np.abs(miss).max() < 1e-13 * max(np.abs(begun).max(), np.abs(work).max())
-
-
-def test_exact_stiff_mode_is_led_by_its_drive_and_its_force():
-    """omega^2 z + 2 zeta omega z' = -a sin(W t) - F/m once the inertia has died out, to 1/(2 zeta)^2: closed form."""
-    zeta, force = 1e5, 3.0
-    modes, drive = basis(W, zeta, mass=2.0), BaseSine(5.0, W)
-    prop, damper = propagator(modes, drive, 100), 2 * zeta * W
-    state, lost, given = np.zeros(2), 0.0, 0.0
-    for k in range(100):
-        state, work, loss, _ = by_step(modes, prop, drive, k, state, force)
-        given, lost = given + work, lost + loss
-    t = drive.period
-    z = -5.0 * (1 - np.cos(W * t)) / (damper * W) - force / 2.0 / damper * t
-    rate = -5.0 * np.sin(W * t) / damper - force / 2.0 / damper
-    assert state[1] == pytest.approx(rate, rel=1e-4) and state[0] == pytest.approx(z, rel=1e-4)
-    heat = 2.0 / damper * (25.0 / 2 + (force / 2)**2) * t  # mean of m (2 zeta omega) z'^2, without the slow return
-    assert lost == pytest.approx(heat, rel=1e-4)
-    assert given - force * state[0] == pytest.approx(lost + 0.5 * 2.0 * (state[1]**2 + (W * state[0])**2), rel=1e-12)
 
 
 def test_exact_doubled_step_is_the_step_itself(monkeypatch):

@@ -4,9 +4,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from contact_sets_reference import ContactSets
 from scipy.optimize import brentq
 
+from patchfem.contact.contact_sets import ContactSets
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import BaseSine, ModalBasis
 from patchfem.dynamics.march import varying_load

@@ -9,7 +9,7 @@ from patchfem.core import BaseSine, ModalBasis, Outcome, Start
 from patchfem.dynamics.grooves.climbing import ClimbingModel
 from patchfem.dynamics.grooves.run import model_of
 from patchfem.dynamics.march.instances import follow_path
-from patchfem.dynamics.march.march import fresh, march
+from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import element_model, points_model
 from patchfem.dynamics.march.varying_load import bonds, plastic
 from patchfem.friction.bonds.parameters import Bonds
@@ -82,18 +82,6 @@ def test_always_short_bonds_are_coulombs_law_on_the_flank(law):
     assert far > 2 * near and near > 1.5 * last and last < 0.03 * true
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_exact_a_slide_one_way_is_coulombs_beyond_the_bonds(law):
-    """Down and up the flanks: after some bond lengths the force is N (t + mu)/(1 - mu t), but for the steps and the
-    bond length, over which the normal force changes."""
-    grooves, slide = Grooves(80e-6, 7.5e-6, 0.4), np.linspace(0, 160e-6, 16001)
-    model = ClimbingModel(grooves, LOAD, LAWS[law][0](2e-8))
-    forces, energies, contact = np.zeros((slide.size, 3)), np.zeros((slide.size, 2)), model.build()
-    assert follow_path(slide, 1e-3, model.kind, contact, 1e-9, energies, forces) == 0
-    true = LOAD * grooves.ratio(slide, 1.0, MU)
-    np.testing.assert_allclose(forces[50:-1, 0], true[50:-1], rtol=0, atol=2e-3 * true.max())
-
-
 @pytest.mark.share(1)
 @pytest.mark.parametrize("law", LAWS)
 def test_exact_flat_grooves_are_the_law_itself(law):
@@ -117,19 +105,6 @@ def test_always_a_lifted_mass_that_leaves_the_grooves_is_said():
     model = ClimbingModel(Grooves(80e-6, 7.5e-6, 0.0, 3.0), 20.0, plastic(MU, 1e-6))
     done = march(BASIS, BaseSine(400.0, 2 * np.pi * 143), model, 5, 100)
     assert done.outcome is Outcome.LEAVES_GROOVES and "leaves the grooves" in done.message
-
-
-@pytest.mark.parametrize("law", LAWS)
-def test_exact_a_motion_may_start_on_a_flank(law):
-    """The law starts under the normal force of a contact without friction there, R = N sqrt(1 + t^2), as it would under
-    that load on flat ground."""
-    grooves, place = Grooves(80e-6, 7.5e-6, 0.4), 17e-6
-    normal = LOAD * np.hypot(1, grooves.slope(place))
-    model = ClimbingModel(grooves, LOAD, LAWS[law][0](2e-6))
-    on = fresh(BASIS, DRIVE, model, 100, start=Start(np.array([place]), np.zeros(1))).contact
-    flat = ClimbingModel(Grooves(80e-6, 0.0), normal, LAWS[law][0](2e-6)).build()
-    for there, here in zip((*on.pressed, on.memory), (*flat.pressed, flat.memory)):
-        np.testing.assert_allclose(there, here, rtol=1e-14)
 
 
 def test_order_two_a_lifted_mass_that_starts_with_a_speed():

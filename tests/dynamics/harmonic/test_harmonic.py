@@ -1,20 +1,17 @@
 """Harmonic balance against closed forms, direct marching, dense linear algebra and energy."""
 
-import itertools
 
 import numpy as np
 import pytest
-from friction_forms import jenkins_loop, stretch_loop
 from harmonic_cases import bonds, five, many, march, of_speed, plain_jenkins, sdof
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from march_paths import rate_model
 
 from patchfem.core import BaseSine, ModalBasis, NotConverged, PatchfemError
 from patchfem.dynamics.harmonic.balance import cycle_energy, periodic_response
 from patchfem.dynamics.harmonic.forces import Group
 from patchfem.dynamics.harmonic.harmonic import Balance, newton, pack, unpack
-from patchfem.dynamics.harmonic.laws import Interlock, Jenkins, Spring, Track, analysis, synthesis
+from patchfem.dynamics.harmonic.laws import Interlock, Jenkins, Spring, Track, synthesis
 from patchfem.dynamics.harmonic.point import balance_of, group_of, point
 from patchfem.dynamics.march.models import coulomb_model, jenkins_model, points_model
 from patchfem.friction.bonds.parameters import Bonds
@@ -85,17 +82,6 @@ def test_exact_slopes_are_the_derivative_of_the_forces(law):
         assert fold.rate[0] == pytest.approx((force(v, 1.3 + eps) - force(v, 1.3 - eps)) / (2 * eps), abs=1e-8)
 
 
-def test_exact_areas_of_the_closed_loops():
-    """A cosine through each law: area -pi A Im F_1 and end force of the closed forms."""
-    for amplitude in (0.5, 1.7, 6.0):
-        x = np.array([0.0, amplitude])
-        for law, truth in ((Jenkins([2.0], [1.0]), jenkins_loop(amplitude, 1.0, 2.0)),
-                           (bonds(2.0, 1.0), stretch_loop(amplitude, 1.0, 2.0))):
-            force = law.sample(Track(x + 0j, 1.0, 8192)).force
-            assert np.pi * amplitude * analysis(force, 1)[1].imag == pytest.approx(truth[0], rel=1e-6, abs=1e-6)
-            assert force[0] == pytest.approx(truth[1], rel=1e-12)
-
-
 def test_exact_samples_of_more_harmonics_than_they_resolve():
     x = harmonics(7, 40)
     angle = 2 * np.pi * np.arange(16) / 16
@@ -159,15 +145,6 @@ def test_exact_the_jacobian_of_the_balance():
         assert here.by_level == pytest.approx((residual(x, level=0.8) - residual(x, level=0.6)) / 0.2, abs=1e-9)
 
 
-def test_exact_more_rows_than_modes():
-    """Three rows on one mode: the same as one row with the summed law."""
-    modes = sdof(0.02)
-    parts = [(np.array([f]), Spring(k)) for f, k in ((1.0, 1.0), (0.5, 2.0), (-2.0, 0.25))]
-    found = point(modes, BaseSine(1.0, 0.9), parts, harmonics=3)
-    one = point(modes, BaseSine(1.0, 0.9), Spring(1.0 + 0.25 * 2.0 + 4 * 0.25), harmonics=3)
-    assert found.modal[1] == pytest.approx(one.modal[1], rel=1e-12)
-
-
 @pytest.mark.parametrize("omega, level", [(0.8, 1.0), (1.5, 3.0), (2.5, 2.0)])
 def test_exact_one_harmonic_of_elements(omega, level):
     """Describing function of a Jenkins element: stick angle acos(1 - 2 w/A)."""
@@ -204,14 +181,6 @@ def test_exact_a_hundred_elements_and_five_modes_march(omega):
     found = point(modes, drive, jenkins_model(k, w), tolerance=1e-4)
     assert found.error < 1e-4 and np.ptp(synthesis(found.coefficients, 512)) > 4 * w.min()
     check_cycle(modes, drive, found, k, w, 2e-4)
-
-
-def test_exact_the_march_from_rest_ends_there():
-    modes, (k, w), drive = five(zeta=0.06), many(30), BaseSine(1.5, 1.2)
-    found = point(modes, drive, Jenkins(k, w), tolerance=1e-4)
-    rows, _ = march(modes, drive, k, w, np.zeros(10), np.zeros(30), 300, 25)
-    z = synthesis(found.modal.T, 600)[:, ::2]
-    assert np.abs(rows[-301:-1, :5] - z.T).max() < 1e-3 * np.abs(z).max()
 
 
 @pytest.mark.share(0, 1, 2, 3)
@@ -254,11 +223,6 @@ def test_order_of_what_is_cut_off():
         errors.append(np.abs(synthesis(here.coefficients[0], 1024) - y).max())
     order = -np.polyfit(np.log([9, 19, 39, 79]), np.log(errors), 1)[0]
     assert 2.7 < order < 4.5
-
-
-def test_always_the_residual_in_time_falls_with_the_harmonics():
-    rest = [point(sdof(0.05), DRIVE, Jenkins([3.0], [0.3]), harmonics=h).residual for h in (3, 7, 15, 31)]
-    assert all(b < 0.6 * a for a, b in itertools.pairwise(rest)) and rest[-1] > 1e-5
 
 
 def test_exact_both_rows_of_a_group():
@@ -311,11 +275,3 @@ def test_refuses_to_call_an_unbalanced_motion_steady():
     balance = balance_of(modes, group, 256)
     with pytest.raises(NotConverged, match="did not converge in"):
         newton(balance, np.full(15, 3.0), 1.0, 1.0, 7, most=2)
-
-
-def test_exact_models_of_the_march_become_laws():
-    modes = sdof()
-    law = Group(modes, points_model(Bonds(0.3, 2e-6), [1.0, 2.0], [5.0, 4.0])).laws[0][0]
-    assert (law.element.limit, law.length) == (pytest.approx(0.3 * 13), 2e-6)
-    law = Group(modes, rate_model(3.0, 0.1)).laws[0][0]
-    assert (law.element.limit, law.element.kernels) == (3.0, "friction.laws.tanh_kernels")

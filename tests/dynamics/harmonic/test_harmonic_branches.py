@@ -4,8 +4,6 @@ import numpy as np
 import pytest
 from harmonic_cases import bonds, five, many, march, of_speed, plain_jenkins, sdof
 from scipy.integrate import solve_ivp
-from scipy.linalg import expm
-from scipy.optimize import brentq
 from scipy.special import ellipk
 
 from patchfem.core import G_N, BaseSine, ModalBasis, NotConverged, PatchfemError
@@ -13,14 +11,12 @@ from patchfem.dynamics.harmonic.backbone import FreeBalance, trace
 from patchfem.dynamics.harmonic.balance import periodic_response
 from patchfem.dynamics.harmonic.branch import backbone, branches, levels, response
 from patchfem.dynamics.harmonic.continuation import follow
-from patchfem.dynamics.harmonic.floquet import Fading, TurningPoint, monodromy, product
 from patchfem.dynamics.harmonic.forces import Group
 from patchfem.dynamics.harmonic.harmonic import Balance
 from patchfem.dynamics.harmonic.laws import Jenkins, OfSpeed, Spring, synthesis
 from patchfem.dynamics.harmonic.point import point
 from patchfem.dynamics.harmonic.stability import monodromy_of, with_stability
-from patchfem.dynamics.periodic import is_stable, multipliers
-from patchfem.dynamics.propagator import exponentials
+from patchfem.dynamics.periodic import multipliers
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
@@ -31,7 +27,6 @@ RIG = ModalBasis(("axial",), np.array([W]), np.array([0.003]), np.ones(1), np.on
 CUBIC = 0.02 * MASS * W**2 / 1e-6  # 2 % of the flexure at 1 mm
 STIFF = [(RIG.output, Spring(0.0, CUBIC))]
 LEVEL = 5 * G_N
-FRICTION = [*STIFF, (0, Jenkins([1e6], [4e-6]))]
 
 
 # ---- following a curve
@@ -73,46 +68,6 @@ def test_refuses_a_start_off_every_branch():
 
 # ---- the fold of the stiffened rig
 
-def one_harmonic_frequencies(a):
-    """Both frequencies [Hz] at which the one-harmonic Duffing balance has the amplitude a [m]; NaN beyond the peak."""
-    stiff = W**2 + 0.75 * CUBIC / MASS * a * a
-    # (stiff - w^2)^2 + (2 xi W w)^2 = (LEVEL/a)^2
-    b, c = 2 * (0.003 * W)**2 * 2 - 2 * stiff, stiff**2 - (LEVEL / a)**2
-    root = np.sqrt(b * b / 4 - c)
-    return np.sqrt(np.array([-b / 2 - root, -b / 2 + root])) / (2 * np.pi)
-
-
-@pytest.fixture(scope="module")
-def curve():
-    return response(RIG, BaseSine(LEVEL, W), STIFF, (120.0, 200.0), stability=True)
-
-
-@pytest.mark.slow
-def test_exact_the_fold_without_friction(curve):
-    """One harmonic against its formula, the multipliers turn unstable between the two folds, the peak on the backbone.
-
-    The peak of the one-harmonic curve lies where the viscous force takes the whole drive, LEVEL = 2 xi W w a.
-    """
-    single = response(RIG, BaseSine(LEVEL, W), STIFF, (120.0, 200.0), harmonics=1)
-    for p, value in zip(single.points, single.values):
-        a = np.abs(p.coefficients[0, 1])
-        assert np.abs(one_harmonic_frequencies(a) - value).min() < 1e-6 * value
-    assert len(curve.folds) == len(single.folds) == 2 and curve.ended == "end"
-
-    def peak(w):
-        return np.sqrt(W**2 + 0.75 * CUBIC / MASS * (LEVEL / (0.006 * W * w))**2) - w
-
-    top = brentq(peak, 1.1 * W, 2 * W) / (2 * np.pi)
-    sizes = np.array([np.abs(p.coefficients[0, 1]) for p in single.points])
-    assert sizes.max() == pytest.approx(LEVEL / (0.006 * W * 2 * np.pi * top), rel=1e-3)
-    assert single.values[sizes.argmax()] == pytest.approx(top, rel=2e-3) and top < max(single.folds) < 1.003 * top
-    turns = np.sign(np.diff(curve.values))
-    for k, p in enumerate(curve.points[1:-1]):
-        if turns[k] == turns[k + 1]:
-            assert p.stable == (turns[k] > 0), curve.values[k + 1]
-    lost = next(p for p in curve.points if not p.stable)
-    assert lost.multipliers[0].real > 1 and lost.multipliers[0].imag == 0  # through +1, as at a fold
-
 
 def duffing(drive, friction=0.0):
     def rhs(t, y):
@@ -145,38 +100,6 @@ def test_exact_both_stable_branches_by_time_integration():
                       atol=1e-14).y[:, -1] for s in (1, -1)]
     growth = (ends[0] - ends[1])[0] / (2 * push[0])
     assert growth == pytest.approx(vector[0][k].real**3, rel=1e-3) and growth > 1.2
-
-
-@pytest.mark.slow
-def test_exact_bistable_starts_with_friction():
-    """Friction of 4 N: three motions at 152 Hz; two follow from sweeps up and down, the march confirms both."""
-    drive = BaseSine(LEVEL, 2 * np.pi * 152)
-    found = branches(RIG, drive, FRICTION)
-    assert [p.stable for p in found] == [True, False, True]
-    up = response(RIG, drive, FRICTION, np.linspace(130, 152, 5)).points[-1]
-    down = response(RIG, drive, FRICTION, np.linspace(190, 152, 5)).points[-1]
-    assert up.amplitude([1.0]) == pytest.approx(found[2].amplitude([1.0]), rel=1e-2)
-    assert down.amplitude([1.0]) == pytest.approx(found[0].amplitude([1.0]), rel=1e-2)
-    whole = response(RIG, drive, FRICTION, (125.0, 200.0))
-    assert len(whole.folds) == 2 and whole.folds[1] < 152 < whole.folds[0]
-    assert whole.folds[0] < 190  # friction lowers the peak
-
-    k, w = 1e6, 4e-6
-    for p in (found[0], found[2]):
-        r = periodic_response(p, RIG, drive, 2000)
-        stretch = plain_jenkins(np.append(np.tile(r.slide[:-1], 2), r.slide[0]), np.array([k]), np.array([w]))[1][0]
-        dt, z, v = drive.period / 2000, r.modal[0, 0], r.modal_rate[0, 0]
-        for i in range(2000):  # leapfrog, one cycle
-            a = -W**2 * z - 0.006 * W * v - (CUBIC * z**3 + k * stretch) / MASS - LEVEL * np.sin(drive.omega * i * dt)
-            half = v + a * dt / 2
-            new = z + half * dt
-            stretch = np.clip(stretch + new - z, -w, w)
-            z = new
-            a = -W**2 * z - 0.006 * W * half - (CUBIC * z**3 + k * stretch) / MASS \
-                - LEVEL * np.sin(drive.omega * (i + 1) * dt)
-            v = half + a * dt / 2
-        assert z == pytest.approx(r.modal[0, 0], abs=2e-3 * p.amplitude([1.0]))
-        assert v == pytest.approx(r.modal_rate[0, 0], abs=2e-3 * np.abs(r.modal_rate).max())
 
 
 def test_exact_levels_jump_up_and_come_back():
@@ -274,16 +197,6 @@ def test_exact_bonds_forget_as_a_march_does():
     unit = np.array([1.0, 1.2, 1 / length])  # rates over the angle, the stretch u length
     found = monodromy_of(p, modes, 4096) * unit[:, None] / unit
     assert found == pytest.approx(columns, abs=2e-5)
-
-
-def test_exact_small_matrices():
-    from scipy.linalg import expm
-
-    rng = np.random.default_rng(5)
-    a = rng.normal(size=(7, 4, 4)) * 3
-    assert exponentials(a) == pytest.approx(np.array([expm(m) for m in a]), rel=1e-10, abs=1e-10)
-    assert product(a) == pytest.approx(np.linalg.multi_dot(a[::-1]), rel=1e-10, abs=1e-9)
-    assert is_stable(np.array([1.0, 0.5])) and not is_stable(np.array([-1.001]))
 
 
 # ---- backbone
@@ -392,30 +305,3 @@ def test_refuses_amplitudes_that_fall():
     with pytest.raises(PatchfemError, match="mode 3"):
         backbone(RIG, Spring(1.0), np.array([2.0]), mode=3)
     assert synthesis(np.array([1.0, 1.0 + 0j]), 4) == pytest.approx([2, 1, 0, 1])
-
-
-def test_exact_neighbours_of_the_same_coefficients_are_one_cell():
-    """Against the product of SciPy's exponential of every cell: of modes, two rows, a turning point that holds and
-    bonds that fade, in cells that are the same for most of a cycle."""
-    rng, n, count = np.random.default_rng(5), 3, 64
-    omega, rows = np.array([0.9, 3.1, 12.0]) * 600, rng.normal(size=(2, n))
-    modes = ModalBasis(("a", "b", "c"), omega, np.full(n, 0.01), np.ones(n), np.ones(n), np.ones(n), MASS)
-    slope = np.repeat(rng.uniform(0, 1e5, (2, 4)), 16, axis=1)
-    hold = np.where((np.arange(count) > 20) & (np.arange(count) < 40), -2e4, 0.0)
-    mark = TurningPoint(1, 20, 0.3, hold)
-    one = Fading(0, np.repeat([0.0, 40.0], 32), np.repeat([0.1, 0.0], 32), 3.0)
-    found = monodromy(modes, rows, 600.0, slope, 0 * slope, [mark], [one])
-    size, grip, true = 2 * n + 2, rows.T / (MASS * 600.0**2), np.eye(2 * n + 2)
-    for k in range(count):
-        a = np.zeros((size, size))
-        a[:n, n:2 * n] = np.eye(n)
-        a[n:2 * n, :n] = -np.diag(omega / 600)**2 - grip @ np.diag(slope[:, k]) @ rows
-        a[n:2 * n, n:2 * n] = -np.diag(0.02 * omega / 600)
-        a[n:2 * n, 2 * n], a[n:2 * n, 2 * n + 1] = -hold[k] * grip[:, 1], -3.0 * grip[:, 0]
-        a[2 * n + 1, n:2 * n], a[2 * n + 1, 2 * n + 1] = one.gain[k] * rows[0], -one.loss[k]
-        step = expm(a * 2 * np.pi / count)
-        if k == 20:
-            across = np.append(rows[1], np.zeros(size - n))
-            step[2 * n] = 0.7 * across + 0.3 * across @ step
-        true = step @ true
-    np.testing.assert_allclose(found, true, atol=1e-10 * np.abs(true).max())

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from harmonic_cases import bonds, five, many, march, plain_jenkins, sdof
+from harmonic_cases import bonds, five, march, plain_jenkins, sdof
 from scene_texts import NONLOCAL, POINT, STRUCTURE
 
 from patchfem.core import BaseSine, ModalBasis, NotConverged
@@ -44,45 +44,6 @@ def test_exact_measures_of_a_run_of_a_scene(law):
                        ("friction_force_peak", 1e-3), ("slip_amplitude", 2e-3), ("loop_area", 2e-3),
                        ("equivalent_stiffness", 2e-3), ("equivalent_damping", 2e-3)):
         assert mine[name] == pytest.approx(found[name].value, rel=near), name
-
-
-@pytest.mark.slow
-def test_exact_forty_points_of_five_modes_and_a_hundred_elements():
-    """Each motion, marched for a cycle with its own memory, follows itself and closes."""
-    modes, (k, w) = five(), many()
-    last = None
-    for omega in np.linspace(0.5, 4.4, 40):
-        drive = BaseSine(1.5, omega)
-        last = point(modes, drive, Jenkins(k, w), tolerance=1e-3, start=last)
-        r = periodic_response(last, modes, drive, 800)
-        stretch = plain_jenkins(np.append(np.tile(r.slide[:-1], 2), r.slide[0]), k, w)[1]
-        start = np.concatenate([r.modal[0], r.modal_rate[0]])
-        rows, forces = march(modes, drive, k, w, start, stretch, 800)
-        scale = np.abs(r.modal).max()
-        assert last.error < 1e-3 and np.abs(rows[:, :5] - r.modal).max() < 1.5e-3 * scale, omega
-        assert np.abs(forces - r.force).max() < 1e-2 * np.abs(forces).max(), omega
-
-
-@pytest.mark.parametrize("limit", [1e-9, 1e6])
-def test_exact_friction_that_does_nothing_or_everything(limit):
-    """1e-9 times the drive: the free resonance; 1e6 times: a spring."""
-    modes, drive = sdof(), BaseSine(1.0, 1.0)
-    p = point(modes, drive, Jenkins([20.0], [limit / 20.0]), tolerance=1e-6)
-    stiff = 20.0 if limit > 1 else 0.0
-    assert p.amplitude([1.0]) == pytest.approx(1 / abs(stiff + 0.006j), rel=1e-6)
-
-
-def test_exact_an_overdamped_and_a_rigid_mode_with_friction():
-    """Frequency 0 and damping 3: no special case, the march closes; the mean of the rigid slide stays where it was."""
-    one = np.ones(2)
-    modes = ModalBasis(("r", "o"), np.array([0.0, 2.0]), np.array([0.0, 3.0]), np.array([1.0, 0.5]), one, one, 1.0)
-    drive, k, w = BaseSine(1.0, 1.5), np.array([2.0, 1.0]), np.array([0.05, 0.3])
-    p = point(modes, drive, Jenkins(k, w), tolerance=1e-4)
-    r = periodic_response(p, modes, drive, 2000)
-    stretch = plain_jenkins(np.append(np.tile(r.slide[:-1], 2), r.slide[0]), k, w)[1]
-    rows, _ = march(modes, drive, k, w, np.concatenate([r.modal[0], r.modal_rate[0]]), stretch, 2000)
-    assert np.abs(rows[:, :2] - r.modal).max() < 3e-4 * np.abs(r.modal).max()
-    assert abs(p.forces[0, 0]) < 1e-9
 
 
 def test_exact_many_interfaces_on_few_modes():

@@ -6,23 +6,6 @@ import pytest
 from patchfem.core import G_N, BaseSine, ModalBasis
 from patchfem.dynamics.harmonic.branch import branches
 from patchfem.dynamics.harmonic.laws import Jenkins, Spring
-from patchfem.dynamics.harmonic.starts import _brackets
-
-
-@pytest.mark.parametrize("middle", [0.31, 0.35, 0.4, -0.55])
-@pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_exact_two_roots_between_neighbours_of_the_grid(middle, sign):
-    """A parabola that dips below zero between two points a tenth apart, and one that does not."""
-    grid = np.linspace(-1, 1, 21)
-
-    def miss(x, depth=4e-4):
-        return sign * ((x - middle)**2 - depth)
-
-    found = _brackets(miss, grid, [miss(x) for x in grid])
-    roots = middle - 0.02, middle + 0.02
-    assert len(found) == 2
-    assert all(a <= root <= b for (a, b), root in zip(found, roots))
-    assert not _brackets(lambda x: miss(x, -1e-4), grid, [miss(x, -1e-4) for x in grid])
 
 
 @pytest.mark.slow

@@ -62,7 +62,3 @@ def test_exact_a_bench_whose_list_grows_is_that_with_room_from_the_start(monkeyp
     monkeypatch.setattr(list_numbers, "room", lambda *_: 50)
     two = bench.run(build(loads(text)), None, 400)
     assert np.array_equal(one.force, two.force) and np.array_equal(one.ledger, two.ledger)
-
-
-def test_always_a_plan_foresees_the_memory_of_the_list():
-    assert capacity.most_bytes(1000) == 240_000 and capacity.most_bytes(1e12) == 240 * capacity.MOST_STRIPS

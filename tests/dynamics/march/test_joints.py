@@ -14,9 +14,8 @@ from patchfem.dynamics.march.joints import Joint, JointsModel, cubic, interlock
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import coulomb_model, jenkins_model, list_model, points_model
 from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.laws import elastic_plastic_kernels as kernels
 from patchfem.friction.laws.coulomb import Coulomb
-from patchfem.friction.laws.elastic_plastic import ElasticPlastic, parallel
+from patchfem.friction.laws.elastic_plastic import ElasticPlastic
 from patchfem.friction.laws.stretch import points_element
 from patchfem.friction.laws.tanh import Rate
 from patchfem.structure.drives import release
@@ -163,19 +162,6 @@ def test_order_three_masses_with_three_unlike_interfaces():
     assert np.log2(errors[0] / errors[-1]) / 3 == pytest.approx(2.0, abs=0.25)
 
 
-def test_exact_two_alike_interfaces_stop_together():
-    """Two unit masses, alike in everything, move as one and stick in the same steps; a rigid common motion besides."""
-    modes = chain([1.0, 0.0])
-    both = ModalBasis(("1", "2"), np.ones(2), np.full(2, 0.003), np.array([1.0, 0]), np.ones(2), np.array([1.0, 0]),
-                      1.0, None, np.eye(2))
-    model = JointsModel(None, (coulomb(0, 0.8, 0.8), coulomb(1, 0.8, 0.8)), np.eye(2), 1.0, ALL)
-    got = march(both, BaseSine(1.0, 1.0), model, 30, 200)
-    alone = march(one(1.0), BaseSine(1.0, 1.0), coulomb_model(0.8, 0.8), 30, 200)
-    assert np.array_equal(*got.response.extra["slides"].T)
-    assert got.response.slide == pytest.approx(alone.response.slide, abs=1e-12)
-    assert modes.omega[0] == 0.0
-
-
 @given(st.integers(0, 10_000))
 def test_always_energy_closes_and_friction_only_takes(seed):
     """Random chains of 2-4 masses with mixed laws and springs: balance at round-off, no law above its limit."""
@@ -238,34 +224,3 @@ def test_exact_strips_that_yaw_are_those_of_the_event_engine():
     assert got.outcome is None
     assert got.amplitudes[-5:] == pytest.approx(truth.amplitudes[-5:], rel=2e-3)
     assert got.ledger["friction"] == pytest.approx(truth.ledger["friction"], rel=2e-3)
-
-
-def test_exact_iwan_elements_wipe_out_a_minor_loop():
-    """A hundred parallel elements, limits spread evenly, along 0 .8 .2 .6 .2 .8 -.8 .8: forces, loss of a cycle."""
-    element = parallel(np.full(100, 0.01), (np.arange(100) + 0.5) / 100)
-    num, mem, forces, lost = element.numbers[None], element.memory[None].copy(), [], 0.0
-    for dq in np.diff([0, 0.8, 0.2, 0.6, 0.2, 0.8, -0.8, 0.8]):
-        dissipated = kernels.commit(num, mem, 0, dq, 0.0, 0.0, 0.0, 1.0, 0.0)
-        forces.append(kernels.state(num, mem, 0, 0.0, 0.0)[0])
-        lost = lost + dissipated if dq in (-1.6, 1.6) else 0.0
-    assert forces == pytest.approx([0.48, -0.03, 0.33, -0.03, 0.48, -0.48, 0.48], abs=1e-12)
-    assert lost == pytest.approx(0.34136, abs=1e-12)
-
-
-def test_exact_an_elastic_rod_on_a_friction_bed():
-    """EA = tau = P = 1, pulled to and fro slowly: the tip swings by 1/2, a cycle loses 2/3; 1.25 long."""
-    n, h = 20, 1 / 16
-    modes = chain([0.0, *np.full(n - 1, 1 / h)], faces=np.eye(n))  # node 0 is the tip
-    last = np.zeros(n)
-    last[0] = 1.0
-    drive = BaseSine(1.0, 2 * np.pi / 3000, False)
-    pulled = ModalBasis(modes.names, modes.omega, np.full(n, 0.7), modes.interfaces[0], -modes.shapes.T @ last,
-                        modes.interfaces[0], 1.0, None, modes.interfaces)
-    limit = np.full(n, h)
-    limit[0] = h / 2
-    model = JointsModel(None, tuple(coulomb(k, f, f) for k, f in enumerate(limit)), modes.interfaces, 1.0, ALL)
-    got = march(pulled, drive, model, 2, 1500, window=1)
-    assert got.outcome is None
-    swing = np.ptp(got.window.slide) / 2
-    assert swing == pytest.approx(0.5, rel=1.5e-2)
-    assert np.diff(got.response.extra["ledger"][2][-1500:]).sum() == pytest.approx(2 / 3, rel=2.5e-2)

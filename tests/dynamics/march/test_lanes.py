@@ -5,15 +5,13 @@ import pytest
 from march_paths import OMEGA
 from test_march_loop import half_plane
 
-from patchfem.compiled import load
 from patchfem.core import BaseSine, ModalBasis, Response
 from patchfem.dynamics.march import lanes
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import points_model
-from patchfem.friction.bonds import recursion
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.response import loops, measures, spectrum
-from patchfem.runs.many.samples import Samples, peaks
+from patchfem.runs.many.samples import Samples
 from patchfem.slip.shear_modes import shear_modes
 
 ONE = ModalBasis(("a",), np.array([OMEGA]), np.full(1, 0.05), np.ones(1), np.ones(1), np.ones(1), 1.0)
@@ -80,14 +78,6 @@ def test_exact_a_case_does_not_hang_on_those_beside_it():
     assert many.extremes.shape == (40, 4, 2)
 
 
-@pytest.mark.parametrize("far", [False, True])
-def test_exact_shape_functions_of_a_slide(far):
-    x = np.append(0.0, np.geomspace(1e-9, 500.0 if far else 0.5, 400))
-    shape = load(lanes.KERNELS).shape.function()
-    np.testing.assert_allclose(np.array([shape(one, far) for one in x]).T,
-                               np.array([*recursion.shape_functions(x)[:2], np.exp(-x)]), rtol=2e-13, atol=1e-17)
-
-
 def test_exact_what_is_read_off_samples_side_by_side(pairs):
     """Each as the readers of one run have it, of the same samples."""
     found, alone = pairs
@@ -111,13 +101,3 @@ def test_exact_what_is_read_off_samples_side_by_side(pairs):
         for name, value in expected.items():
             size = np.abs(here.slide).max() if name == "drift_per_cycle" else abs(value)
             assert values[name][k] == pytest.approx(value, abs=1e-9 * size), (name, PUSHES[k])
-
-
-def test_exact_peaks_side_by_side():
-    r = np.random.default_rng(1)
-    size = np.abs(np.cumsum(np.cumsum(r.normal(size=(40, 200)), axis=0), axis=0))
-    value, above = peaks(size)
-    for k in range(200):
-        one = Response(*[np.zeros(40)] * 7, size[:, k], *[np.zeros(40)] * 3)
-        assert value[k] == pytest.approx(measures.acceleration_peak(one), rel=1e-13)
-        assert above[k] == pytest.approx(measures.peaks_between(one).get("absolute_acceleration_peak", 0.0), rel=1e-13)

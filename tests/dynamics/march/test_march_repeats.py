@@ -16,7 +16,6 @@ from patchfem.dynamics.march import varying_load
 from patchfem.dynamics.march.joints import JointsModel
 from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import coulomb_model, jenkins_model, points_model
-from patchfem.dynamics.repeats import ahead, looked_at, until_look
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.slip.shear_modes import shear_modes
 
@@ -126,16 +125,3 @@ def test_always_what_creeps_beats_or_has_another_period_does_not_repeat(motion, 
         run.done = number * STEPS
         found = found or run.repeats(100_000)
     assert found == periodic
-
-
-def test_exact_what_changes_ahead():
-    """Of a decay by a share per cycle all that is left, of a creep what it goes on by."""
-    q, far = 0.97, 128
-    change, before = (abs(q**(far // k) - q**(far // (2 * k))) for k in (1, 2))
-    assert ahead(change, before, 10**9, far) == pytest.approx(max(q**far, change), rel=0.02)
-    assert ahead(3e-9 * 64, 3e-9 * 32, 1000, 128) == pytest.approx(3e-9 * 1000)
-    number, seen = 0, []
-    while number < 64:
-        number += until_look(number)
-        seen += [number] if looked_at(number) else []
-    assert seen == [4, 8, 16, 32, 64]

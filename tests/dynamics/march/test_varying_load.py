@@ -8,13 +8,11 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 from varying_load_cases import LAWS, LOAD, MASS, STILL, balance, crowned, elastic, mechanical, modes
 
-from patchfem.compiled import load
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import BaseSine, ModalBasis, PatchfemError, Start
 from patchfem.dynamics.march import varying_load
 from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.recursion import Recursion, pressed
-from patchfem.friction.laws.elastic_plastic import ElasticPlastic
+from patchfem.friction.bonds.recursion import Recursion
 from patchfem.model.structure import strip_rows
 
 POINTED = ["bonds", "growing", "plastic"]  # one loop; that of Coulomb and that of tanh are others to compile
@@ -177,41 +175,6 @@ def loses(name, seed, steps):
     held, spent = held[-1], spent[-1]
     assert done.ledger["friction"] == pytest.approx(spent, abs=1e-9 * (spent + held) + 1e-18)
     assert (np.abs(r.force) <= 0.3 * r.extra["normal_load"] + 1e-9 * LOAD).all()
-
-
-def test_exact_twins_of_the_points():
-    """Compiled points under a changing load against the laws of a bench."""
-    points, rng = load("friction.laws.elastic_plastic_kernels"), np.random.default_rng(3)
-    press_point = load("friction.bonds.point_kernels").press_point
-    law, other = Bonds(0.3, 1e-6, initial=0.4), ElasticPlastic(0.3, 1e-6)
-    bonds, springs = Recursion(law), other.start(np.array([2.0]))
-    state = bonds.start(np.array([2.0]))
-    one = np.array([0.8, 0.0, 0.0])
-    two, at = (0.0, 2.0), 2.0
-    for _ in range(200):
-        after = max(rng.normal() + 1.5, 0.0)
-        dq = rng.normal() * 1e-6
-        one = np.array(press_point(*one, at, after, 0.4, 1e-6))
-        assert one == pytest.approx(pressed(law, state.bonds, np.array([at]), np.array([after]))[:, 0], rel=1e-13)
-        state = bonds.press(state, np.array([at]), np.array([after])).state
-        two = points.press_springs(*two, after)
-        springs = other.press(springs, np.array([at]), np.array([after])).state
-        assert two == pytest.approx(springs[:, 0], rel=1e-13)
-        if after > 0:
-            mean = points.spring_mean(*two, after, dq, 1e-6)
-            near = points.spring_mean(*two, after, dq * (1 + 1e-6), 1e-6)
-            moved = other.step(springs, dq, np.array([after]), np.array([after]), 0.0)
-            assert 0.3 * mean[0] == pytest.approx(moved.mean[0], rel=1e-12, abs=1e-15)
-            assert mean[1] == pytest.approx((near[0] - mean[0]) / (dq * 1e-6), rel=1e-3, abs=1e-3)
-            end = points.spring_end(*two, after, dq, 1e-6)[0]
-            two = points.spring_step(*two, after, dq, 1e-6)
-            assert end == pytest.approx(two[0], rel=1e-14)
-            springs = moved.state
-            assert two == pytest.approx(springs[:, 0], rel=1e-12)
-            moved = bonds.step(state, dq, np.array([after]), np.array([after]), 0.0)
-            state = moved.state
-            one = state.bonds[:, 0]
-        at = after
 
 
 def test_exact_a_prescribed_load_is_a_bench_load_in_a_rig():

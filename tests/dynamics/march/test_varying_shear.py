@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scipy.optimize import root
 from varying_load_cases import LAWS, LOAD, MASS, balance, crowned, modes
 
+from patchfem.contact.unilateral import solve_forces
 from patchfem.core import BaseSine, PatchfemError, Start
 from patchfem.dynamics.march import march as plain
 from patchfem.dynamics.march import models, varying_load
@@ -38,7 +39,7 @@ def dense(basis, drive, law, sets, response, steps: int) -> tuple:
     table, beta = p.tables(drive, 0, steps), p.beta[0, 0]
     stiff = np.linalg.inv(giving(sets.x))
     motion = zip(-response.extra["heave"], response.extra["turn"])
-    loads = np.array([sets.at(d, t).forces(d, t) for d, t in motion])
+    loads = np.array([solve_forces(sets.c, sets.x, sets.opening - d + t * sets.x, np.zeros(0))[0] for d, t in motion])
     z = v = 0.0
     u, state, slides, forces = np.zeros(sets.x.size), law.start(loads[0]), [0.0], [0.0]
     bonds = isinstance(law, Recursion)

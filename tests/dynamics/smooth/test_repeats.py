@@ -56,17 +56,3 @@ def test_always_a_motion_that_still_grows_is_not_carried_on():
     run = Motion(one_mode(OMEGA, 1e-5, MASS), BaseSine(49.0, OMEGA), law_of("tanh"), 300, 1e-9)
     run.onward(300 * 2 * np.pi / OMEGA)
     assert run.unlike == 0 and run.time == 300 * 2 * np.pi / OMEGA
-
-
-@pytest.mark.parametrize("apart, left_out", [(0.0, True), (1e-6, False)])
-def test_always_a_motion_that_repeats_every_other_cycle_is_not_carried_on(apart, left_out, monkeypatch):
-    """Of extremes that go to and fro by a share of them from cycle to cycle."""
-    run, until = Motion(MODES, SINE, law_of("tanh"), 300, 1e-9), Motion.until
-
-    def uneven(time):
-        until(run, time)
-        run.kept.cycles[:2, 1::2] *= 1 + apart
-
-    monkeypatch.setattr(run, "until", uneven)
-    run.onward(300 * SINE.period)
-    assert (run.unlike > 0) == left_out

@@ -50,13 +50,6 @@ def test_always_no_step_of_a_stretch_list_creates_and_the_ledger_closes(reading,
     books_close(1, 6, reading, order, engine)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("engine", ENGINES)
-@pytest.mark.parametrize("reading, order", LAWS)
-def test_always_both_books_on_100_random_paths(reading, order, engine):
-    books_close(2, 100, reading, order, engine)
-
-
 @pytest.mark.share(0, 3, 6, 9, 11, 14, 17, 20)
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("reading, order", LAWS)

@@ -3,14 +3,10 @@
 import numpy as np
 import pytest
 from friction_paths import pulled, random_walk, sum_by_hand, triangle, upper_pressure, walk
-from hypothesis import given, settings
-from hypothesis import strategies as st
-from list_paths import empty_list, energy_by_hand, follow_list
+from list_paths import energy_by_hand, follow_list
 from scipy.special import gammainc
 
-from patchfem.friction.bonds import list_kernels, list_math_kernels
 from patchfem.friction.bonds.engines import choose
-from patchfem.friction.bonds.list_numbers import law_numbers, room, share_table
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.friction.bonds.recursion import Recursion
@@ -20,30 +16,6 @@ GROWTH = {"ratio": 0.6, "rest_growth": 0.3, "slip_growth": 0.4, "rest_speed": 1e
 
 
 # ---- functions of one number
-
-def test_exact_exponential_and_logarithm():
-    x = np.concatenate([np.linspace(-708, 709, 3001), np.linspace(-1, 1, 1001)])
-    assert max(abs(list_math_kernels.fexp(v) / np.exp(v) - 1) for v in x) < 1e-15
-    assert list_math_kernels.fexp(-1e300) == list_math_kernels.fexp(-708.0) < 1e-307
-    y = np.concatenate([np.geomspace(1e-300, 1e300, 3001), np.linspace(0.5, 2, 1001)])
-    assert max(abs(list_math_kernels.flog(v) - np.log(v)) / max(1, abs(np.log(v))) for v in y) < 1e-15
-    assert list_math_kernels.flog(0.0) < -709
-
-
-@pytest.mark.parametrize("a", [0.1, 0.5, 1.0, 1.5, 2.0, 3.7, 12.0, 60.0])
-def test_exact_gamma_p_is_scipy(a):
-    for x in np.concatenate([[0.0, 1e-300, 1e-12], np.geomspace(1e-6, 400, 60), [a, a + 1, a + 0.999999, 1e5]]):
-        assert list_math_kernels.gamma_p(a, x) == pytest.approx(gammainc(a, x), rel=5e-13, abs=1e-300)
-
-
-@pytest.mark.parametrize("p", [-0.9, -0.5, 0.0, 0.5, 1.0, 2.0, 5.5])
-def test_exact_share_and_its_table_are_scipy(p):
-    law = Bonds(1.0, 1.0, p, "report")
-    table, norm = share_table(law), law_numbers(law, 1.0, 0.0)[4]
-    for x in np.concatenate([[-1.0, 0.0], np.geomspace(1e-3, 100, 200), [1e3, 1e9]]):
-        want = gammainc(p + 1, max(x, 0.0))
-        assert list_math_kernels.share(p, x) == pytest.approx(want, rel=1e-10, abs=1e-15)
-        assert list_math_kernels.tabled(p, x, table, norm) == pytest.approx(want, abs=2e-8)
 
 
 # ---- direct: every bond
@@ -116,16 +88,6 @@ def test_exact_bonds_of_fractional_order_that_grew_at_rest(order, within):
     assert after[-1] == pytest.approx(gammainc(order + 1, 0.2), abs=within)
 
 
-def test_exact_direct_through_a_dwell_of_growing_bonds():
-    """After a rest the first new strip must grow from the healed length, not from before the rest."""
-    law = Bonds(1.0, 1.0, 1.0, "report", ratio=0.5, rest_growth=0.1, slip_growth=0.2, rest_speed=1e-2, initial=0.0)
-    path = np.concatenate([np.linspace(0, 2, 41), [2.0], 2 + np.linspace(0.0125, 0.5, 40)])
-    times = np.where(np.diff(path) == 0, 1.0, np.where(path[1:] > 2.001, 0.125, 0.5))
-    after = follow_list(law, path, times).after
-    for k in (41, 44, 60, 81):
-        assert after[k - 1] == pytest.approx(sum_by_hand(law, path[:k + 1], ONE, times[:k])[0], abs=1e-6)
-
-
 def test_exact_long_rests_of_growing_bonds_stay_finite():
     """10^6 e-folds of growth in one rest: scaled lengths are moved before they overflow; all bonds full-grown then."""
     law = Bonds(1.0, 1.0, 1.0, "report", ratio=0.5, rest_growth=1.0, slip_growth=0.2, rest_speed=1e-2, initial=0.0)
@@ -178,11 +140,6 @@ def test_exact_growing_bonds_of_a_nanometre_are_bounded_and_counted():
     law = Bonds(1.0, 1.0, 1.0, "report", ratio=0.5, rest_growth=1e9, slip_growth=0.05, rest_speed=1.0, initial=0.0)
     got = follow_list(law, np.array([0.0, 1e6, 0.0]), tail=1e-9)
     assert np.isfinite(got.after).all() and got.tally[10] <= 300 and got.tally[8] >= 4e6
-
-
-def test_refuses_strips_beyond_the_capacity():
-    held = empty_list(Bonds(1.0, 1.0, 0.0, "report"), capacity=3)
-    assert [list_kernels.list_step(dq, held, 0.0, 0.0, 1.0) for dq in (0.1, -0.1, 0.1, -0.1)] == [True] * 3 + [False]
 
 
 # ---- truncated
@@ -243,18 +200,3 @@ def test_always_merging_of_growing_bonds_keeps_its_bound_at_small_strokes(order,
     got, whole = follow_list(law, path, dt, chosen.merge), follow_list(law, path, dt)
     assert np.abs(got.after - whole.after).max() <= chosen.error
     assert got.tally[10] < 0.5 * whole.tally[10]
-
-
-@settings(settings.get_profile("costly"))
-@given(st.integers(0, 10**6), st.sampled_from([0.01, 0.1, 0.7]), st.sampled_from([0.0, 0.5, 2.0]))
-def test_always_merging_of_any_path_is_close(seed, size, order):
-    law = Bonds(1.0, 1.0, order, "stretch", initial=0.0)
-    path = random_walk(seed, 150, size)
-    got, whole = follow_list(law, path, 1.0, 0.05), follow_list(law, path)
-    assert np.abs(got.after - whole.after).max() <= 2e-3
-    assert np.abs(got.stored - whole.stored).max() <= 2e-3
-
-
-def test_exact_room_grows_with_the_inverse_width():
-    law = Bonds(1.0, 1.0, 2.0, "stretch")
-    assert room(law, 20.0, 0.02) < 2000 < room(law, 20.0, 0.001)

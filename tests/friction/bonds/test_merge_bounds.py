@@ -84,8 +84,3 @@ def worst_of(seed, count):
 
 def test_always_merging_keeps_its_bound_on_15_random_paths():
     assert worst_of(4, 15) < 1
-
-
-@pytest.mark.slow
-def test_always_merging_keeps_its_bound_on_300_random_paths():
-    assert worst_of(5, 300) < 1

@@ -134,12 +134,6 @@ def test_always_a_turned_path_turns_the_traction(seed, angle):
     turned(seed, angle)
 
 
-@pytest.mark.slow
-@given(st.integers(0, 10**6), st.floats(-4, 4))
-def test_always_each_of_many_turned_paths_turns_the_traction(seed, angle):
-    turned(seed, angle)
-
-
 def turned(seed: int, angle: float) -> None:
     """A random path of eight legs and the same turned by an angle: turned tractions, the same losses."""
     rng = np.random.default_rng(seed)
@@ -161,13 +155,6 @@ def test_exact_the_sum_is_the_state_on_random_polygons():
         other = along(Quadrature(GROWING, 0.0), path, dt=0.4, pressures=pressures)
         for a, b in zip(one[:4], other[:4]):
             assert a == pytest.approx(b, abs=1e-10)
-
-
-@pytest.mark.slow
-def test_exact_a_long_path_is_cut_within_its_tail():
-    path = circle(1.3, 80, 500)
-    whole, cut = (along(Quadrature(Bonds(1.0, 1.0), tail), path) for tail in (0.0, 1e-9))
-    assert cut[1] == pytest.approx(whole[1], abs=2e-9) and len(cut[4].path) < 400 < len(whole[4].path)
 
 
 def by_hand(law, path, dt):
@@ -237,12 +224,6 @@ def worst_gain(seed, paths, legs=24):
 def test_always_random_paths_take_energy():
     """100 paths of 4 points with steps in the pressure, lost contact and changing bond length."""
     work, dissipated, ledger = worst_gain(1, 100)
-    assert work >= -1e-12 and dissipated >= -1e-12 and ledger < 1e-12
-
-
-@pytest.mark.slow
-def test_always_twenty_thousand_random_paths_take_energy():
-    work, dissipated, ledger = worst_gain(2, 20_000)
     assert work >= -1e-12 and dissipated >= -1e-12 and ledger < 1e-12
 
 

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from friction_forms import virgin_force
 from friction_paths import lower_pressure, pulled, sum_by_hand, triangle, upper_pressure, walk
-from scipy.special import gammaincc
 
 from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.quadrature import Quadrature, cutoff
+from patchfem.friction.bonds.quadrature import Quadrature
 from patchfem.friction.bonds.strips import Strips
 
 ONE = upper_pressure([1.0, 0.25])
@@ -31,17 +30,6 @@ def test_exact_printed_law_on_random_paths(order, initial):
     run = pulled(Quadrature(law, tail=0.0), path, ONE)
     within = {-0.5: 0.05, 0.5: 1e-4}.get(order, 1e-8 if order == 3.7 else 1e-12)
     assert run.traction[-1] == pytest.approx(sum_by_hand(law, path, ONE), abs=within)
-
-
-@pytest.mark.parametrize("order", [-0.5, 0.5])
-def test_exact_printed_law_of_fractional_order_where_the_strips_are_old(order):
-    """After a slide far from every turn the kink has died out in the hand sum except in the newest strip, cut fine."""
-    law = Bonds(1.0, 1.0, order, "report", initial=0.0)
-    path = np.concatenate([random_path(4, 20), [1.0 + 1e-9]])
-    run = pulled(Quadrature(law, tail=0.0), path, ONE)
-    coarse, fine = (sum_by_hand(law, path, ONE, pieces=n)[0] for n in (400, 1600))
-    rate = 4.0**(order + 1)  # the hand sum's own error falls as h^(p+1)
-    assert run.traction[-1, 0] == pytest.approx((rate * fine - coarse) / (rate - 1), abs=2e-4 if order < 0 else 1e-7)
 
 
 @pytest.mark.parametrize("pressure", [ONE, lower_pressure(np.linspace(-2, 2, 5), 5.0, 1.5)])
@@ -89,22 +77,7 @@ def test_exact_readings_agree_without_a_reversal(order, sign):
     assert runs[1].traction[:, 0] == pytest.approx(sign * virgin_force(abs(path[1:]), 1.0, order, 0.7), abs=1e-12)
 
 
-def test_exact_readings_differ_after_a_reversal():
-    path = np.array([0.0, 2.0, 1.0])
-    stretch, report = (pulled(Quadrature(Bonds(1.0, 1.0, 1.0, r)), path, ONE).traction[-1, 0]
-                       for r in ("stretch", "report"))
-    assert report - stretch > 0.05  # u/|u| turns at once, the stretch first has to be undone
-
-
 # ---- Gauss strips
-
-def test_exact_gauss_strips_on_a_root():
-    """p = 0.5: the integrand starts as R^0.5, the weight of the points beside u = 0: exact for any strip length."""
-    for step in (0.2, 0.1, 0.05, 0.025):
-        law = Bonds(1.0, 1.0, 0.5, "stretch", initial=0.0)
-        path = np.linspace(0, 0.8, round(0.8 / step) + 1)
-        end = pulled(Quadrature(law, tail=0.0), path, ONE).traction[-1, 0]
-        assert end == pytest.approx(virgin_force(0.8, 1.0, 0.5, 0.0), abs=1e-8)
 
 
 @pytest.mark.parametrize("order", [2.0, 3.0])
@@ -124,16 +97,6 @@ def test_exact_printed_law_with_growing_bonds_at_steps_of_any_length(order):
         run = pulled(Quadrature(law, tail=0.0), path, ONE, dt=0.4 / parts)
         found, wanted = run.traction[-1, 0], sum_by_hand(law, path, ONE, 0.4 / parts)[0]
         assert found == pytest.approx(wanted, abs=2e-6 if order > -0.5 else 1e-4)
-
-
-@pytest.mark.parametrize("order", [0.0, 1.0])
-def test_exact_printed_law_pushes_back_while_it_heals(order):
-    """l_k = 1e-3, eps_k = 0.5: 0.5 while sliding; at rest 0.81606 and 0.93233 after one and two e-folds of healing."""
-    law = Bonds(1.0, 1.0, order, "report", ratio=0.5, rest_growth=10.0, slip_growth=1e-3, rest_speed=1.0)
-    path = np.concatenate([np.linspace(0, 20, 201), [20, 20]])
-    times = np.append(np.full(200, 1e-9), [0.1, 0.1])
-    force = pulled(Quadrature(law), path, upper_pressure([1.0]), times).traction[-3:, 0]
-    assert force == pytest.approx([0.5, 0.81606, 0.93233], abs=5e-4)
 
 
 @pytest.mark.share(0, 2, 4, 7, 9)
@@ -168,12 +131,6 @@ def test_always_the_cut_off_loses_less_than_its_bound(reading, order, growth):
         assert gap <= tail * 0.4 * 1.0
         if reading == "report" and not growth:
             assert gap > 0
-
-
-@pytest.mark.parametrize("order", [-0.5, 0.0, 1.0, 2.0])
-def test_exact_cut_off_is_the_tail_of_the_gamma_function(order):
-    for tail in (1e-3, 1e-6, 1e-9):
-        assert gammaincc(order + 1, cutoff(order, tail)) == pytest.approx(tail, rel=1e-9)
 
 
 # ---- far ends

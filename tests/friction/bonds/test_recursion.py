@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.quadrature import Quadrature
-from patchfem.friction.bonds.recursion import Recursion, advance, shape_functions
+from patchfem.friction.bonds.recursion import Recursion, advance
 
 GROWTH = [{}, {"ratio": 0.5, "rest_growth": 0.4, "slip_growth": 0.3, "rest_speed": 1e-2}]
 X = np.linspace(-3, 3, 7)
@@ -51,17 +51,6 @@ def test_exact_recursion_is_the_sum_over_bonds(piece, growth, seed):
     assert np.abs(fast.dissipated - slow.dissipated).max() <= 1e-10
 
 
-@pytest.mark.parametrize("piece", ["upper", "lower"])
-@pytest.mark.parametrize("growth", GROWTH)
-def test_exact_recursion_is_the_sum_written_out_by_hand(piece, growth):
-    rng = np.random.default_rng(7)
-    path = np.concatenate([[0], np.cumsum(rng.normal(0, 0.7, 50))])
-    law = Bonds(1.0, 1.0, initial=0.8, **growth)
-    run = walk(Recursion(law), path, pressures(piece), 0.5)
-    for k in (1, 9, 27, 50):
-        assert run.traction[k - 1] == pytest.approx(sum_by_hand(law, path[:k + 1], pressures(piece), 0.5), abs=1e-10)
-
-
 def test_exact_step_mean_is_the_average_along_the_step():
     """Means of whole steps against Gauss points on partial steps whose bonds are summed by hand."""
     law = Bonds(1.0, 1.0)
@@ -81,29 +70,6 @@ def test_exact_slope_is_the_derivative_of_the_mean():
         h = 1e-5 * abs(dq)
         slope = (advance(bonds, dq + h, sigma, 0.8)[1] - advance(bonds, dq - h, sigma, 0.8)[1]) / (2 * h)
         assert advance(bonds, dq, sigma, 0.8)[2] == pytest.approx(slope, rel=1e-6, abs=1e-8)
-
-
-def test_exact_shape_functions_across_their_switch():
-    x = np.array([0.0, 1e-12, 1e-6, 0.01, 0.029999, 0.030001, 0.5, 30.0])
-    f1, f2, e = shape_functions(x)
-    y, w = np.polynomial.legendre.leggauss(40)
-    part = (1 + y) / 2
-    assert f1 == pytest.approx(np.array([w / 2 @ np.exp(-xi * part) for xi in x]), rel=1e-14)
-    assert f2 == pytest.approx(np.array([w / 2 @ ((1 - part) * np.exp(-xi * part)) for xi in x]), rel=1e-13)
-    assert e == pytest.approx(np.exp(-x))
-
-
-def test_exact_step_may_be_split_at_constant_length():
-    law = Recursion(Bonds(0.3, 1.0, initial=0.5))
-    state = law.start(np.ones(1))
-    state = law.step(state, 0.7, np.ones(1), np.ones(1), 1.0).state
-    whole = law.step(state, -2.3, np.ones(1), np.ones(1), 1.0)
-    mean, spent = 0.0, 0.0
-    for _ in range(23):
-        part = law.step(state, -0.1, np.ones(1), np.ones(1), 1.0)
-        mean, spent, state = mean + part.mean[0] / 23, spent + part.dissipated[0], part.state
-    assert state.bonds == pytest.approx(whole.state.bonds, abs=1e-14)
-    assert (mean, spent) == pytest.approx((whole.mean[0], whole.dissipated[0]), abs=1e-13)
 
 
 # ---- passivity

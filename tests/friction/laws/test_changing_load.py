@@ -124,29 +124,6 @@ def test_order_work_of_coulomb_under_a_swinging_load(amplitude):
         assert (found.load == 0).any() and found.values["friction_ratio_peak"] == pytest.approx(0.3)
 
 
-@pytest.mark.slow
-def test_order_stretch_under_a_swinging_load_is_its_differential_equation():
-    """At v: m = N, z' = v (N - z/eps), s2' = v (2 z - s2/eps), the rule for a falling N in between: order 1."""
-    model = build(bench('law = "nonlocal"\nbond_length = "2 um"', CONSTANT, SWING))
-    time = np.linspace(0, 0.02, 400_001)
-    load, z, s2 = model.point.at(time), np.zeros(time.size), 0.0
-    x = 1e-3 * 0.5e-7 / 2e-6  # v dt/eps; lengths in eps, loads in N
-    for k in range(1, time.size):
-        mean, last = (load[k] + load[k - 1]) / 2, z[k - 1]
-        z[k] = mean + (last - mean) * np.exp(-x)
-        s2 += x * ((last + z[k]) - s2)
-        if load[k] < load[k - 1]:
-            keep = min(1.0, load[k] * s2 / z[k]**2)
-            keep *= min(1.0, load[k] / (keep * z[k]))
-            z[k], s2 = keep * z[k], keep * s2
-    errors = []
-    for steps in (50, 100, 200):
-        found = law_bench.run(model, None, steps)
-        errors.append(np.abs(found.force / 0.3 - np.interp(found.time, time, z)).max() / 100)
-        assert found.values["energy_balance"] <= 1e-13 and found.values["energy_created"] == 0
-    assert errors[2] <= 3e-3 and 1.8 <= errors[0] / errors[1] <= 2.2 and 1.8 <= errors[1] / errors[2] <= 2.2
-
-
 def test_exact_samples_hold_the_instants_without_load():
     model = build(bench('law = "coulomb"', CONSTANT, SWING.replace("40 N", "150 N")))
     time, slide = model.point.refined(model.slide, np.linspace(0, 0.02, 11), np.linspace(0, 2e-5, 11), 16)
@@ -155,15 +132,6 @@ def test_exact_samples_hold_the_instants_without_load():
     edges = edges[(edges > 0) & (edges < 0.02)]
     assert all(np.abs(time - edge).min() <= 1e-15 for edge in edges) and edges.size >= 11
     assert slide == pytest.approx(1e-3 * time, abs=1e-18) and (np.diff(time) > 0).all()
-
-
-@pytest.mark.slow
-def test_exact_a_scene_under_a_swinging_load_runs_with_errors():
-    result = run(plan(bench('law = "elastic-plastic"\nbond_length = "2 um"',
-                            'kind = "sine"\namplitude = "10 um"\nfrequency = "50 Hz"\ncycles = 3', SWING)))
-    assert all(m.error is not None for m in result.measures.values())
-    assert result.measures["normal_load"].value == 100
-    assert result.response.slide == pytest.approx(1e-5 * np.sin(2 * np.pi * 50 * result.response.time), abs=1e-18)
 
 
 def test_refuses_a_load_too_fast_to_resolve():

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scene_texts import COULOMB, POINT, SHEAR, SHORT, SLIDE, SMALL_PATCH
 from scipy.integrate import quad
-from scipy.special import gamma, gammainc
+from scipy.special import gamma
 
 from patchfem.core import PatchfemError
 from patchfem.friction.bonds.parameters import Bonds
@@ -67,34 +67,6 @@ def test_always_an_average_lies_between_nothing_and_the_largest_pressure(order, 
 
 # ---- C9, C10: edges and waves
 
-@pytest.mark.parametrize("width, want", [(5, (0.80134759, 0.60943313)), (10, (0.90000454, 0.80005448)),
-                                         (100, (0.99, 0.98))])
-@pytest.mark.parametrize("order", [0, 1])
-@pytest.mark.parametrize("way", [1.0, -1.0])
-def test_exact_c9_resultant_of_a_pad(width, want, order, way):
-    """Integral over the pad by Gauss points between enough cuts; uniform pressure on a few nodes."""
-    y, w = np.polynomial.legendre.leggauss(20)
-    cuts = np.linspace(0, width, 2 * width + 1)
-    places = (cuts[:-1, None] + (1 + y) / 2 * 0.5).ravel()
-    weight = np.tile(w / 4, 2 * width)
-    nodes = np.linspace(0, width, 7)
-    assert weight @ average(places, nodes, np.ones(7), way, 1.0, order) / width == pytest.approx(want[order], abs=1e-8)
-
-
-@pytest.mark.parametrize("order, length, size, degrees", [(0, 2.0, 0.9878867, -8.92705), (1, 2.0, 0.9759201, -17.85411),
-                                                         (1, 20.0, 0.2884004, -115.03673)])
-def test_exact_c10_transfer_of_a_wave(order, length, size, degrees):
-    """80 um wave of the pressure on a long straight-sided grid: (1 + i k eps)^-(p + 1), but for the nodes' own sinc."""
-    k, h = 2 * np.pi / 80, 0.05
-    nodes = np.arange(-40 * length, 80 + h / 2, h)
-    places = nodes[nodes >= 0][:-1:7]
-    wave = average(places, nodes, 2 + np.cos(k * nodes), 1.0, length, order) - 2
-    wave += 2 * (1 - gammainc(order + 1, (places - nodes[0]) / length))
-    found = np.linalg.lstsq(np.stack([np.cos(k * places), np.sin(k * places)], axis=1), wave, rcond=None)[0]
-    answer = complex(found[0], -found[1]) / np.sinc(k * h / 2 / np.pi)**2
-    assert abs(answer) == pytest.approx(size, abs=1e-6)
-    assert np.degrees(np.angle(answer)) == pytest.approx(degrees, abs=1e-4)
-
 
 # ---- the steady limit of 2.17
 
@@ -119,25 +91,6 @@ def test_exact_a_long_slide_over_a_pressure_below_settles_to_the_average(law, or
     assert (np.diff((sigma > 0).astype(int)) != 0).sum() >= 2
     assert (4 * fine - coarse) / 3 == pytest.approx(averaged.traction(end), abs=2e-6)
     assert np.abs(averaged.traction(end)).max() > 0.4
-
-
-def test_exact_the_recursion_comes_to_the_average_with_the_square_of_the_step():
-    """Away from edges: a smooth pressure that is straight between the knots of the path."""
-    nodes = np.linspace(0, 60, 121)
-    sigma = 1.5 + np.sin(nodes / 3)
-    inner = (nodes > 5) & (nodes < 35)
-    miss = []
-    for steps in (200, 400, 800):
-        path = np.linspace(0, 20, steps + 1)
-        engine = Recursion(Bonds(0.4, 1.0))
-        state = engine.start(sigma)
-        pressure = lower(nodes, sigma)
-        for a, b in pairwise(path):
-            state = engine.step(state, b - a, pressure(a), pressure(b), 1.0).state
-        averaged = Convolution(0.4, 1.0, 1.0, nodes, sigma)
-        end = averaged.step(averaged.start(sigma), 20.0, sigma, pressure(20.0), 1.0).state
-        miss.append(np.abs(engine.traction(state) - averaged.traction(end))[inner].max())
-    assert miss[0] < 2e-4 and miss[1:] == pytest.approx([miss[0] / 4, miss[0] / 16], rel=0.1)
 
 
 def test_exact_short_bonds_and_even_pressure_are_coulomb():
@@ -196,12 +149,6 @@ def bench_of(text, *sets, steps=64):
     return patch, bench.run(model, patch, steps, 4)
 
 
-def test_exact_one_point_is_coulomb():
-    _, one = bench_of(POINT + AVERAGED + SLIDE)
-    _, two = bench_of(POINT + COULOMB + SLIDE)
-    assert one.values == two.values and (one.force == two.force).all()
-
-
 def test_exact_one_point_under_a_changing_load_is_coulomb():
     sets = ["normal.amplitude=60 N", "normal.frequency=300 Hz"]
     dwell = '[slide]\nkind = "dwell"\nspeed = "5 mm/s"\ndistance = "20 um"\nhold = "5 ms"\ndistance_after = "20 um"\n'
@@ -222,18 +169,6 @@ def test_exact_force_of_a_patch_bench_is_the_resultant_of_the_average(order):
     assert found.force.max() < 0.97 * 0.3 * patch.pressure.load
     assert abs(found.force.max() + found.force.min()) > 1e-3 * found.force.max()
     assert found.values["energy_balance"] < 1e-12 and found.slip == pytest.approx(found.slide)
-
-
-@pytest.mark.slow
-def test_exact_a_long_nonlocal_bench_over_a_pressure_below_ends_at_the_average():
-    """Two laws of the same scene: after ten bond lengths 2.17 and the average agree but for steps and edges."""
-    slide = '[slide]\nkind = "constant"\nspeed = "1 mm/s"\ndistance = "1 mm"\n'
-    sets = ["contact.tilt.on=lower", "contact.tilt.angle=0.1 mrad", "friction.bond_length=80 um"]
-    patch, one = bench_of(SMALL_PATCH + AVERAGED + slide, *sets, steps=4000)
-    _, two = bench_of(SMALL_PATCH + AVERAGED.replace("convolution", "nonlocal") + slide, *sets, steps=4000)
-    assert one.force[-1] == pytest.approx(two.force[-1], rel=2e-4)
-    limit = 0.3 * patch.pressure.load
-    assert np.abs(one.tau[-1] - two.tau[-1]).max() < 5e-3 * one.tau[-1].max() and one.force[-1] < 0.99 * limit
 
 
 def test_exact_a_symmetric_block_on_a_rig_is_coulomb_with_the_limit_of_the_average():

@@ -2,12 +2,10 @@
 
 import numpy as np
 import pytest
-from law_runs import LOAD, bench_along, fitted, masses, rig, shrinking
-from march_paths import share_one_loop
+from law_runs import LOAD, bench_along, shrinking
 from scene_texts import COATED, DRIVE, MODE, mistakes, only
-from stepped_laws import SteppedIwan
 
-from patchfem.friction.laws.iwan import from_keys, largest, sliders
+from patchfem.friction.laws.iwan import largest, sliders
 from patchfem.scene.scene import loads
 
 LAW = 'law = "iwan"\nstatic = 0.31\nstiffness = "1.3e7 N/m"\nchi = -0.4\nbeta = 0.3\n'
@@ -69,51 +67,6 @@ def test_exact_a_bench_loop_is_the_density_itself():
     book = found.ledger
     assert book[0, -1] == pytest.approx(book[1, -1] + book[2, -1], rel=1e-12) and np.diff(book[2]).min() >= -1e-18
     assert not book[3].any()
-
-
-def test_exact_the_compiled_bench_is_the_plain_law():
-    time, slide = shrinking(60)
-    found, law, one = bench_along(LAW, time, slide), from_keys(loads_of(LAW), LOAD), np.full(1, LOAD)
-    law = SteppedIwan(law.stiffness, law.yield_slide)
-    state = law.start(one)
-    for k, dq in enumerate(np.diff(slide)):
-        step = law.step(state, dq, one, one, 1.0)
-        state = step.state
-        assert found.force[k + 1] == pytest.approx(law.traction(state)[0], abs=1e-10)
-        assert found.ledger[1, k + 1] == pytest.approx(law.stored(state)[0], abs=1e-16)
-        assert found.ledger[2, k + 1] - found.ledger[2, k] == pytest.approx(step.dissipated[0], abs=1e-16)
-
-
-def loads_of(law):
-    return loads('[normal]\nload = "100 N"\n[friction]\n' + law + '[slide]\nkind = "sine"\namplitude = "1 um"\n'
-                 'frequency = "1 Hz"\n').friction
-
-
-def test_exact_a_march_settles_on_the_harmonic_balance():
-    """Two engines that share nothing but the sliders, each within its own bars."""
-    marched, steady = rig(LAW), rig(LAW, "accuracy.method=harmonic")
-    assert marched.outcome.value == "steady"
-    for name in ("relative_displacement_amplitude", "friction_force_peak", "loop_area"):
-        a, b = marched.measures[name], steady.measures[name]
-        assert abs(a.value - b.value) <= a.error + b.error + 1e-3 * abs(b.value), name
-    assert marched.measures["energy_balance"].value < 1e-9
-    assert marched.measures["energy_created"].value <= 1e-12 * marched.measures["energy_dissipated"].value
-
-
-def test_exact_two_alike_interfaces_move_alike(monkeypatch):
-    share_one_loop(monkeypatch)
-    both = masses(LAW, 2)
-    slides, alone = both.response.extra["slides"], masses(LAW, 1).response.slide
-    assert slides[:, 0] == pytest.approx(slides[:, 1], abs=1e-12 * np.abs(slides).max())
-    assert slides[:, 0] == pytest.approx(alone, abs=1e-7 * np.abs(alone).max())
-
-
-def test_exact_a_fit_finds_the_numbers_of_a_loop(tmp_path):
-    time, slide = shrinking(60)
-    force = bench_along(LAW, time, slide).force
-    found = fitted(tmp_path, LAW.replace("0.31", "0.4").replace("-0.4", "-0.6"), (time, slide, force),
-                   "friction.static=0.1..0.7,friction.chi=-0.9..-0.1")
-    assert found.keys.fit.values == pytest.approx([0.31, -0.4], rel=1e-5)
 
 
 def test_refuses_what_the_law_cannot_do():

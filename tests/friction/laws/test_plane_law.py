@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from patchfem.friction.laws import elastic_plastic_kernels as line
 from patchfem.friction.laws import plane_kernels as plane
 
 K, MOST = 3e6, 2e-6
@@ -44,32 +43,6 @@ def test_exact_a_straight_slide_has_the_force_and_loss_of_the_rate_equations(see
     gained = 0.5 * K * (np.square(found[6:8]).sum() - stretch @ stretch)
     assert mean @ move == pytest.approx(gained + lost, rel=1e-8, abs=1e-9 * K * MOST**2)
     assert found[:2] @ move == pytest.approx(gained + found[8], rel=1e-12, abs=1e-13 * K * MOST**2)
-
-
-@pytest.mark.parametrize("seed", range(20))
-def test_exact_slopes_are_those_of_the_mean_force(seed):
-    draw = np.random.default_rng(seed)
-    stretch, move = MOST * draw.uniform(-0.7, 0.7, 2), MOST * draw.uniform(-3, 3, 2)
-    slopes = np.reshape(plane.along(K, MOST, *stretch, *move)[2:6], (2, 2))
-    h = 1e-5 * MOST
-    for k, step in enumerate(h * np.eye(2)):
-        up, down = (plane.along(K, MOST, *stretch, *(move + way * step))[:2] for way in (1, -1))
-        np.testing.assert_allclose(slopes[:, k], np.subtract(up, down) / (2 * h), rtol=0, atol=1e-7 * K)
-
-
-def test_exact_along_one_line_it_is_the_element_of_one_direction():
-    draw = np.random.default_rng(1)
-    unit = np.array([np.cos(0.5236), np.sin(0.5236)])
-    num, mem = np.array([[0.0, 1.0, K, MOST]] * 2), np.zeros((2, 4))
-    flat, past = np.array([[0.0, 1.0, K, MOST]]), np.zeros((1, 4))
-    for step in draw.uniform(-3, 3, 200) * MOST:
-        mean = plane.along(K, MOST, mem[0, 3], mem[1, 3], *(step * unit))[:2]
-        force = line.mean(flat, past, 0, 0.0, step, 0.0, 1.0)[0]
-        assert mean @ unit == pytest.approx(force, rel=1e-12, abs=1e-12 * K * MOST)
-        lost = plane.commit(num, mem, 0, 1, *(step * unit))
-        own = line.commit(flat, past, 0, step, force, 0.0, 0.0, 1.0, 0.0)
-        assert lost == pytest.approx(own, abs=1e-12 * K * MOST**2)
-        assert np.hypot(*mem[:, 3]) <= MOST * (1 + 1e-14)
 
 
 @pytest.mark.parametrize("seed", range(40))

@@ -102,20 +102,3 @@ def test_refuses_the_rate_law_behind_shear_and_without_its_speed():
         loads(patch.format('reference_speed = "1 mm/s"\n'))
     with pytest.raises(SceneError, match="reference_speed: missing"):
         loads(patch.format("").replace("[contact.shear]\n", ""))
-
-
-def test_exact_the_compiled_step_is_the_plain_one():
-    from march_paths import rate_model
-
-    from patchfem.dynamics.march.models import load_kernels
-
-    loops, model = load_kernels(None), rate_model(2.5, 1e-3)
-    contact = model.build()
-    path, dt = np.random.default_rng(5).normal(size=400).cumsum() * 1e-7, 1e-4
-    energies, forces = np.zeros((400, 2)), np.zeros((400, 3))
-    assert loops.follow_path(path, dt, model.kind, contact, 1e-12, energies, forces) == 0
-    law, one = Rate(2.5, 1e-3), np.ones(1)
-    plain = [law.step(one, move, one, one, dt) for move in np.diff(path)]
-    assert forces[:-1, 1] == pytest.approx(np.array([step.mean[0] for step in plain]), rel=1e-13, abs=1e-16)
-    assert energies[:-1, 0] == pytest.approx(np.array([step.dissipated[0] for step in plain]), rel=1e-13, abs=1e-22)
-    assert (energies[:-1, 0] >= 0).all()
