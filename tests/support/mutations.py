@@ -897,6 +897,7 @@ def main() -> None:
     words.add_argument("faults", type=Path)
     words.add_argument("results", type=Path)
     words.add_argument("--tests", nargs="+", default=["tests"])
+    words.add_argument("--without", nargs="*", default=[], help="folders of tests to leave out")
     words.add_argument(
         "--seconds", type=float, default=120.0, help="of tests without fault that a fault may cost"
     )
