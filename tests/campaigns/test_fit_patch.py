@@ -91,31 +91,24 @@ def test_exact_the_slip_force_is_that_of_the_load(table):
 
 
 def test_the_verb_prints_what_a_law_leaves_out(tmp_path, monkeypatch):
+    """The differences that are printed are those of the table of loops."""
     monkeypatch.chdir(tmp_path)
     (tmp_path / "bench.toml").write_text(JOINT + SLIDE)
     answer = cli("fit", "bench.toml", "--from-patch", "--amplitudes", "10 nm..200 nm:9", "-o", "out")
     assert answer.code == 0, answer.err
-    told = json.loads((tmp_path / "out/fit.json").read_text())
-    sizes = [told["laws"][told["law"]][part] for part in ("stiffness", "dissipation")]
-    for one, words in zip(sizes, ("by at most {} (at {}) and by {} rms", "law dissipates per cycle is up to {} ")):
-        largest, rms = (f"{plain(100 * abs(one[name]), 2)} %" for name in ("largest", "rms"))
-        assert words.format(largest, short(one["at"], "m", 3), rms) in answer.out
+    law = json.loads((tmp_path / "out/fit.json").read_text())["law"].replace("-", "")
     rows = np.genfromtxt(tmp_path / "out/fit.csv", delimiter=",", names=True)
-    law = told["law"].replace("-", "")
     for part, name, unit in (("stiffness", "force", "N"), ("energy loss per cycle", "loss", "J")):
-        own = rows[f"patch_{name}_{unit}"]  # no loss at 10 nm, where no element slips
+        own = rows[f"patch_{name}_{unit}"]  # there is no loss at 10 nm, where no element slips
         off = rows[f"{law}_{name}_{unit}"] / np.where(own > 0, own, np.nan) - 1
         k = np.nanargmax(np.abs(off))
         size, at = f"{'+' if off[k] > 0 else ''}{plain(100 * off[k], 2)} %", short(rows["slide_m"][k], "m", 3)
         assert f"{size} of the {part} (at {at})" in answer.out.split("\n")[0]
-    for word in ("9 amplitudes of the slide from 10 nm to 200 nm", "iwan", "bouc-wen", "elastic-plastic", "by at most",
-                 "A mesh coarser than the present one"):
-        assert word in answer.out
-    assert sorted(one.name for one in (tmp_path / "out").iterdir()) == [
-        "fit.csv", "fit.json", "fit.svg", "report.html", "scene.bouc-wen.toml", "scene.elastic-plastic.toml",
-        "scene.fitted.toml", "scene.iwan.toml"]
-    assert pf.run(tmp_path / "out/scene.fitted.toml").measures["friction_force_peak"].value == pytest.approx(
-        pf.run(JOINT + SLIDE).measures["friction_force_peak"].value, rel=1e-6)
+    assert {"scene.bouc-wen.toml", "scene.elastic-plastic.toml", "scene.iwan.toml"} <= {
+        one.name for one in (tmp_path / "out").iterdir()}
+    fitted, patch = (pf.run(one).measures["friction_force_peak"].value
+                     for one in (tmp_path / "out/scene.fitted.toml", JOINT + SLIDE))
+    assert fitted == pytest.approx(patch, rel=1e-6)
     assert cli("fit", "bench.toml", "--from-patch", "-o", "out").code == 0  # its own folder is replaced
 
 

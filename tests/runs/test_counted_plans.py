@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from patchfem.dynamics.march import march
 from patchfem.model.patch import turned
 from patchfem.runs.plan import plan
 from patchfem.runs.rig.lists import list_cost
@@ -96,19 +95,6 @@ cycles = {cycles}
 [accuracy]
 tolerance = 0.01
 """
-
-
-@pytest.fixture
-def counted(monkeypatch):
-    """Steps of all marches, and strips [1] at the end of each of them."""
-    seen, old = {"steps": 0}, march.Run._steps
-
-    def steps(self, count, rows):
-        seen["steps"] += count
-        return old(self, count, rows)
-
-    monkeypatch.setattr(march.Run, "_steps", steps)
-    return seen
 
 
 def test_always_the_list_of_a_block_that_is_pushed_once_is_foreseen():

@@ -98,10 +98,6 @@ def test_always_the_peak_of_a_random_rig_is_within_its_bars(seed):
     assert [one for one in outside(seed) if one[1] > 1] == []
 
 
-def mode(f):
-    return 1 / np.abs(1 - f**2 + 0.02j * f)
-
-
 def test_exact_a_stuck_curve_has_the_peak_of_its_held_structure():
     """patchfem new damper under 100 kN: the platform stays on its spring, and the force meets one receptance."""
     text = text_of("damper")

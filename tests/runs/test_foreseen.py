@@ -6,19 +6,16 @@ import sys
 import tracemalloc
 from dataclasses import replace
 
-import numpy as np
 import plan_trial
 import pytest
 from scene_texts import BENCH, COULOMB, MODE, PATCH, POINT, STRUCTURE
 
-from patchfem import rates
 from patchfem.core import Missing
 from patchfem.runs import memory, run
 from patchfem.runs.plan import UP_TO, plan, refuse_size
 from patchfem.runs.rig import costs
 from patchfem.runs.rig.numerics import choose
-from patchfem.scene.scene import load, loads
-from patchfem.scene.starting import text_of
+from patchfem.scene.scene import loads
 
 TANH = COULOMB.replace("coulomb", "tanh") + 'reference_speed = "1 mm/s"\n'
 RIG = POINT + TANH + STRUCTURE
@@ -149,59 +146,3 @@ def test_always_a_random_run_keeps_as_many_samples_as_are_foreseen():
     kept = costs.kept_samples(choose(found.model))
     assert run.run(found).window.time.size == pytest.approx(kept, rel=0.01)
     assert 1e9 < planned(SHAKEN.format(60)).bytes < 2e9
-
-
-NINE = ["accuracy.harmonics=9"]
-OTHER = {"": "", "iwan": "chi = -0.5\nbeta = 0.5\n", "bouc-wen": "", "tanh": 'reference_speed = "10 mm/s"\n'}
-BLADE = """[structure]
-output_mass = 2
-[structure.reduced]
-stiffness = "b.npz"
-mass = "b.npz"
-damping = "b.npz"
-boundary = [10, 40]
-modes = 8
-[[structure.interface]]
-between = [1, 0]
-law = "elastic-plastic"
-static = 0.3
-stiffness = "10 N/um"
-load = "100 N"
-[drive]
-kind = "force"
-waveform = "sweep"
-from = "180 Hz"
-to = "260 Hz"
-rate = "1 Hz/s"
-force = "12 N"
-mass = 2
-[accuracy]
-method = "harmonic"
-tolerance = 1e-2
-"""
-
-
-@pytest.mark.parametrize("kind, law, sets, took", [
-    ("damper", "", [], 0.55), ("damper", "", NINE, 3.1), ("damper", "iwan", [], 1.5), ("damper", "iwan", NINE, 2.85),
-    ("damper", "bouc-wen", [], 26.5), ("damper", "tanh", [], 1.75), ("shroud", "", [], 0.35), ("shroud", "", NINE, 1.3),
-    ("beam", "", [], 0.9), ("blade", "", [], 2.4), ("blade", "", NINE, 6.3), ("blade", "iwan", [], 13.9),
-    ("blade", "tanh", [], 75.9), ("blade", "bouc-wen", [], 233.0)])
-def test_always_curves_of_many_laws_and_modes_are_foreseen_within_3(tmp_path, kind, law, sets, took):
-    """CPU seconds of the run on the machine of the table; the last from a tenth of its curve. Ten modes of a law that
-    flows were said to take 51 s, the beam 25 s."""
-    k = 2e7 * (2 * np.eye(40) - np.eye(40, k=1) - np.eye(40, k=-1))
-    k[-1, -1] = 2e7
-    np.savez(tmp_path / "b.npz", K=k, M=0.02 * np.eye(40), C=2e-6 * k + 0.01 * np.eye(40))
-    text = BLADE if kind == "blade" else text_of(kind)
-    if kind == "beam":
-        text = text[:text.index("[drive]")] + BLADE[BLADE.index("[drive]"):].replace("mass = 2\n", "").replace(
-            "180", "135").replace("260", "155")
-    elif kind != "blade":
-        text = text[:text.index("\n[sweep]")] + text[text.index("\n[accuracy]"):]
-    if law:
-        text = text.replace('law = "elastic-plastic"', f'law = "{law}"\n{OTHER[law]}'.rstrip())
-        others = ('stiffness = "70 ', 'stiffness = "10 ') if law == "tanh" else ()
-        text = "".join(line for line in text.splitlines(True) if not line.startswith(others))
-    (tmp_path / "a.toml").write_text(text)
-    found = plan(load(tmp_path / "a.toml", sets=sets))
-    assert 1 / 3 < found.seconds / (took + rates.START) < 3

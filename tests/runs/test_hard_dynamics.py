@@ -5,7 +5,6 @@ from math import asin, cos, pi, sin
 
 import numpy as np
 import pytest
-from march_paths import share_one_loop
 from scene_texts import PIECE
 from scipy.optimize import brentq
 
@@ -48,16 +47,6 @@ def base(acceleration, cycles, ratio=1.0):
 @lru_cache(maxsize=64)
 def result_of(text, *sets, estimate=True):
     return run(plan(loads(text, "a.toml", sets)), estimate=estimate)
-
-
-@pytest.fixture(params=[True, pytest.param(False, marks=pytest.mark.slow)], ids=["shared loop", "own loop"])
-def loop(request, monkeypatch):
-    """Joints march in the loop that knows all laws; in slow tests in the one of theirs alone, 7 s to compile."""
-    if request.param:
-        share_one_loop(monkeypatch)
-    result_of.cache_clear()
-    yield
-    result_of.cache_clear()
 
 
 def value(result, name="relative_displacement_amplitude"):
@@ -142,55 +131,6 @@ def test_exact_below_the_resonance_threshold():
     rise = (value(long) - value(short)) / 600 * W**2 / (30.0 / d)
     assert rise == pytest.approx(pi - 4 * d, rel=1e-2)
     balanced(long, 1e-10)
-
-
-def test_exact_two_contacts_stop_together(loop):
-    """Two alike masses on alike interfaces, a spring between them: each is the single mass, stops and all."""
-    k = W * W
-    text = f"""\
-[structure]
-masses = ["1 kg", "1 kg"]
-[[structure.spring]]
-between = [1, 0]
-stiffness = "{k!r} N/m"
-[[structure.spring]]
-between = [2, 0]
-stiffness = "{k!r} N/m"
-[[structure.spring]]
-between = [1, 2]
-stiffness = "7e4 N/m"
-[[structure.damper]]
-between = [1, 0]
-coefficient = "{2 * 0.003 * W!r} N s/m"
-[[structure.damper]]
-between = [2, 0]
-coefficient = "{2 * 0.003 * W!r} N s/m"
-[[structure.interface]]
-between = [1, 0]
-law = "coulomb"
-static = 0.3
-load = "100 N"
-[[structure.interface]]
-between = [2, 0]
-law = "coulomb"
-static = 0.3
-load = "100 N"
-[drive]
-{base(37.5, 60)}
-"""
-    one = result_of(rig("static = 0.3", base(37.5, 60)))
-    both = result_of(text)
-    for name in ("relative_displacement_amplitude", "slip_amplitude", "loop_area", "stick_fraction",
-                 "friction_force_peak"):
-        assert value(both, name) == pytest.approx(value(one, name), rel=1e-10), name
-        other = {"relative_displacement_amplitude": "slip_amplitude"}.get(name, name)
-        assert value(both, f"{other}_2") == pytest.approx(value(one, other), rel=1e-10), name
-    assert value(both, "energy_dissipated") == pytest.approx(2 * value(one, "energy_dissipated"), rel=1e-10)
-    balanced(both, 1e-10)
-    marched = result_of(text, "accuracy.method=march")
-    balanced(marched, 1e-8)
-    for name in ("relative_displacement_amplitude", "slip_amplitude_2", "loop_area", "loop_area_2"):
-        close(marched, name, value(both, name))
 
 
 def test_exact_friction_far_above_and_far_below_the_drive():

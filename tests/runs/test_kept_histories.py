@@ -99,32 +99,6 @@ def test_always_a_release_is_kept_evenly_all_along(done, engine):
     assert np.abs(middle - straight).max() < 2e-2 * np.abs(r.output).max()
 
 
-@pytest.mark.parametrize("engine", ["exact", "exact two modes", "march coulomb", "march plastic", "march bonds"])
-def test_always_every_stop_and_release_is_kept(done, engine):
-    """Of the exact engine each event of its list; of a march, those of a run whose window is the whole run."""
-    _, result = done(engine, "sine")
-    period = result.plan.model.rig.drive.period
-    r, events = result.response, result.extra["events"]
-    gaps = np.array([np.abs(r.time - t).min() for t in events.time])
-    if engine.startswith("exact"):
-        assert gaps.max() <= 1e-12
-        return
-    step = result.extra["steps_per_cycle"]
-    from patchfem.response.events import detected
-    from patchfem.response.run_events import slips_of
-
-    short = loads(ENGINES[engine] + SINE.replace("cycles = 30", "cycles = 5"),
-                  sets=["accuracy.method=march", f"accuracy.steps_per_cycle={step}"])
-    whole = run(plan(short), estimate=False)
-    # the first cycles are kept whole in the short run: the same steps of the same motion
-    slips, slides = slips_of(whole.response)
-    seen = detected(whole.response.time[-2 * step - 1:], slips[-2 * step - 1:], slides[-2 * step - 1:], period)
-    stops = seen.time[np.isin(seen.kind, (0, 1, 2))]
-    assert stops.size >= 4
-    apart = np.array([np.abs(r.time - t).min() for t in stops])
-    assert apart.max() <= 1.6 * period / step
-
-
 def test_exact_how_runs_end():
     """A release of a rubbing block sticks; without friction it comes to rest or has not yet; a sweep never is steady
     and never grows, whatever its amplitude does; nothing moves under a drive too small."""

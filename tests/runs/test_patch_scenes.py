@@ -177,12 +177,11 @@ def meshed(folder, lower, upper) -> str:
 
 def test_exact_pieces_of_unlike_nodes_carry_the_load_to_both_bodies(tmp_path):
     coarse, fine = (graded_grid(LENGTH, HEIGHT, LENGTH / cells) for cells in (60, 96))
-    found = scene(TILT.format(1e-4), meshed(tmp_path, coarse, fine), path=tmp_path / "scene.toml")
-    low, high = bodies_of(build(found).patch)
-    patch = solve(build(found).patch, low, high)
-    assert patch.pair.joint is not None and low.x.size == 61 and high.x.size == 97
-    weight = patch.pieces.interface.weight
-    forces = patch.pair.forces(patch.pressure.sigma_n * weight)
+    found = build(scene(TILT.format(1e-4), meshed(tmp_path, coarse, fine), path=tmp_path / "scene.toml")).patch
+    low, high = bodies_of(found)
+    patch = solve(found, low, high)
+    assert patch.pair.joint is not None and (low.x.size, high.x.size) == (61, 97)
+    forces = patch.pair.forces(patch.pressure.sigma_n * patch.pieces.interface.weight)
     for body, force in zip((low, high), forces):
         assert force.sum() == pytest.approx(LOAD, rel=1e-10) and force.size == body.x.size
         assert force @ body.x == pytest.approx(patch.pressure.moment, rel=1e-9)
@@ -190,15 +189,6 @@ def test_exact_pieces_of_unlike_nodes_carry_the_load_to_both_bodies(tmp_path):
     mine = values(patch)
     for name in ("approach", "normal_stiffness", "tangential_stiffness", "pressure_centre"):
         assert mine[name] == pytest.approx(same[name], rel=0.02), name
-    result = run(plan(found), estimate=False)
-    from patchfem.export.fields.bodies import write_fields
-    from patchfem.export.fields.series import Series
-
-    write_fields(result, tmp_path / "fields.vtkhdf")
-    with Series(tmp_path) as series:  # the interface stands at the places of the pressure, on neither piece's nodes
-        line = series.frame().blocks["interface"]
-    assert np.array_equal(line.points[:, 0], result.patch.x) and not np.isin(result.patch.x, high.x).all()
-    assert np.array_equal(line.point_data["normal_stress"], result.patch.pressure.sigma_n.astype(np.float32))
 
 
 UNLIKE = '[contact.upper]\nsubstrate = "Ti-8Al-1Mo-1V"\nheight = "{}"\n'

@@ -12,8 +12,6 @@ from patchfem.friction.bonds.parameters import Bonds
 from patchfem.friction.bonds.recursion import Recursion
 from patchfem.model.model import build
 from patchfem.runs.bench import bench as law_bench
-from patchfem.runs.bench.ledger import UNWATCHED
-from patchfem.runs.bench.stepped import stepped
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
@@ -55,26 +53,6 @@ def test_exact_c14_circle_of_a_bench_scene(table, radius, size, lag):
     assert -np.degrees(np.angle(force / motion)) == pytest.approx(lag, abs=2e-3)
     assert found.values["energy_balance"] < 1e-12 and found.yaw_moment is None
     assert model.speed == pytest.approx(2e-6 * np.pi * radius, rel=1e-4)
-
-
-@pytest.mark.share(0, 2, 3)
-@pytest.mark.parametrize("keys", ["", "order = 0\n", 'reading = "report"\norder = 2\n',
-                                  'kinetic = 0.2\nrest_growth = "10 m/s^2"\nslip_growth = "1 um"\n'])
-def test_exact_a_column_of_zeros_is_the_slide_in_one_direction(table, keys):
-    rows = [(0, 0), (2, 10), (6, -10), (8, 0)]
-    plain = "time [ms],displacement [um]\n" + "".join(f"{t},{x}\n" for t, x in rows)
-    zeros = "lateral [mm],time [ms],displacement [um]\n" + "".join(f"0,{t},{x}\n" for t, x in rows)
-    model = build(table(plain, POINT + LONGER + keys))
-    fast, one = law_bench.run(model, None, 200), stepped(model, None, *model.slide.samples(200)[:2], 0, UNWATCHED)
-    two = law_bench.run(build(table(zeros, POINT + LONGER + keys)), None, 200)
-    assert fast.lateral_force is None and not two.lateral_force.any()
-    assert two.force == pytest.approx(one.force, rel=1e-9, abs=1e-9 * one.force.max())
-    assert two.slip == pytest.approx(one.slip, rel=1e-9, abs=1e-15)
-    assert two.ledger == pytest.approx(one.ledger, rel=1e-9, abs=1e-12)
-    bound = 1e-9 + fast.engine.choice.error  # what the compiled sum may lose of the friction limit
-    assert fast.force == pytest.approx(two.force, abs=bound * 0.3 * fast.load[0])
-    assert fast.ledger == pytest.approx(two.ledger, abs=bound * np.abs(np.diff(two.ledger[0])).sum())
-    assert fast.values.keys() == two.values.keys()
 
 
 @pytest.mark.parametrize("strips", ["", STRIPS])

@@ -153,32 +153,27 @@ def test_exact_resolved_scene_is_the_scene(done, name):
 @pytest.mark.parametrize("name", SCENES)
 def test_exact_netcdf(done, name):
     folder, answer = done(name)
-    data, kind = netcdf(folder), name.split()[0]
-    for variable in data.variables.values():
-        if variable.dtype.kind == "f":
-            assert "units" in variable.attrs
-    if kind != "patch":
-        wanted = {"relative_displacement": "m", "relative_velocity": "m s-1"}
-        if kind != "linear":
-            wanted |= {"friction_force": "N", "normal_load": "N"}
-        if kind != "bench":
-            wanted |= {"absolute_acceleration": "m s-2", "base_acceleration": "m s-2", "modal_coordinate": "m"}
-            assert data.modal_coordinate.dims == ("time", "mode") and list(data.mode.values) == ["axial"]
-        assert {key: data[key].attrs["units"] for key in wanted} == wanted
-        assert (np.diff(data.time) > 0).all() and data.time[0] == 0
-    assert data.attrs["Conventions"].startswith("CF-") and data.attrs["outcome"] == json.loads(answer.out)["outcome"]
-    text = json.dumps(data.attrs)
-    assert str(folder.parent) not in text and socket.gethostname() not in text.replace("localhost", "")
+    data, kind, summary = netcdf(folder), name.split()[0], json.loads(answer.out)
+    assert all("units" in variable.attrs for variable in data.variables.values() if variable.dtype.kind == "f")
+    wanted = {"relative_displacement": "m", "relative_velocity": "m s-1"} if kind != "patch" else {}
+    if kind in ("bench", "rig"):
+        wanted |= {"friction_force": "N", "normal_load": "N"}
+    if kind in ("linear", "rig"):
+        wanted |= {"absolute_acceleration": "m s-2", "base_acceleration": "m s-2", "modal_coordinate": "m"}
+        assert data.modal_coordinate.dims == ("time", "mode") and list(data.mode.values) == ["axial"]
     if name in WITH_FIELDS:
-        units = {"weight": "m2", "normal_stress": "Pa", "gap": "m"}
-        assert {key: data[key].attrs["units"] for key in units} == units
+        wanted |= {"weight": "m2", "normal_stress": "Pa", "gap": "m"}
         np.testing.assert_allclose((data.weight * data.normal_stress).sum("x"), LOAD, rtol=1e-10)
         assert float(data.weight.sum()) == pytest.approx(WIDTH * 0.0127, rel=1e-12)
-        assert (data.normal_stress >= 0).all() and (data.gap >= 0).all()
-        assert float((data.normal_stress * data.gap).max()) == 0.0
+        assert (data.normal_stress >= 0).all() and (data.gap >= 0).all() and not (data.normal_stress * data.gap).any()
         centre = float((data.x * data.weight * data.normal_stress).sum("x")[0]) / LOAD
-        assert centre == pytest.approx(json.loads(answer.out)["measures"]["pressure_centre"]["value"], rel=1e-9)
+        assert centre == pytest.approx(summary["measures"]["pressure_centre"]["value"], rel=1e-9)
         assert ((data.status == 0) == (data.normal_stress == 0)).all()
+    assert {key: data[key].attrs["units"] for key in wanted} == wanted
+    assert kind == "patch" or ((np.diff(data.time) > 0).all() and data.time[0] == 0)
+    assert data.attrs["Conventions"].startswith("CF-") and data.attrs["outcome"] == summary["outcome"]
+    text = json.dumps(data.attrs)
+    assert str(folder.parent) not in text and socket.gethostname() not in text.replace("localhost", "")
 
 
 @pytest.mark.parametrize("name", ["rig", "rig march", "rig patch", "linear"])

@@ -10,7 +10,6 @@ from patchfem.runs.rig.numerics import choose
 SCENE = POINT + NONLOCAL.replace("1 um", "5 um") + MODE + DRIVE.replace("frequency", 'waveform = "sine"\nfrequency')
 GROWTH = 'bond_length = "5 um"\nkinetic = 0.2\nrest_growth = "10 m/s^2"\nslip_growth = "0.2 um"'
 LENGTH = 'bond_length = "5 um"'
-SLIP = ("slip_start_phase", "stick_fraction")
 
 
 def engine(text, **keys):

@@ -115,11 +115,18 @@ def test_exact_a_slide_that_does_not_repeat_is_one_cycle(slide, path):
         assert found.value == pytest.approx(KAPPA * LOAD * path * CYCLES, rel=1e-12 if contact == TILTED else 0.06)
 
 
-def test_exact_files_hold_the_way_of_the_wear(tmp_path):
-    scene = tmp_path / "worn.toml"
+@pytest.fixture(scope="module")
+def worn_folder(tmp_path_factory):
+    """The results folder of a worn bench."""
+    scene = tmp_path_factory.mktemp("worn") / "worn.toml"
     scene.write_text(TILTED + COULOMB + SINE + WEAR)
-    assert cli("run", scene, "-o", tmp_path / "out", "-q").code == 0
-    with xr.open_dataset(tmp_path / "out" / "result.nc", engine="h5netcdf") as data:
+    answer = cli("run", scene, "-o", scene.parent / "out", "-q")
+    assert answer.code == 0, answer.err
+    return scene.parent / "out"
+
+
+def test_exact_files_hold_the_way_of_the_wear(worn_folder):
+    with xr.open_dataset(worn_folder / "result.nc", engine="h5netcdf") as data:
         load = (data.weight * data.normal_stress).sum("x")
         assert load.values == pytest.approx(LOAD, rel=1e-10)
         depth = data.worn_depth.values
@@ -130,13 +137,10 @@ def test_exact_files_hold_the_way_of_the_wear(tmp_path):
         assert (np.diff(data.frame_time.values) > 0).all()
 
 
-def test_exact_bodies_close_over_the_worn_gap_in_every_frame(tmp_path):
-    """What separates both interfaces changes from frame to frame as the gap that remains, less what was worn off."""
-    scene = tmp_path / "worn.toml"
-    scene.write_text(TILTED + COULOMB + SINE + WEAR)
-    assert cli("run", scene, "-o", tmp_path / "out", "-q").code == 0
-    with h5py.File(tmp_path / "out" / "fields.vtkhdf") as file, \
-            xr.open_dataset(tmp_path / "out" / "result.nc", engine="h5netcdf") as data:
+def test_exact_bodies_close_over_the_worn_gap_in_every_frame(worn_folder):
+    """The distance of both interfaces changes from frame to frame as the remaining gap less the worn depth."""
+    with h5py.File(worn_folder / "fields.vtkhdf") as file, \
+            xr.open_dataset(worn_folder / "result.nc", engine="h5netcdf") as data:
         frames, nodes = data.gap.shape
         sides = []
         for body in (file["VTKHDF/lower"], file["VTKHDF/upper"]):

@@ -97,19 +97,6 @@ def test_always_a_batch_that_is_contradicted_is_exact(monkeypatch):
     np.testing.assert_array_equal(found.values["loop_area"], ones.values["loop_area"])
 
 
-def test_exact_a_stick_shorter_than_a_step_counts():
-    """Bonds that turn over by a slide far shorter than that of a step stick while their stretch passes the middle."""
-    base = base_of(load(SCENE.format(law=LAWS["nonlocal"])))
-    cases = [build(base.changed(["normal.load=0.03 N", f"friction.bond_length={length!r} m"]))
-             for length in np.geomspace(3e-8, 3e-7, 64).tolist()]
-    found = many.answers(cases)
-    some = [case for case in (0, 31, 63) if found.numerics[case]["engine"] == "lanes"]
-    stick, ones = found.values["stick_fraction"], one_by_one.solve([cases[case] for case in some])
-    assert len(some) == 3 and (stick / 2 < 1 / min(found.numerics[case]["steps_per_cycle"] for case in some)).all()
-    np.testing.assert_allclose(stick[some], ones.values["stick_fraction"], rtol=2e-3)
-    np.testing.assert_allclose(np.diff(np.log(stick)), np.log(10) / 63 / 2, rtol=0.3)  # as the root of the length
-
-
 @pytest.mark.parametrize("law", EXACT[:3])
 def test_exact_what_sticks_is_told_by_lanes(law):
     """Cases that end stuck, with their rings: the answers of the exact batch within the bars, and no measure less."""
@@ -130,18 +117,6 @@ def test_always_cases_have_the_errors_of_single_runs_of_the_same_values():
         error = lanes.bars(runs[0], coarser)[lanes.AMPLITUDE]
         alone = convergence_errors(*({name: float(row[0]) for name, row in one.items()} for one in [runs[0], *coarser]))
         assert error[0] == pytest.approx(alone[lanes.AMPLITUDE]) and np.isinf(error[1]) and error[2] == 0.0
-
-
-def test_exact_a_yield_that_settles_across_the_end_of_a_cycle_is_found():
-    """While this motion settles, a yield moves from before the end of a cycle to behind it. What slips is that of a run
-    from event to event, and of an integration of its own with 16 000 steps a cycle: 7.02523e-7 m."""
-    base = base_of(load(SCENE.format(law='law = "elastic-plastic"\nstatic = 0.3\nstiffness = "338512.6754077899 N/m"')))
-    sets = {"normal.load": 100.0, "structure.moving_mass": 1.0, "structure.mode.axial.frequency": 37.354702012424916,
-            "structure.mode.axial.damping": 0.01749691725399936, "drive.frequency": 100.0, "drive.cycles": 1000,
-            "accuracy.tolerance": 0.01}
-    levels = [0.7745493775532992, *np.geomspace(5, 60, 71).tolist()]
-    found = run_many([build(base.changed(assignments(sets | {"drive.acceleration": one}))) for one in levels])
-    assert found.values["slip_amplitude"][0] == pytest.approx(7.025228e-7, rel=1e-5)
 
 
 def test_exact_where_a_motion_that_will_yield_no_more_goes_is_within_its_bar():

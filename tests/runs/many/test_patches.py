@@ -15,7 +15,7 @@ from patchfem.scene import scene
 TEXT = PIECE + '{}load = "{} N"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING + "{}\n[accuracy]\ntolerance = 1e-2\n"
 TILT, LINE = '[contact.tilt]\nangle = "{} rad"\n', '[contact.load_line]\noffset = "{} m"\n'
 SKIN = '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e14 Pa/m"\ntangential_ratio = 0.8\n'
-HOLDER, CROWN = '[contact.holder]\nrotational_stiffness = "100 N m/rad"\n', '[contact.crown]\nradius = "2 m"\n'
+HOLDER = '[contact.holder]\nrotational_stiffness = "100 N m/rad"\n'
 PEAK = 1e-11  # of the pressure at an end of bare pieces, the mean over a cell of a micron: 1.5e-12 was seen
 PINNED = 'element_size = "0.2 mm"\n'  # no mesh has to be chosen
 

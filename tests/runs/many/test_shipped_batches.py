@@ -24,7 +24,6 @@ SCENES = {"rig": RIG.replace("tolerance = 1e-2", "tolerance = 1e-3"),
           "jenkins": PIECES + '[contact.shear]\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n' + MOVED + CLOSE,
           "static": PIECES + CLOSE, "crowned": PIECES + '[contact.crown]\nradius = "5 m"\n' + CLOSE}
 BATCHES = {"rig": "gathered", "jenkins": "lumped.tabled", "static": "patches", "crowned": "patches"}
-APART, OUTSIDE = 0.01, 0.001  # most of the cases, and of the measures, that lie outside
 
 
 def models(kind: str, seed: int, count: int) -> list:
