@@ -1,15 +1,20 @@
 """Backbones of scenes: three ways beside each other and beside closed forms."""
 
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from scene_texts import IWAN, shaken
+from scene_texts import IWAN, JOINT_SHAKEN, shaken
 from scipy.integrate import solve_ivp
 
 import patchfem as pf
 from patchfem.campaigns.backbone.bench_loops import run_loop, settle_loop
 from patchfem.campaigns.backbone.curves import backbone
 from patchfem.campaigns.backbone.joint import build_joint
+from patchfem.campaigns.backbone.notes import note_differences
+from patchfem.campaigns.backbone.records import Curve
+from patchfem.runs.rig.engines import ENGINES
 
 PLASTIC = 'law = "elastic-plastic"\nbond_length = "1 mm"'
 OMEGA = 200 * np.pi
@@ -24,6 +29,16 @@ def segalman(u):
     r, scale = u / 2.7e-3, 30 / (0.5 + 1 / 3)
     force = scale * (1.5 * r - r**1.5 / 1.5)
     return force, 8 * scale * 2.7e-3 * (0.75 * r**2 - r**2.5 / 3.75) - 4 * u * force
+
+
+def test_exact_methods_that_differ_by_more_than_their_value_differ_by_a_factor():
+    """"by 9.6e+03 %" stood there for a damping ratio that was 97 times as large."""
+    a, f, z, none = np.array([1e-6, 1e-5]), np.array([100.0, 90.0]), np.array([1e-3, 2e-3]), np.zeros(2)
+    balance = Curve(a, f, none, z, none, none)
+    decay = balance._replace(frequency=f * [1, 1.5], damping=z * [97, 1])
+    frequency, damping = note_differences({"balance": balance, "decay": decay})
+    assert "frequency by decay and by balance differ most at the amplitude 10 um, by 50 %: a decay" in frequency
+    assert "differ most at the amplitude 1 um, where the value by decay is 97 times the value by" in damping
 
 
 def test_exact_the_static_curve_of_an_iwan_joint_is_segalmans():
@@ -179,6 +194,21 @@ def test_a_decay_behind_a_stiff_contact_lasts_some_swings_in_slip():
     assert found.damping[-1] == pytest.approx(0.002 + lost, rel=0.02)
 
 
+def test_a_long_decay_is_told_before_it_begins(monkeypatch):
+    """50 cycles that take a second tell 40 s of the further ones; nothing is told of a short one."""
+    told, run = [], ENGINES["piecewise"].run
+    backbone(model(PLASTIC, **{"structure.mode.axial.damping": 1e-3}), "", [1e-5, 1e-3], ("decay",), told.append)
+    assert told == ["decay"]
+    monkeypatch.setattr(type(ENGINES["piecewise"]), "run", property(lambda engine: lambda *given: (
+        replace(run(*given), seconds=given[0].rig.cycles / 50))))
+    told.clear()
+    backbone(model(PLASTIC, **{"structure.mode.axial.damping": 1e-3}), "", [1e-5, 1e-3], ("decay",), told.append)
+    assert told[0] == "decay" and len(told) > 1
+    for said in told[1:]:
+        cycles = int(said.split()[2])
+        assert cycles >= 500 and said == f"decay over {cycles} cycles: about {cycles / 25:.2g} s of computing time"
+
+
 def test_amplitudes_stay_within_the_stop():
     stopped = pf.build(shaken(IWAN).replace("moving_mass", 'travel = "0.2 mm"\nmoving_mass'))
     found = backbone(stopped, methods=("decay", "quasi-static"))
@@ -305,8 +335,6 @@ def test_a_decay_in_which_another_mode_rings_is_not_given_as_that_of_this_mode()
     assert balance.amplitude.size == a.size and decay.amplitude == pytest.approx(a[4:])
     assert decay.damping == pytest.approx(balance.damping[4:], rel=0.04) and (decay.other_modes > 0.01).all()
     assert any("fallen to 11 mm, the motion of other modes is more than 10 % of its am" in one for one in found.notes)
-    found = backbone(pf.build(NEAR), "yaw", a[2:], ("balance", "decay"))
-    assert any("is not known at 5 of 5 amplitudes" in one for one in found.notes)
 
 
 CROWNED = """\
@@ -339,6 +367,26 @@ def test_always_the_mesh_is_in_the_bars_of_micro_slip():
     assert coarse.exponents.micro is None
     assert any("the exponent of micro-slip cannot be determined" in note for note in coarse.notes)
     assert any("higher than the frequencies by balance" in note for note in fine.notes)
+
+BEHIND_BONDS = JOINT_SHAKEN.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "100 um"').replace(
+    "kinetic = 0.2\n", "").replace("damping = 0.01", "damping = 0.05")
+
+FEW = "[contact.shear]", 'element_size = "6 mm"\n[contact.shear]'
+
+
+def test_errors_say_what_they_leave_out_of_the_mesh():
+    """Bonds behind pieces that give way have no steady loop: their errors hold the change on a coarser mesh, and where
+    there is none, no error of the mesh."""
+    a = [1e-6, 2e-6]
+    found, few = (backbone(pf.build(one), "", a, ("decay",)) for one in (BEHIND_BONDS, BEHIND_BONDS.replace(*FEW)))
+    (said,), (unmeshed, bare) = ([note for note in one.notes if "the errors of" in note] for one in (found, few))
+    assert said.startswith("the errors of method decay include the change on a coarser mesh, but not the energy that")
+    assert said.endswith("because the hysteresis loop of this friction law is not known without a computation in time")
+    assert unmeshed.endswith("too few elements for a coarser mesh; leave out contact.element_size")
+    assert bare.startswith("the errors of method decay include no error of the mesh, because the hysteresis loop of")
+    assert (found.curves["decay"].frequency_error > few.curves["decay"].frequency_error).all()
+    plain = backbone(pf.build(JOINT_SHAKEN.replace("kinetic = 0.2\n", "")), "", a, ("balance",))
+    assert plain.curves and not any("the errors of" in note for note in plain.notes)
 
 
 def test_the_held_frequency_is_that_of_the_stiffness_which_a_run_prints():
@@ -374,6 +422,13 @@ def test_a_loop_that_remembers_is_read_when_it_has_settled():
     assert abs(found.run.values[name] / many[name] - 1) < 2e-3
 
 
+def test_bonds_without_a_closed_loop_name_the_method_that_works():
+    bonds = model('law = "nonlocal"\nreading = "stretch"\norder = 2\nbond_length = "1 um"')
+    (said,) = backbone(bonds, "", [3e-7], ("balance",)).missing.values()
+    assert said.endswith("; use --method quasi-static")
+    assert not backbone(bonds, "", [3e-7], ("quasi-static",)).missing
+
+
 def test_a_static_curve_ends_where_its_force_falls():
     """An interlock gives way at a quarter of its wave: 20 um of 80."""
     bonded = '[structure.bonded]\nstiffness = "4.6e6 N/m"\nwavelength = "80 um"\n[[structure.mode]]'
@@ -381,6 +436,12 @@ def test_a_static_curve_ends_where_its_force_falls():
     found = backbone(pf.build(scene), "", np.array([5e-6, 1e-5, 1.5e-5, 5e-5]), ("quasi-static",))
     assert found.curves["quasi-static"].amplitude.size == 3 and "curve does not reach these" in found.notes[0]
     assert found.frequencies.free == pytest.approx(np.sqrt(OMEGA**2 + 9.2e6) / (2 * np.pi))
+
+
+def test_a_linear_mode_that_does_not_swing_has_no_curve():
+    scene = shaken(PLASTIC)[shaken(PLASTIC).index("[structure]"):].replace("0.002", "1.5")
+    found = backbone(pf.build(scene))
+    assert not found.curves and "ratio is 1 or more" in found.missing["decay"]
 
 
 def test_python_gives_a_dataset():

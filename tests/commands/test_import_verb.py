@@ -86,7 +86,7 @@ def test_exact_a_band_keeps_the_mode_in_it_and_its_damping(shaken, tmp_path):
 
 def test_exact_the_response_written_is_read_by_structure_file(shaken, tmp_path):
     """Its modes carry the window's damping, which the record does not."""
-    answer = cli("import", shaken, "-o", tmp_path / "response.uff", "--segment", "2 s")
+    answer = cli("import", shaken, "-o", tmp_path / "response.uff", "--segment", "1 s")
     assert answer.code == 0 and "window hann" in answer.out, answer.err
     kinds = [one["func_type"] for one in pyuff.UFF(str(tmp_path / "response.uff")).read_sets() if one["type"] == 58]
     assert kinds == [4, 6]

@@ -40,22 +40,6 @@ def test_exact_the_least_squares_are_those_of_the_dear_model():
     assert np.square(off(dear(BOX.values(u)))).sum() > 1.01 * best.rms**2 * DATA.size
 
 
-def test_exact_the_touching_model_has_the_slopes_of_the_dear_one():
-    models, u = TwoModels(cheap, dear, off, BOX), np.array([0.3, 0.6])
-    model, step = models._tangent(u), 1e-6
-    for i in range(2):
-        beside = u + step * (np.arange(2) == i)
-        slope, own = (((one(BOX.values(beside)) - one(BOX.values(u))) / step) for one in (model, dear))
-        np.testing.assert_allclose(slope, own, atol=1e-3 * np.abs(own).max())
-
-
-def test_always_a_share_of_nothing_is_a_sum():
-    """A cheap model that is 0 in a row, as the damping of a joint that sticks."""
-    models = TwoModels(lambda values: cheap(values) * [[1.0], [0.0]], dear, off, BOX)
-    u = np.array([0.3, 0.6])
-    np.testing.assert_allclose(models.touching(u, dear(BOX.values(u)))(BOX.values(u)), dear(BOX.values(u)))
-
-
 def test_refuses_a_dear_model_that_fails_everywhere():
     def failing(values):
         raise PatchfemError("no motion")

@@ -11,11 +11,11 @@ import patchfem as pf
 from patchfem.campaigns.backbone.curves import backbone
 from patchfem.response.decay_curve import (
     curve_of,
-    last_swing,
     of_turns,
     turns,
     turns_from_outside,
 )
+from patchfem.runs.rig.decays import left_by_mesh
 
 RELEASED = DRIVE[:DRIVE.index('kind')] + 'kind = "free"\ndisplacement = "2 mm"\ncycles = 30\n'
 
@@ -34,24 +34,6 @@ def viscous(zeta: float, omega: float, samples: int):
     lam = complex(-zeta * omega, omega * np.sqrt(1 - zeta**2))
     y = np.exp(lam * t)
     return t, y.real, (lam * y).real
-
-
-def test_exact_the_last_swing_is_the_last_whole_cycle_from_turn_to_turn():
-    """Of a viscous decay the turns are known: places e^(-zeta omega t) (1 - zeta^2)^(1/2) at times k pi/own. A small
-    fast mode beside it makes no turns; a rest has its range in the last period, fewer turns than three have none."""
-    zeta, omega = 0.01, 300.0
-    own, period = omega * np.sqrt(1 - zeta**2), 2 * np.pi / omega
-    t, y, v = viscous(zeta, omega, 4000)
-    at = (np.arctan2(-zeta, np.sqrt(1 - zeta**2)) + np.pi * np.arange(1, 90)) / own
-    last = at[at < t[-1]][-3:]
-    places = np.exp(-zeta * omega * last) * np.cos(own * last)
-    assert last_swing(t, y, v, period) == pytest.approx((places[0] - places[1]) / 2 * np.sign(places[0]), rel=1e-6)
-    assert last_swing(t, y, v, period) < 0.6 * np.ptp(y[t > t[-1] - 10 * period]) / 2  # ten begin larger
-    fast = 0.02 * y[-1] * np.cos(4000 * t), -80 * y[-1] * np.sin(4000 * t)
-    found = last_swing(t, y + fast[0], v + fast[1], period)
-    assert found == pytest.approx(last_swing(t, y, v, period), rel=0.05)
-    assert last_swing(t, np.where(t < 0.5, y, 0.2), np.where(t < 0.5, v, 0.0), period) == 0
-    assert last_swing(t, np.exp(-t), -np.exp(-t), period) is None
 
 
 def test_exact_a_release_has_the_amplitude_of_its_last_whole_cycle():
@@ -84,18 +66,6 @@ def test_exact_at_its_points_a_curve_is_itself_and_outside_there_is_none():
     wider = there.widened(there, there._replace(damping=there.damping + np.array([1.0, np.nan, 0.0])))
     assert wider.damping_error == pytest.approx(there.damping_error + np.array([1.0, np.inf, 0.0]))
     assert np.isnan(curve_of(of_turns(np.arange(3.0), np.array([1.0, -0.5, 0.2]))).over([0.3]).damping).all()
-
-
-def test_exact_a_block_on_rigid_friction():
-    """h = F/k: half swings 2 (A - h), 2 (A - 3 h) ...: the decrement over two of them is ln((A + 2 h)/(A - 2 h)), and
-    the loss of a cycle over 2 pi times its energy, 2 h/(pi A), lies inside the interval."""
-    h, k = 0.01, np.arange(30)
-    found = curve_of(of_turns(np.pi * k, (-1.0)**k * (1 - 2 * h * k)))
-    a = found.amplitude
-    fall = np.log((a + 2 * h) / (a - 2 * h)) / 2
-    assert found.damping == pytest.approx(fall / np.hypot(np.pi, fall), rel=1e-9)
-    assert (np.abs(found.damping - 2 * h / (np.pi * a)) < found.damping_error)[1:].all()
-    assert found.frequency == pytest.approx(1 / (2 * np.pi), rel=1e-12)
 
 
 def test_always_intervals_hold_a_loss_that_bends_with_the_amplitude():
@@ -276,6 +246,16 @@ def test_a_release_says_what_its_errors_leave_out_of_the_mesh():
     assert note.endswith("because the hysteresis loop of this friction law is not known without a computation in time")
     assert np.isfinite(result.extra["decay"].damping_error).any()
     assert not [one for one in pf.run(CROWNED, **{"drive.cycles": 10}).notes if one.startswith("the errors of")]
+
+
+@pytest.mark.parametrize("old, new, why", [
+    ("[contact.shear]", '[contact.shear]\n[contact.grooves]\nwavelength = "80 um"\namplitude = "2 um"',
+     "the contact slides on grooves"),
+    ("slide = 1.0", "slide = 1.0\nnormal = 0.1", "the normal load changes")])
+def test_where_no_static_loop_tells_the_error_of_the_mesh_there_is_a_reason(old, new, why):
+    scene = CROWNED.replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"').replace(old, new, 1)
+    error, said = left_by_mesh(pf.build(scene), None, None, np.array([1e-7, 1e-6]), int)
+    assert said == why and not error.any()
 
 
 @pytest.mark.parametrize("begin", [0.0, 100.0])

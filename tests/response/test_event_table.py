@@ -48,16 +48,6 @@ def test_exact_a_slip_below_the_bound_is_no_event():
     assert detected(time, 0 * slip[:, None], slip[:, None], 1.0).time.size == 0
 
 
-def test_exact_borders_of_the_drive_and_two_interfaces_in_order():
-    time, slip = stick_slip()
-    found = detected(time, np.stack([slip, np.roll(slip, 100)], axis=1), np.stack([slip, slip], axis=1), 1.0,
-                     borders=(1.5, 7.0))
-    assert np.all(np.diff(found.time) >= 0) and set(found.interface) == {0, 1, 2}
-    border = found.kind == events.BORDER
-    assert found.time[border].tolist() == [1.5] and found.interface[border].tolist() == [0]
-    assert np.isnan(found.slide[border]).all() and np.isfinite(found.slide[~border]).all()
-
-
 @given(st.floats(0.05, 0.4), st.floats(0, 1.3), st.floats(1.6, 3))
 def test_always_the_sticks_and_the_time_of_slip_fill_the_window(rest, begin, end):
     time, slip = stick_slip(rest=rest)

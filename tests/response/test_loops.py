@@ -11,7 +11,6 @@ from scene_texts import COULOMB, DRIVE, MODE, POINT
 
 from patchfem.response import loops
 from patchfem.response.measures import harmonic
-from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
@@ -113,19 +112,6 @@ def test_exact_secant_where_the_force_jumps(rest, fall):
     assert loops.half_range(turns) == pytest.approx(1.0, abs=2e-4)  # samples alone, without rates
 
 
-@pytest.mark.parametrize("early", [0.1, 0.4, 0.7, 0.95])
-def test_exact_secant_where_a_cubic_overshoots_a_rest(early):
-    """A slide that stops inside a step: the cubic through its rates overshoots the rest, whose own force, 0.123, is
-    neither side of the jump. early: of a step, from the stop to the first sample at rest."""
-    phase = 2 * pi * (np.arange(3 * 400 + 1) + early) / 400 - 1.0 - np.mod(pi - 0.2 - 1.0, 2 * pi / 400)
-    turn, part = np.divmod(phase, pi)
-    way, angle = 1 - 2 * (turn % 2), part * pi / (pi - 0.2)
-    rate = np.where(angle < pi, way * np.sin(angle), -1e-18 * way) * pi / (pi - 0.2) * OMEGA
-    force = np.where(angle < pi, way * np.where(angle < pi / 2, 1.0, 0.6), way * 0.123)
-    turns = loops.turns_of(phase / OMEGA, -way * np.cos(np.minimum(angle, pi)), rate, force, PERIOD, "jumps")
-    assert loops.secant_stiffness(turns) * loops.half_range(turns) == pytest.approx(-0.2, abs=1e-9)
-
-
 @pytest.mark.parametrize("early", [0.05, 0.3, 0.5, 0.8])
 @pytest.mark.parametrize("length", [1e-4, 1e-3, 2.0])
 def test_exact_secant_of_a_reversal_that_no_step_resolves(length, early):
@@ -177,7 +163,7 @@ def dense(done, begin: float, samples: int = 20_000) -> np.ndarray:
 def test_exact_range_and_drift_of_an_exact_run(more, drive):
     """A ring-up, sliding through and sticking: the last cycles by the engine's series at 20 000 instants a cycle. Both
     bars hold; they did not while A came from Gauss nodes and the drift from a mean of uneven samples."""
-    done = run(plan(loads(BLOCK.format(more=more, drive=drive, cycles=21))))
+    done = run(loads(BLOCK.format(more=more, drive=drive, cycles=21)))
     slides = [dense(done, begin) for begin in (19, 20)]
     drift, damping = done.measures["drift_per_cycle"], done.measures["equivalent_damping"]
     rough = 1e-8 * np.ptp(slides[0]) * 1e-3  # of the midpoint rule across stops: 1/20000^2

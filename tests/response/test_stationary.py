@@ -28,21 +28,6 @@ def test_exact_spectra_are_those_of_scipy():
     assert np.all((found.frequency[inside] >= drive.band[0]) & (found.frequency[inside] <= drive.band[1]))
 
 
-def test_exact_a_blurred_peak_is_the_integral_over_the_correlation_of_the_window():
-    omega, zeta, span = 60.0, 0.03, 1.7
-
-    def tapered(t):
-        x = t / span
-        correlation = (1 - x) * (2 + np.cos(2 * np.pi * x)) / 3 + np.sin(2 * np.pi * x) / (2 * np.pi)
-        own = omega * np.sqrt(1 - zeta**2)
-        return correlation * np.exp(-zeta * omega * t) * np.sin(own * t) / own
-
-    for f in (7.0, 9.5, 13.0):
-        real, imaginary = (quad(lambda t: tapered(t) * of(2 * np.pi * f * t), 0, span, limit=400)[0]  # noqa: B023
-                           for of in (np.cos, np.sin))
-        assert stationary.blurred(np.array([f]), omega, zeta, span)[0] == pytest.approx(real - 1j * imaginary, rel=1e-9)
-
-
 @pytest.mark.parametrize("zeta", [0.003, 0.05, 0.6])
 @pytest.mark.parametrize("band", [(20.0, 300.0), (90.0, 110.0), (150.0, 400.0)])
 def test_exact_root_mean_squares_in_closed_form_are_integrals(zeta, band):

@@ -125,7 +125,7 @@ def test_exact_the_bar_holds_the_error_of_the_sum(keys, slide):
     """Against the sum over every bond, nothing merged or cut off, at four times the steps."""
     sets = ["accuracy.tolerance=1e-2", "accuracy.quadrature=merged", "accuracy.steps_per_cycle=400"]
     model = model_of(BONDS + keys, slide, *sets)
-    found = run(plan(model))
+    found = run(model)
     choice = found.response.engine.choice
     assert choice.engine == "merged" and choice.merge > 0
     assert found.measures["friction_force_peak"].error >= choice.error * 30
@@ -144,7 +144,7 @@ def test_exact_the_bar_holds_the_error_of_the_sum(keys, slide):
                                         (EXACT["tanh"], PATCH + 'on = "lower"\n')])
 def test_always_the_done_share_grows_to_one(law, where):
     told = []
-    run(plan(model_of(law, "sine", "accuracy.steps_per_cycle=6000", where=where)), progress=told.append,
+    run(model_of(law, "sine", "accuracy.steps_per_cycle=6000", where=where), progress=told.append,
         estimate=False)
     assert told[-1] == 1.0 and (np.diff([0.0, *told]) >= 0).all()
     assert len(told) >= (1 if law == EXACT["coulomb"] else 12000 // BLOCK)
@@ -159,7 +159,7 @@ def test_always_an_interrupt_ends_a_bench_between_two_blocks():
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run(plan(model_of(BONDS, "sine", "accuracy.steps_per_cycle=20000")), progress=stop)
+        run(model_of(BONDS, "sine", "accuracy.steps_per_cycle=20000"), progress=stop)
     assert told[-1] <= 0.5 + BLOCK / 40000
 
 

@@ -19,6 +19,16 @@ damping = 0.003
 slide = %r
 output = %r
 """
+
+SECOND = """\
+[[structure.mode]]
+name = "yaw"
+frequency = "%r Hz"
+damping = 0.003
+slide = %r
+output = %r
+base = 0.0
+"""
 SHEARED = """\
 [contact]
 length = "12.7 mm"
@@ -45,6 +55,26 @@ def test_exact_free_then_stuck_then_free(law):
     stuck = pf.plan(before + MODES % (STUCK, free["stuck_frequency"], 0.8, 0.9) + DRIVE).as_json()["modes"][0]
     assert stuck["free_frequency"] == pytest.approx(143.0, rel=1e-10) and stuck["name"] == "axial"
     assert stuck["stuck_frequency"] == pytest.approx(free["stuck_frequency"], rel=1e-12)
+
+
+def test_exact_two_modes_and_a_bonded_spring():
+    """The held shapes of two modes, given as measured, turn back into the free ones; the spring stays where it was."""
+    spring = '[structure.bonded]\nstiffness = "4e5 N/m"\n'
+    tail = POINT + friction_of("iwan") + spring + DRIVE
+    text = tail + MODES % ("", 143.0, 0.8, 0.9) + SECOND % (400.0, 0.5, -0.2)
+    free = pf.build(text).rig.modes
+    rows, k = free.interfaces, 1e7
+    square, shapes = np.linalg.eigh(np.diag(free.omega**2) + k * rows.T @ rows / free.mass)
+    f, slide, output, base = (np.sqrt(square) / (2 * np.pi)).tolist(), (rows[0] @ shapes).tolist(), \
+        (free.output @ shapes).tolist(), (free.base @ shapes).tolist()
+    held = MODES % (STUCK, f[0], slide[0], output[0]) + f"base = {base[0]!r}\n" + (
+        SECOND % (f[1], slide[1], output[1])).replace("base = 0.0", f"base = {base[1]!r}")
+    found = pf.build(tail + held).rig.modes
+    assert found.omega == pytest.approx(free.omega, rel=1e-10)
+    for name in ("slide", "output", "base"):
+        assert np.abs(getattr(found, name)) == pytest.approx(np.abs(getattr(free, name)), rel=1e-9)
+    listed = pf.plan(tail + held).as_json()["modes"]
+    assert [one["stuck_frequency"] for one in listed] == pytest.approx(f, rel=1e-10)
 
 
 def test_exact_several_interfaces_of_a_file(tmp_path):

@@ -14,7 +14,6 @@ from scene_texts import COATED, DRIVE, MODE, SLIDE, only
 
 from patchfem.dynamics.march import march
 from patchfem.effects import LAWS
-from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.rules.draft import LAWS as KEYS
 from patchfem.scene.scene import SceneError, loads
@@ -70,7 +69,7 @@ def reached(*_):
 def ran(scene) -> bool:
     """Whether a scene runs; a PatchfemError passes through."""
     try:
-        run(plan(scene), estimate=False)
+        run(scene, estimate=False)
     except Reached:
         return True
     return True

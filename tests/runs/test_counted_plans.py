@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 
-from patchfem.model.patch import turned
 from patchfem.runs.plan import plan
 from patchfem.runs.rig.lists import list_cost
 from patchfem.runs.rig.numerics import choose
@@ -40,20 +39,6 @@ cycles = 14
 [accuracy]
 tolerance = 0.003
 """
-
-
-@pytest.mark.parametrize("moment", [0.0, 0.1, 0.99, 1.01, 3.0, -3.0, 50.0])
-def test_exact_the_load_of_bars_that_a_moment_turns(moment):
-    """Beside bars one by one, whose slope is halved down to the moment; moment: over load * length/6."""
-    load, length = 3.0, 2.0
-    edges = np.linspace(-length / 2, length / 2, 40_001)
-    x, wide = (edges[1:] + edges[:-1]) / 2, edges[1] - edges[0]
-    low, high = 0.0, 1e4
-    for _ in range(60):
-        slope = (low + high) / 2
-        pressure = np.maximum(load / length + slope * x, 0.0)
-        low, high = (slope, high) if (pressure * x).sum() * wide < abs(moment) * load * length / 6 else (low, slope)
-    assert turned(load, moment * load * length / 6, length) == pytest.approx(pressure.sum() * wide, rel=1e-6)
 
 
 def test_always_a_moment_beside_an_approach_is_in_the_load_that_a_plan_counts_with():

@@ -5,12 +5,17 @@ frequency. The seeds from 71_000_000 on were drawn for no other use.
 """
 
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
 import patchfem as pf
+from patchfem.runs.rig import rig
+from patchfem.runs.rig.steady import curves
 from patchfem.scene.starting import text_of
+from patchfem.structure.drives import Sweep
 
 LAWS = ("none", "coulomb", "elastic-plastic", "chain", "iwan", "bouc-wen")
 FIRST, COUNT = 71_000_000, 30
@@ -144,3 +149,44 @@ def test_always_a_steady_run_tells_where_it_still_goes(seeds):
         else:
             told.append(abs(steady.value - truth.value) <= steady.error + truth.error)
     assert np.mean(told or [1]) >= (0.9 if len(told) > 9 else 1)
+
+
+def test_exact_a_run_that_checks_a_curve_looks_near_its_top_alone():
+    """Down to 0.8 of the peak and a quarter of that way beyond; another peak of that height, or a short curve, is
+    searched as a whole."""
+    f = np.linspace(50, 250, 201)
+    curve = {"frequency": f, "amplitude": 1 / (1 + ((f - 140) / 10)**2)}
+    near = curves.around_the_top(sweep := Sweep(50.0, 250.0, 10.0), curve, 140.0)
+    assert (near.low, near.high, near.duration) == pytest.approx((131.0, 149.0, 10.0)) and near.starts == curves.FEW
+    back = curves.around_the_top(Sweep(250.0, 50.0, 10.0), {name: each[::-1] for name, each in curve.items()}, 140.0)
+    assert (back.low, back.high) == pytest.approx((149.0, 131.0))
+    two = curve | {"amplitude": curve["amplitude"] + 0.85 / (1 + ((f - 220) / 5)**2)}
+    assert curves.around_the_top(sweep, two, 140.0) is None
+    assert curves.around_the_top(sweep, curve | {"amplitude": np.ones(201)}, 140.0) is None
+
+
+def test_a_curve_that_is_checked_near_its_top_has_the_errors_of_a_whole_one(monkeypatch):
+    law, text, low, high, force = scene(71_000_008)
+    assert law == "iwan"
+    text += f'[drive]\nkind = "force"\nwaveform = "sweep"\nfrom = "{low!r} Hz"\nto = "{high!r} Hz"\n' \
+        f'rate = "1 Hz/s"\n{force}[accuracy]\nmethod = "harmonic"\n'
+    plain, own, taken = curves.around_the_top, rig._at_the_top, []
+
+    def told(*given):
+        taken.append(own(*given))
+        return taken[-1]
+
+    def beside(drive, curve, at):  # a neighbourhood whose largest lies at its end
+        near = plain(drive, curve, at)
+        return replace(near, low=at + 0.3 * (near.high - at))
+
+    monkeypatch.setattr(rig, "_at_the_top", told)
+    near = pf.run(text).measures
+    assert taken and None not in taken
+    taken.clear()
+    monkeypatch.setattr(curves, "around_the_top", beside)
+    whole = pf.run(text).measures
+    assert taken and set(taken) == {None}
+    for name in (*MAIN, "peak_frequency"):
+        assert near[name].value == whole[name].value
+        assert near[name].error == pytest.approx(whole[name].error, rel=0.5)

@@ -3,7 +3,6 @@
 
 import numpy as np
 import pytest
-from event_run import steady
 
 import patchfem as pf
 
@@ -54,16 +53,6 @@ def test_exact_a_linear_curve_is_the_sum_of_its_modes():
     assert top == pytest.approx(0.9 * LEVEL / (2 * ZETA * (2 * np.pi * 143)**2), rel=1e-4)
     peak = found.measures["peak_frequency"]
     assert abs(peak.value - 143 * np.sqrt(1 - 2 * ZETA**2)) < peak.error < 0.2
-
-
-def test_exact_a_linear_curve_is_that_of_the_event_map():
-    found = pf.run(RIG)
-    modes, curve = found.plan.model.rig.modes, found.extra["curve"]
-    for k in (0, int(np.argmax(curve["amplitude"])), -1):
-        sine = pf.core.BaseSine(LEVEL, 2 * np.pi * curve["frequency"][k])
-        other = steady(modes, sine, np.zeros(1), np.zeros(1))
-        assert curve["amplitude"][k] == pytest.approx(other.amplitude, rel=1e-9)
-        assert curve["multiplier"][k] == pytest.approx(np.abs(other.multipliers).max(), rel=1e-9)
 
 
 def test_always_an_undamped_mode_has_a_hole_in_its_curve():

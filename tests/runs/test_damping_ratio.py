@@ -68,16 +68,6 @@ def test_exact_the_scale_of_a_mode_does_not_enter(law, method):
     assert scaled.measures["equivalent_damping"].value == pytest.approx(ratio(scaled), rel=2e-3)
 
 
-@pytest.mark.parametrize("law", LAWS)
-def test_exact_a_batch_gives_the_ratio_of_single_runs(law):
-    models = [pf.build(loads(scene(law, slide=SLIDE, drive=f'acceleration = "{level} g"\ncycles = 30')))
-              for level in (2, 3)]
-    found = pf.run_many(models)
-    for k, model in enumerate(models):
-        alone = pf.run(model).measures["equivalent_damping"]
-        assert found.values["equivalent_damping"][k] == pytest.approx(alone.value, abs=2 * alone.error + 1e-12)
-
-
 def test_exact_another_mode_that_slides_leaves_no_ratio():
     """At 110 Hz a mode of 300 Hz that slides as much carries some tenths of the slide; one of 0.001 does not."""
     second = '[[structure.mode]]\nname = "second"\nfrequency = "300 Hz"\ndamping = 0.02\nslide = {}\nbase = 0.9\n'
@@ -90,15 +80,3 @@ def test_exact_another_mode_that_slides_leaves_no_ratio():
     assert none.value is None and none.reason == \
         f"this measure is that of mode 1, but another mode contributes {100 * share:.2g} % of the slide"
     assert alone.measures["equivalent_damping"].value == pytest.approx(ratio(alone), rel=2e-3)
-
-
-def test_always_a_mode_that_slides_unseen_is_noted():
-    second = '[[structure.mode]]\nname = "second"\nfrequency = "300 Hz"\ndamping = 0.02\nslide = 0.5\n{}'
-    said = "mode 'second' does not move the output point (`output` is 0 by default)"
-    assert loads(scene("coulomb", more=second.format(""))).notes == \
-        (f"{said}, and the base motion does not drive this mode (`base` is 0 by default)",)
-    assert loads(scene("coulomb", more=second.format("base = 0.0"))).notes == (said,)
-    result = pf.run(loads(scene("coulomb", more=second.format("base = 0.0"))))
-    assert said in result.notes
-    for written in ("output = 0.0", "output = 0.3", "gauge = 0.2"):
-        assert loads(scene("coulomb", more=second.format(written))).notes == ()

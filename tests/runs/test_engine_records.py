@@ -36,14 +36,3 @@ def test_exact_the_march_takes_all_that_others_lack():
         assert lacking("march", m) == ""
         if m.varies or m.spring:
             assert all([*reasons(m), lacking("smooth", m)])
-
-
-def test_exact_what_has_no_solution_between_events_is_named():
-    ep, coulomb, tanh = (Friction(law=law, static=0.3) for law in ("elastic-plastic", "coulomb", "tanh"))
-    for laws, soft in (([], ""), ([coulomb], ""), ([coulomb], "[contact.shear]"), ([ep], ""), ([ep], "a holder")):
-        assert "" in reasons(Motion(laws, [soft] * len(laws), "", False, "", SINE))
-    for m, said in ((Motion([tanh], [""], "", False, "", SINE), "for law 'tanh'"),
-                    (Motion([ep], [""], "", True, "", SINE), "with strips that yaw"),
-                    (Motion([coulomb], [""], "", True, "", LEVELS), "with strips that yaw and waveform 'levels'"),
-                    (Motion([coulomb], [""], "", False, "[normal.grooves]", SINE), "with [normal.grooves]")):
-        assert all(reasons(m)) and said in reasons(m)

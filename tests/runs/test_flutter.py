@@ -95,6 +95,20 @@ def test_a_motion_that_grows_past_all_bounds_ends(law):
     assert all(one.error is None for name, one in found.measures.items() if name != "flutter_amplitude")
 
 
+def test_without_friction_negative_damping_is_refused():
+    lone = text().replace('[friction]\nlaw = "coulomb"\nstatic = 0.3\n', "").replace('[normal]\nload = "30 N"\n', "")
+    with pytest.raises(pf.SceneError, match=r"damping: -0\.02 is negative damping, and without friction"):
+        pf.load(lone)
+    with pytest.raises(pf.SceneError, match="damping: must be > -1"):
+        pf.load(text(damping=-1.5))
+
+
+def test_what_is_not_known_has_its_reason():
+    still = text(law="nonlocal", more='bond_length = "20 um"\nreading = "report"', start=0.01, cycles=3)
+    edge = pf.run(pf.load(still)).measures["flutter_amplitude"]
+    assert edge.value is None and edge.reason
+
+
 def test_cases_with_such_a_mode_run_by_themselves():
     driven = text(cycles=40).replace("[structure.start]\ndisplacement", "#").replace(
         '"free"', '"base"\nfrequency = "110 Hz"\nacceleration = "3 g"')

@@ -10,6 +10,7 @@ import plan_trial
 import pytest
 from scene_texts import BENCH, COULOMB, MODE, PATCH, POINT, STRUCTURE
 
+from patchfem import compiled
 from patchfem.core import Missing
 from patchfem.runs import memory, run
 from patchfem.runs.plan import UP_TO, plan, refuse_size
@@ -121,6 +122,37 @@ def test_always_plans_hold_in_most_scenes(tmp_path):
     scores = [one.within() for one in plan_trial.told(6000, 80, tmp_path)]
     time, memory_ = (sum(column) / len(scores) for column in zip(*scores))
     assert time >= 0.9 and memory_ >= 0.9
+
+RUBBED = """[structure]
+masses = ["1 kg", "2 kg"]
+[[structure.spring]]
+between = [1, 0]
+stiffness = "1 N/um"
+[[structure.spring]]
+between = [2, 1]
+stiffness = "2 N/um"
+[[structure.interface]]
+between = [1, 0]
+load = "30 N"
+law = "coulomb"
+static = 0.3
+[[structure.interface]]
+between = [2, 1]
+load = "20 N"
+law = "coulomb"
+static = 0.3
+[drive]
+kind = "base"
+acceleration = "2 m/s^2"
+frequency = "100 Hz"
+cycles = 2
+"""
+
+
+def test_always_a_short_run_of_several_interfaces_is_planned(monkeypatch):
+    monkeypatch.setattr(compiled, "PATIENCE", 2.0)
+    found = planned(RUBBED)
+    assert found.engine == "exact" and found.compile_seconds == 0 and 7e7 < found.bytes < 2e8
 
 
 SHAKEN = """[structure]

@@ -11,7 +11,6 @@ import patchfem as pf
 from patchfem.core import BaseSine, Measure, Outcome
 from patchfem.response import settling
 from patchfem.response.outcome import settle
-from patchfem.runs.rig.numerics import choose
 from patchfem.scene.scene import load, loads
 
 FOUND = Path(__file__).parent / "found"
@@ -54,18 +53,6 @@ def test_exact_the_bar_holds_an_independent_program(name, measure, truth, digit)
     found = once(name).measures[measure]
     assert abs(found.value - truth) <= found.error + digit
     assert found.error <= (2 / 128 if measure == "stick_fraction" else 1e-2 * truth)
-
-
-@pytest.mark.parametrize("periods", [30, 60, 70])
-def test_always_a_record_of_whole_periods_has_their_window(periods, tmp_path):
-    """Its length over the period is a whole number but for round-off, on either side."""
-    for frequency in (179.70985910515157, 143.0, 0.7):
-        time = np.linspace(0, periods / frequency, 50)
-        rows = "\n".join(f"{t!r},{float(np.sin(t))!r}" for t in time.tolist())
-        (tmp_path / "record.csv").write_text(f"time [s],acceleration [m/s^2]\n{rows}\n")
-        text = RIG.format(law='law = "coulomb"', frequency=frequency, method="",
-                          drive='kind = "base"\nwaveform = "file"\nfile = "record.csv"')
-        assert choose(pf.build(loads(text, tmp_path / "scene.toml"))).window == periods // 10
 
 
 def test_always_a_motion_that_nothing_bounds_has_no_steady_amplitude():

@@ -54,11 +54,3 @@ def test_always_a_plan_expects_the_grids_of_a_contact_that_only_its_pressure_end
     patch = asked(text)
     (found,), ((wanted,), _) = expected_grids(patch, 1e-2).finest, grids_of_run(patch, 1e-2)
     assert np.array_equal(found, wanted)
-
-
-@pytest.mark.parametrize("shape", [ENDING.format("crown", 'radius = "2 m"'),
-                                   ENDING.format("tilt", 'angle = "1 mrad"')])
-@pytest.mark.parametrize("tolerance", [3e-3, 1e-3])
-def test_always_a_plan_is_at_most_one_level_off_where_a_contact_ends_inside(shape, tolerance):
-    patch = asked(PIECES + shape)
-    assert abs(expected_grids(patch, tolerance).levels - grids_of_run(patch, tolerance)[1]) <= 1

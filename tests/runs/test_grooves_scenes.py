@@ -7,8 +7,6 @@ from scene_texts import BLOCK
 
 import patchfem as pf
 from patchfem.core import Outcome
-from patchfem.model.model import build
-from patchfem.runs.many.many import batch_of
 from patchfem.scene.scene import SceneError, loads
 
 GROOVES = 'grooves = {wavelength = "80 um", amplitude = "7.5 um"}'
@@ -133,13 +131,11 @@ def test_exact_flat_grooves_are_the_law_itself(text):
         {name: one.value for name, one in here.measures.items()}
 
 
-def test_exact_the_plan_prints_stiffness_and_capacity():
-    found = pf.plan(loads(RIG))
-    assert found.chain["grooves"] == pytest.approx(115 * WAVE**2 * 7.5e-6)
-    steep = WAVE * 7.5e-6
-    said = next(line for line in found.verdict if "grooves" in line)
-    assert f"{115 * (steep + 0.4) / (1 - 0.4 * steep):.4g} N" in said and "mu N = 46 N" in said
-    assert found.engine == "march"
+def test_refuses_heave_over_grooves():
+    text = RIG.replace("[normal]", PIECES).replace('load = "115 N"\ngrooves', "grooves").replace(
+        "slide = 1.0}", "slide = 1.0, normal = 0.1}")
+    with pytest.raises(SceneError, match=r"structure\.mode\.\S+: not supported yet with \[contact\.grooves\]"):
+        loads(text)
 
 
 @pytest.mark.parametrize(("text", "sets", "key", "words"), [
@@ -175,14 +171,6 @@ def test_refuses_grooves_under_a_static_patch_and_soft_pieces():
     with pytest.raises(SceneError, match=r"contact\.holder\.tangential_stiffness: not supported yet with "
                                          r"\[contact\.grooves\]"):
         loads(soft + '\n[contact.holder]\ntangential_stiffness = "1e7 N/m"')
-
-
-@pytest.mark.parametrize("law", ["coulomb", "elastic-plastic"])
-def test_refuses_a_batch_that_knows_no_grooves(law):
-    """The lumped batch takes the same rig without them, with them each case runs by itself."""
-    text = RIG.replace('law = "coulomb"', f'law = "{law}"' + '\nbond_length = "1 um"' * (law != "coulomb"))
-    text = text.replace("steps_per_cycle = 100", "")
-    assert batch_of(build(loads(text))) is None and batch_of(build(loads(flat(text)))) is not None
 
 
 LEAVES = {"normal.grooves.lifted_mass": "1.5 kg", "drive.acceleration": "60 g", "normal.load": "60 N",

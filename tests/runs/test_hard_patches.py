@@ -8,10 +8,9 @@ from command_line import cli
 from scene_texts import PIECE
 
 from patchfem.closed_forms.contact import hertz_half_width, hertz_peak
-from patchfem.core import Outcome
+from patchfem.core import Outcome, PatchfemError
 from patchfem.runs.patch import ladder
 from patchfem.runs.patch.grids import seconds_of
-from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
@@ -30,7 +29,7 @@ TILT = "contact.tilt.angle=0.1 mrad"
 def solved(*sets, text=BLOCKS):
     """The Result of a scene, after what must hold in every one: finite numbers, no tension, forces in balance."""
     scene = loads(text, "hard.toml", sets)
-    result = run(plan(scene))
+    result = run(scene)
     patch = result.patch
     for name, measure in result.measures.items():
         if measure.value is None:
@@ -185,18 +184,6 @@ def test_exact_an_approach_that_closes_nothing_carries_nothing(mesh):
     assert Outcome.NO_CONTACT.sentence in found.warnings
 
 
-def test_exact_the_edge_strip_alone_is_a_narrow_patch():
-    """A roll that lifts four strips of five: the fifth carries the load as a patch a fifth as wide does."""
-    found = solved("contact.strips.count=5", "contact.strips.roll=10 mrad", TILT, COARSE)
-    alone = solved(f"contact.width={WIDTH / 5} m", TILT, COARSE)
-    touching = (found.patch.strips.pressure > 0).any(axis=1)
-    assert touching.sum() == 1 and (touching[0] or touching[-1])
-    assert value(found, "pressure_peak") == pytest.approx(value(alone, "pressure_peak"), rel=1e-9)
-    assert value(found, "contact_fraction") == pytest.approx(value(alone, "contact_fraction") / 5, rel=1e-9)
-    assert value(found, "normal_stiffness") == pytest.approx(value(alone, "normal_stiffness"), rel=1e-7)
-    assert abs(value(found, "pressure_centre_lateral")) == pytest.approx(0.4 * WIDTH, rel=1e-9)
-
-
 EXPONENTIAL = "contact.asperities.law=exponential"
 
 
@@ -249,3 +236,10 @@ def test_always_the_command_line_names_what_was_wrong(tmp_path):
                                   ("contact.profile.file=none.csv", 2, "none.csv")):
         code, _, err = cli("run", path, "-o", tmp_path / "out2", "--set", COARSE, "--set", sets)
         assert code == exit_code and said in err and "Traceback" not in err, (sets, code, err)
+
+
+def test_refuses_a_profile_without_heights(tmp_path):
+    path = tmp_path / "lost.csv"
+    path.write_text("x [mm],z [um]\n" + "\n".join(f"{a},nan" for a in np.linspace(0, 12.7, 50)), "utf-8")
+    with pytest.raises(PatchfemError, match=r"lost\.csv"):
+        solved(f"contact.profile.file={path}", COARSE)

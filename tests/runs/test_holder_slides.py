@@ -5,7 +5,6 @@ import pytest
 from scene_texts import BENCH, PATCH, RIG, only
 from scipy.integrate import solve_ivp
 
-from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
@@ -16,7 +15,7 @@ SPRING = ["contact.holder.tangential_stiffness=5e6 N/m", "contact.element_size=4
 
 def bench(law, *sets):
     text = PIECE.replace('"coulomb"', law)
-    return run(plan(loads(text, "a.toml", [*SPRING, "slide.cycles=2", *sets])), estimate=False).response
+    return run(loads(text, "a.toml", [*SPRING, "slide.cycles=2", *sets]), estimate=False).response
 
 
 def test_exact_coulomb_behind_a_spring_is_one_jenkins_element():
@@ -51,7 +50,7 @@ def test_exact_the_spring_adds_to_the_shear_of_the_pieces():
     """In stick: compliance of the pieces and of the holder add, for the exact elements and for the modes."""
     soft = ["contact.shear={}", "accuracy.steps_per_cycle=100000", "slide.cycles=1"]
     text = PIECE.replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 nm"')
-    stiff = [run(plan(loads(text, "a.toml", [*sets, *soft])), estimate=False).response
+    stiff = [run(loads(text, "a.toml", [*sets, *soft]), estimate=False).response
              for sets in (SPRING, SPRING[1:])]
     first = [found.force[1] / found.slide[1] for found in stiff]
     assert 1 / first[0] == pytest.approx(1 / STIFF + 1 / first[1], rel=1e-9)
@@ -63,7 +62,7 @@ def test_exact_a_rig_feels_the_spring():
     text = RIG[:RIG.index("[[structure.mode]]\nname = \"second\"")] + RIG[RIG.index("[drive]"):]
     text = text.replace('"nonlocal"', '"coulomb"').replace('bond_length = "1 um"\n', "")
     text = text.replace("slide = 0.8", "slide = 1.0")
-    found = run(plan(loads(text, "a.toml", sets)), estimate=False)
+    found = run(loads(text, "a.toml", sets), estimate=False)
     mass, omega = 0.884, 2 * np.pi * 143
     own, drive = np.sqrt(omega**2 + STIFF / mass), 40 * np.pi
     t, z = found.response.time, found.response.slide

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 from scene_texts import COATING, PIECE
 
 from patchfem.contact.gaps import step
+from patchfem.core import Outcome
 from patchfem.model.model import build
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.patch.values import values
@@ -105,3 +106,9 @@ def test_exact_an_approach_with_a_turning_piece_is_the_load_that_reaches_it(tabl
     assert closed["normal_load"] == pytest.approx(loaded["normal_load"], rel=1e-7)
     for name in ("rotation", "moment", "pressure_peak", "approach"):
         assert closed[name] == pytest.approx(loaded[name], rel=1e-6, abs=1e-13), name
+
+
+def test_exact_a_turning_piece_above_first_touch_is_apart():
+    tables = TURNING["spring"]
+    patch, found = solved("", tables.replace("0.01 mrad", "0 mrad") + '[contact.approach]\ndistance = "0 m"\n')
+    assert patch.pressure.outcome is Outcome.NO_CONTACT and found["normal_load"] == 0

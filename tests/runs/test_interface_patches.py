@@ -191,6 +191,17 @@ def test_exact_a_patch_beside_a_point_and_one_that_bears_nothing():
         assert mixed.measures[name].value == pytest.approx(stiff.measures[name].value, rel=1e-2), name
 
 
+def test_exact_elements_of_strips_are_those_of_one_patch():
+    """Strips of equal pressure, side by side behind one slide, slip as the whole."""
+    strips = "[structure.interface.contact.strips]\ncount = 3\n"
+    wide, whole = (pf.build(pf.load(ALONE.replace("[drive]", more + "[drive]"))).rig.interfaces[0]
+                   for more in (strips, ""))
+    for slide in (2e-8, 1e-7, 1e-6):
+        force = [float(k @ np.minimum(slide, most)) for k, most, _ in (faces.elements_of(one, 1e-3)
+                                                                       for one in (wide, whole))]
+        assert force[0] == pytest.approx(force[1], rel=1e-3)
+
+
 def test_a_rigid_patch_moves_as_a_point_and_says_so():
     rigid = ALONE.replace("[structure.interface.contact.shear]\n", "")
     point = masses(1) + held(1, 0) + f'[[structure.interface]]\nbetween = [1, 0]\n{LAW}load = "100 N"\n' + DRIVE

@@ -8,7 +8,6 @@ from scene_texts import COULOMB, DRIVE, MODE, NONLOCAL, PLASTIC, POINT
 
 from patchfem.core import G_N, Outcome
 from patchfem.model.model import build
-from patchfem.runs.plan import plan
 from patchfem.runs.rig.march import run_march
 from patchfem.runs.rig.numerics import choose
 from patchfem.runs.run import run
@@ -60,7 +59,7 @@ def done(tmp_path_factory):
             from patchfem.scene.scene import load
 
             scene = load(path, words)
-            kept[engine, drive] = scene, run(plan(scene), estimate=False)
+            kept[engine, drive] = scene, run(scene, estimate=False)
         return kept[engine, drive]
     return of
 
@@ -86,7 +85,7 @@ def test_always_kept_are_the_ends_and_a_hundred_a_cycle_of_the_last_two(done, en
 def test_always_a_release_is_kept_evenly_all_along(done, engine):
     """At least 20 samples a cycle from its start on; before, turning points stood alone up to the last cycles."""
     if engine == "smooth":
-        result = run(plan(loads(TANH + MODE + RELEASE)), estimate=False)
+        result = run(loads(TANH + MODE + RELEASE), estimate=False)
         assert result.extra["engine"] == "smooth"
     else:
         _, result = done(engine, "release")
@@ -117,20 +116,11 @@ def test_exact_how_runs_end():
         (TANH + MODE + RELEASE.replace("0.1 s", "1 s")): "steady",
     }
     for text, outcome in wanted.items():
-        found = run(plan(loads(text)), estimate=False)
+        found = run(loads(text), estimate=False)
         assert found.outcome == outcome, (text, found.outcome)
         if found.outcome is Outcome.TRANSIENT and "sweep" in text:
             assert any("changes until the end" in line for line in found.warnings)
             assert "relative_displacement_amplitude_steady" not in found.measures
-
-
-def test_exact_levels_are_judged_by_their_last_one():
-    """The second level is settled though the first was far from it."""
-    text = SOFT + MODE.replace("0.003", "0.1") + LEVELS.replace("15", "40")
-    found = run(plan(loads(text)), estimate=False)
-    assert found.outcome == "steady"
-    assert run(plan(loads(text.replace('levels = ["3 g", "6 g"]', 'levels = ["6 g"]'))), estimate=False).measures[
-        "slip_amplitude"].value == pytest.approx(found.measures["slip_amplitude"].value, rel=1e-6)
 
 
 @pytest.mark.parametrize("text", [

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scene_texts import COATED
+from scene_texts import COATED, COULOMB, SLIDE
 from wedges import falling
 
+import patchfem as pf
 from patchfem.closed_forms.contact import punch_pressure, rounded_punch_half_width, rounded_punch_pressure
 from patchfem.core import PatchfemError, frozen_array
 from patchfem.elasticity.coating_bond import bond_line
@@ -88,16 +89,6 @@ def test_order_pressure_grows_towards_a_corner_with_the_power_of_its_wedges(tabl
     near = (inward > 1e-7) & (inward < 5e-6)
     found = -np.polyfit(np.log(inward[near]), np.log(patch.pressure.sigma_n[near]), 1)[0]
     assert found == pytest.approx(wanted, abs=3e-3)
-
-
-def test_order_the_end_of_two_alike_sharp_pieces_is_bounded_and_a_rounded_end_too():
-    assert not asked(BLOCK).singular_ends
-    assert not asked(BLOCK + UPPER + 'end_radius = "1 mm"\n').singular_ends
-    assert not asked(BLOCK + UPPER + 'length = "8 mm"\nend_radius = "1 mm"\n').singular_ends
-    patch = graded(asked(BLOCK), towards(12e-3, 12e-3, 1e-7))
-    inward = patch.x[-1] - patch.x
-    near = (inward > 1e-6) & (inward < 1e-4)
-    assert abs(np.polyfit(np.log(inward[near]), np.log(patch.pressure.sigma_n[near]), 1)[0]) < 5e-3
 
 
 def test_order_rounded_ends_on_a_long_block_are_the_punch_in_closed_form():
@@ -185,6 +176,14 @@ def test_always_the_peak_beside_a_rounding_lies_in_the_bar_of_cells_that_pass_ov
         assert found["pressure_peak"].error < 20 * true["pressure_peak"]
 
 
+def test_always_a_bench_rubs_and_writes_its_fields_on_shaped_pieces(tmp_path):
+    text = COATED + OUTLINE.format("upper", "lower") + TILT.format("") + "[contact.shear]\n" + COULOMB + SLIDE
+    result = pf.run(text + "cycles = 1\n")
+    assert result.measures["friction_ratio_peak"].value == pytest.approx(0.3, rel=1e-6)
+    result.save(tmp_path / "out")
+    assert {"fields.vtkhdf", "result.nc"} <= {path.name for path in (tmp_path / "out").iterdir()}
+
+
 def test_refuses_a_profile_shorter_than_the_interface_though_not_than_the_longer_piece(tmp_path):
     x = np.linspace(0, 8.2, 400)
     rows = "\n".join(f"{a:.6f},{0.05 * np.sin(a):.6f}" for a in x)
@@ -201,3 +200,14 @@ def test_refuses_a_profile_shorter_than_the_interface_though_not_than_the_longer
         with pytest.raises(PatchfemError, match="trace"):
             solve(model, *bodies_of(model))
         assert [key for key, _ in faults(scene, tmp_path)] == ["contact.profile.file"]
+
+
+@pytest.mark.parametrize("more, planned, noted", [
+    ("", "the stiffness is assembled by the stencil of a tensor grid", []),
+    (NARROW.format("upper"), "the stiffness is assembled by scikit-fem, because the mesh of the "
+     "shaped ends is not a tensor grid",
+     ["scikit-fem assembles the stiffness of the lower and the upper piece"])])
+def test_always_plan_and_result_say_what_assembles_the_pieces(more, planned, noted):
+    scene = loads(BLOCK + 'element_size = "0.5 mm"\n' + more, "scene.toml")
+    assert [text for text in pf.plan(scene).verdict if "assemble" in text] == [planned]
+    assert [text for text in pf.run(scene).notes if "assemble" in text] == noted

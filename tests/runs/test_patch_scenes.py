@@ -92,6 +92,21 @@ def test_exact_normal_stiffness_is_the_slope_of_the_load_over_the_approach(law, 
                                                             rel=5e-4 if law == "linear" else 1e-4)
 
 
+@pytest.mark.parametrize("law", SKINS)
+def test_exact_asperities_give_way_in_shear_without_the_pieces(law):
+    """A slow loop far inside the sticking range has the slope of the skin alone, and with [contact.shear] of both."""
+    bench = '[friction]\nlaw = "coulomb"\nstatic = 1e4\n[slide]\nkind = "triangle"\namplitude = "1 nm"\n' \
+            'speed = "1 mm/s"\n'
+    patch, found = solved(SKINS[law])
+    crush = 1e13 if patch.skin is None else patch.skin.stiffness
+    rigid, both = 0.8 * np.sum(crush * patch.pieces.interface.weight), found["tangential_stiffness"]
+    assert both < rigid
+    for tables, stiffness in (("", rigid), ("[contact.shear]\n", both)):
+        found = run(scene(SKINS[law] + tables + bench), estimate=False)
+        assert found.response.force.max() == pytest.approx(stiffness * 1e-9, rel=2e-4)
+        assert found.measures["loop_area"].value <= 1e-9 * stiffness * 1e-18
+
+
 # --------------------------------------------------------------------------------------------------------------- strips
 @pytest.mark.parametrize("count", [2, 8])
 def test_exact_strips_of_a_rigid_pad_on_a_linear_skin(count):
@@ -117,6 +132,16 @@ def test_exact_a_load_line_beside_the_middle_rolls_a_rigid_pad():
     assert found["roll"] == pytest.approx(-LOAD * arm / (1e13 * spread), rel=1e-5)
     outer = LOAD / (LENGTH * WIDTH) + LOAD * arm * patch.strips.offsets[-1] / spread
     assert patch.strips.pressure[-1] == pytest.approx(outer, rel=1e-4)
+
+
+@pytest.mark.parametrize("count, arm", [(2, 1e-3), (6, 3e-3)])
+def test_always_the_bars_of_a_free_roll_hold_the_count_of_strips(count, arm):
+    tables = f'[contact.crown]\nradius = "5 m"\n[contact.strips]\ncount = {{}}\noffset = "{arm} m"\n'
+    keys = 'load = "26 lbf"\nelement_size = "0.5 mm"'
+    few, many = (run(scene(tables.format(n), keys)).measures for n in (count, 48))
+    for name in ("roll", "pressure_peak", "contact_fraction", "approach"):
+        assert abs(few[name].value - many[name].value) <= few[name].error + many[name].error, name
+    assert few["pressure_centre_lateral"].value == pytest.approx(arm, rel=1e-9)
 
 
 def test_exact_strips_without_roll_are_the_patch():
@@ -268,13 +293,13 @@ def test_always_the_bar_of_an_even_mesh_holds_the_error_of_its_rows():
             assert abs(found[name].value - value) <= found[name].error <= 60 * abs(found[name].value - value), name
 
 
-def test_exact_the_count_of_strips_is_in_the_bars():
-    """A crowned pad under a roll in 4 strips against 64: the bar of 4 holds the difference."""
-    tables = '[contact.crown]\nradius = "5 m"\n[contact.strips]\ncount = {}\nroll = "0.02 mrad"\n'
-    keys = 'load = "26 lbf"\nelement_size = "0.25 mm"'
-    few, many = (run(plan(scene(tables.format(count), keys))).measures for count in (4, 64))
-    for name in ("pressure_centre_lateral", "roll_moment", "pressure_peak", "contact_fraction"):
-        assert 0 < abs(few[name].value - many[name].value) <= few[name].error, name
+def test_refuses_a_run_that_the_memory_cannot_hold():
+    from patchfem.core import Missing
+
+    found = plan(scene(keys='load = "26 lbf"\nelement_size = "0.2 um"'))
+    assert any("`run` will refuse this scene" in sentence for sentence in found.verdict)
+    with pytest.raises(Missing, match="GB of memory are needed"):
+        run(found)
 
 
 @pytest.mark.parametrize("tables, keys, said", [
@@ -284,7 +309,7 @@ def test_exact_the_count_of_strips_is_in_the_bars():
     ("", 'element_size = "3 mm"', "the 5 elements along the interface are too few"),
 ])
 def test_always_what_leaves_the_model_is_said(tables, keys, said):
-    found = run(plan(scene(tables, 'load = "26 lbf"\n' + (keys or 'element_size = "0.5 mm"'))))
+    found = run(scene(tables, 'load = "26 lbf"\n' + (keys or 'element_size = "0.5 mm"')))
     assert any(said in text for text in found.warnings)
 
 
@@ -311,3 +336,17 @@ def test_exact_the_answer_says_where_the_contact_is(tmp_path, shape, ends, told)
     assert (parts[0, 0] == contact["from"], parts[-1, 1] == contact["to"]) == ends
     assert np.diff(parts).sum() / LENGTH == pytest.approx(known["contact_fraction"], rel=1e-3)
     assert parts[-1, 1] - parts[0, 0] == pytest.approx(2 * known["contact_half_width"], rel=1e-3)
+
+
+def test_refuses_a_profile_finer_than_the_mesh(tmp_path):
+    x = np.linspace(-LENGTH / 2, LENGTH / 2, 8001)
+    tables = profile(tmp_path, x, 1e-7 * np.sin(2 * np.pi * x / 50e-6))
+    with pytest.raises(PatchfemError, match=r"scene\.toml:9: contact\.profile\.file: .*rms height.*element_size"):
+        run(scene(tables, path=tmp_path / "scene.toml"))
+
+
+def test_exact_a_patch_without_a_load_has_no_contact(tmp_path):
+    path = tmp_path / "apart.toml"
+    path.write_text(TEXT.format(keys='load = "0 N"\nelement_size = "0.5 mm"', material=STEEL, tables=""), "utf-8")
+    answer = cli("run", path, "-o", tmp_path / "out", "--json")
+    assert answer.code == 0 and json.loads(answer.out)["outcome"] == "no_contact"

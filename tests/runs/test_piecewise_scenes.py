@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from march_paths import share_one_loop
 from support.scene_texts import (
@@ -19,6 +18,7 @@ from support.scene_texts import (
     SHEAR,
     SWEEP,
     friction_of,
+    only,
 )
 
 import patchfem as pf
@@ -79,30 +79,6 @@ def test_exact_two_interfaces_between_masses(monkeypatch):
     assert exact.measures["slip_amplitude_2"].error <= 1e-9 * exact.measures["slip_amplitude_2"].value
 
 
-@pytest.mark.parametrize("law", (COULOMB, PLASTIC))
-def test_exact_patch_behind_its_shear(law):
-    text = COATED + SHEAR + law + KILOGRAM + DRIVE
-    exact, march = both(text, "drive.cycles=6", "accuracy.tolerance=1e-3", "contact.element_size=0.4 mm")
-    assert agree(exact, march) == []
-    fine, coarse = exact.fields, march.fields
-    assert np.abs(fine["shear_stress"] - coarse["shear_stress"]).max() < 0.02 * np.abs(coarse["shear_stress"]).max()
-    assert np.abs(fine["slip"] - coarse["slip"]).max() < 0.02 * np.abs(coarse["slip"]).max()
-
-
-def test_exact_both_books_close():
-    """The samples hold every yield, so the trapezoidal rule on them is exact."""
-    exact = pf.run(POINT + PLASTIC + MODE + SECOND + DRIVE, **{"accuracy.method": "exact"})
-    assert exact.measures["work_check"].value < 1e-11 and exact.measures["loop_area"].value > 1e-4
-
-
-def test_exact_levels_and_their_onset():
-    drive = '[drive]\nkind = "base"\nwaveform = "levels"\nfrequency = "143 Hz"\ncycles = 12\n'
-    exact, march = both(POINT + PLASTIC + MODE + drive, 'drive.levels=["0.5 g", "3 g", "5 g"]')
-    assert agree(exact, march, "level_hysteresis") == []
-    assert len(exact.extra["levels"]) == 3
-    assert np.all(np.diff(exact.response.time) > 0)
-
-
 def test_exact_a_level_of_a_patch_carries_the_error_of_its_mesh():
     """The first level has the bars of a run at its force alone but for what rings on from its start, the last those of
     the run; the onset lies within the bars of both meshes. The bars were 1e-9 of the values once."""
@@ -146,3 +122,13 @@ def test_refuses_an_exact_run_without_end():
     march = pf.plan(stiff, **{"accuracy.method": "march"}).seconds
     seconds = float(str(found.value).partition("computing time of about ")[2].split(" s")[0])
     assert ("accuracy.method" in str(found.value)) == (march < seconds)
+
+
+def test_refuses_exact_where_a_spring_bends_or_the_load_changes():
+    exact = '[accuracy]\nmethod = "exact"\n'
+    bends = POINT + PLASTIC + MODE + '[structure.stiffening]\ncubic = "1e12 N/m^3"\n' + DRIVE + exact
+    assert "no exact solution exists with [structure.stiffening]" in only(bends)
+    varies = POINT + 'amplitude = "10 N"\nfrequency = "20 Hz"\n' + PLASTIC + MODE + DRIVE + exact
+    assert "no exact solution exists with normal.amplitude" in only(varies)
+    assert "no exact solution exists for law 'tanh'" in only(
+        POINT + '[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"\n' + MODE + DRIVE + exact)

@@ -9,7 +9,6 @@ from scene_texts import COATING, CROWNED_JOINT, PIECE
 from patchfem.core import PatchfemError
 from patchfem.model.model import build
 from patchfem.runs.many.meshes import meshed
-from patchfem.runs.patch.ladder import solve_all
 from patchfem.runs.run import run
 from patchfem.scene import scene
 
@@ -45,14 +44,6 @@ def test_exact_a_case_is_the_cold_run_on_the_shared_mesh(angle):
         assert same.error == pytest.approx(m.error, rel=1e-12, abs=1e-12 * abs(m.value)), name
 
 
-def test_exact_pinned_elements_stay_those_of_a_single_run():
-    cases = family(1e-5, 1e-4, keys='element_size = "0.4 mm"\n')
-    for own, shared in zip(cases, meshed(cases), strict=True):
-        a, b = run(own), run(shared)
-        assert {k: (m.value, m.error) for k, m in a.measures.items()} == \
-            {k: (m.value, m.error) for k, m in b.measures.items()}
-
-
 def test_exact_other_geometries_and_lonely_cases_keep_their_own_mesh():
     plane, fault = family(1e-4, 1e-5, keys='plane = "stress"\n'), PatchfemError("a case that was refused")
     found = meshed([*family(1e-4), fault, *plane, *family(1e-4, keys='element_size = "0.4 mm"\n')])
@@ -69,12 +60,6 @@ def test_always_a_case_that_cannot_be_pressed_costs_the_others_nothing():
     assert found[0].patch.meshes.name == meshed(good)[0].patch.meshes.name
     with pytest.raises(PatchfemError, match="tips over"):
         run(found[2])
-
-
-def test_always_patches_that_wear_share_a_mesh_as_fine_as_their_own():
-    cases = [replace(one, patch=replace(one.patch, sweeps="wear", still=False)) for one in family(1e-5, 1e-4)]
-    for own, shared in zip(cases, meshed(cases), strict=True):
-        assert shared.patch.meshes.levels[0][0].x.size >= 0.75 * solve_all(own.patch, 1e-2)[0].x.size
 
 
 JOINT = CROWNED_JOINT + """\

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,6 +12,11 @@ from scene_texts import PIECE
 from static_scenes import KINDS, drawn, judged, line, missed, text_of, wider
 
 import patchfem as pf
+from patchfem.model.model import build
+from patchfem.model.pieces import bodies_of
+from patchfem.runs.patch.condensed import condensed
+from patchfem.runs.patch.press import pressed
+from patchfem.scene.scene import loads
 
 TITANIUM = 'substrate = {young = "120 GPa", poisson = 0.32, density = "4370 kg/m^3"}\n'
 NARROW = '[contact]\nlength = "40 mm"\nwidth = "1 m"\nheight = "20 mm"\nload = "9100 N"\n' + TITANIUM + \
@@ -111,3 +118,13 @@ def test_always_the_bar_of_a_single_jump_holds_the_worn_peak():
     """Hertz worn in one jump: 39.4 MPa where 30.6 MPa are left (19 jumps); the bar was 7.7 MPa."""
     worn = pf.run(WORN).measures["pressure_peak"]
     assert abs(worn.value - 30.56e6) <= worn.error <= 0.5 * worn.value
+
+
+@pytest.mark.parametrize("worn, said", [(0.0, 0), (4e-9, 1)])
+def test_a_ripple_is_said_where_the_pressure_zigzags(worn, said):
+    """One join, which is expected to ripple by 6.7 %: a smooth pressure has none, one on alternating nodes has."""
+    asked = build(loads(PIECE + 'load = "2000 N"\nelement_size = "0.5 mm"\n' + TITANIUM)).patch
+    pair = condensed(asked, *bodies_of(asked))
+    pair = replace(pair, joint=SimpleNamespace(ripple=0.067, reason="is expected to ripple by 6.7 %"))
+    patch = pressed(asked, pair, worn * (-1.0) ** np.arange(pair.compliance.interface.x.size))
+    assert [text for text in patch.notes if "ripple" in text] == said * ["contact.mesh: is expected to ripple by 6.7 %"]

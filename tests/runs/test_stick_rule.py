@@ -4,7 +4,6 @@ from math import pi
 
 import pytest
 
-from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
@@ -39,7 +38,7 @@ def both(scene, steps: int) -> list:
     """(stick fraction, phase) by the engine of events and by the march, and whether the first was no march."""
     out = []
     for more in ("", f'[accuracy]\nmethod = "march"\nsteps_per_cycle = {steps}\n'):
-        found = run(plan(loads(scene + more)), estimate=False)
+        found = run(loads(scene + more), estimate=False)
         out.append((found.measures["stick_fraction"].value, found.measures["slip_start_phase"].value,
                     found.extra["engine"]))
     assert out[0][2] != "march" == out[1][2]
@@ -67,24 +66,11 @@ NULLS = ("equivalent_stiffness", "secant_stiffness", "equivalent_damping", "acce
          "slip_start_phase")
 
 
-@pytest.mark.parametrize("drive, reason", [
-    ('kind = "free"\ndisplacement = "3 m"\nduration = "20 s"', "sine"),
-    ('kind = "force"\nwaveform = "step"\nforce = "2 N"\nduration = "20 s"', "sine"),
-    ('kind = "force"\nwaveform = "sweep"\nfrom = "0.1 Hz"\nto = "0.2 Hz"\nrate = "0.002 Hz/s"\nforce = "2 N"', "sine"),
-    ('kind = "force"\nfrequency = "0.1 Hz"\nforce = "2 N"\ncycles = 0.5', "whole cycle")])
-def test_exact_what_a_run_has_not_is_null_with_the_reason(drive, reason):
-    """A stuck release printed a stiffness of 4.5e5 +- 1.1e5 N/m: nothing repeats without a sine."""
-    scene = text('law = "coulomb"', 1.0)
-    found = run(plan(loads(scene[:scene.index("[drive]")] + f"[drive]\n{drive}\n"))).measures
-    for name in NULLS[:4]:
-        assert found[name].value is None and found[name].error is None and reason in found[name].reason, name
-
-
 @pytest.mark.parametrize("load, reason", [("0.8 N", "never sticks"), ("8 N", "the whole interface sticks throughout")])
 def test_exact_a_phase_wants_a_slip_out_of_a_stick(load, reason):
     """Far above the limit it slides through; below it nothing slips, and the loop has no width."""
     scene = text('law = "coulomb"', 1.0).replace("0.8 N", load).replace('"1 N"', '"4 N"')
-    found = run(plan(loads(scene))).measures
+    found = run(loads(scene)).measures
     assert found["slip_start_phase"].value is None and reason in found["slip_start_phase"].reason
     held = load == "8 N"
     assert found["stick_fraction"].value == held

@@ -6,9 +6,6 @@ import pytest
 from scene_texts import FORCED, MODE, PAIR, POINT, SHEAR, SMALL_PATCH, TRIANGLE, mistakes
 
 import patchfem as pf
-from patchfem.model.law import stretching
-from patchfem.model.model import build
-from patchfem.model.wear import WornFriction
 from patchfem.scene.scene import loads
 
 LOAD, STIFF = 26 * 0.45359237 * 9.80665, 7e6  # N, N/m
@@ -53,13 +50,6 @@ def test_exact_a_sweep_of_the_load_leaves_the_stiffness():
     held = found["outcome"].values == "stuck"
     np.testing.assert_allclose(found["secant_stiffness"].values[held], STIFF, rtol=1e-6)
     assert 5 < held.sum() < 60
-
-
-def test_exact_wear_of_the_coefficient_leaves_the_stiffness():
-    law, change = build(loads(both(RIG)[0])).friction, WornFriction((0.0, 1e-6), (1.0, 2.0), None)
-    worn = change.after(law, 0.5e-6)
-    assert worn.static == pytest.approx(0.45) and worn.static * LOAD / worn.bond_length == pytest.approx(STIFF)
-    assert stretching(law, 0.0).bond_length == pytest.approx(0.3 / STIFF)  # of no load as of 1 N
 
 
 @pytest.mark.parametrize("sets, key, says", [

@@ -7,7 +7,6 @@ from scene_texts import BENCH, RIG, STRUCTURE, only
 from patchfem.contact.unilateral import solve_forces
 from patchfem.dynamics.march.varying_load import sets_of
 from patchfem.export.histories import histories
-from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
@@ -18,7 +17,7 @@ SWING = ["normal.amplitude=60 N", "normal.frequency=50 Hz"]
 
 
 def result_of(text, *sets, estimate=False):
-    return run(plan(loads(text, "a.toml", sets)), estimate=estimate)
+    return run(loads(text, "a.toml", sets), estimate=estimate)
 
 
 @pytest.mark.share(0, 2)  # Coulomb and tanh: each a loop to compile

@@ -5,16 +5,11 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import cli
-from scene_texts import COATED, COULOMB, MODE, PIECE
+from scene_texts import COATED, COULOMB, MODE, PIECE, mistakes
 
 import patchfem as pf
-from patchfem.contact.unilateral import solve_forces
-from patchfem.model.model import build
-from patchfem.runs.patch.press import areas, presser
-from patchfem.runs.patch.result import solve_all
 from patchfem.runs.rig.strips import across
 from patchfem.scene.scene import loads
-from patchfem.wear.jumps import Wearing, after, start
 
 STRIPS = '[contact.strips]\ncount = 4\n'
 ROLLED = STRIPS + 'roll = "0.1 mrad"\n'
@@ -48,25 +43,6 @@ def test_exact_volume_and_depth_of_rolled_strips_mirror_with_the_roll():
     assert np.abs(worn(one) - worn(other)[::-1]).max() < 1e-9 * worn(one).max()
     assert worn(one).max(axis=1)[0] == one.measures["worn_depth_max"].value
     assert (np.diff(worn(one).max(axis=1)) <= 0).all()  # a roll opens at +y
-
-
-def test_exact_jumps_of_strips_are_those_of_one_block_diagonal_problem():
-    model = build(loads(TILTED + ROLLED + COULOMB + SINE + WEAR + LOOSE, "strips.toml"))
-    pair = solve_all(model.patch, 1e-2, False)[0].pair
-    x, area = pair.compliance.interface.x, areas(model.patch, pair.compliance.interface)
-    gap = (model.patch.gap.at(x)[0] + 1e-4 * (np.arange(4) - 1.5)[:, None] * 12.7e-3 / 4).ravel()
-    dense, path = np.kron(np.eye(4), 4 * pair.compliance.normal), np.linspace(1, 2, area.size) * 40e-6
-
-    def press(depth, softening):
-        return solve_forces(dense + np.diag(softening), np.tile(x, 4), gap + depth, np.array([LOAD]))[0]
-
-    asked = [Wearing(press, lambda _: path, area.ravel(), 1e-14, 1e5),
-             Wearing(presser(model.patch, pair), lambda _: path.reshape(area.shape), area, 1e-14, 1e5)]
-    flat, strips = (start(one) for one in asked)
-    for _ in range(3):
-        flat, strips = (after(one, state, 1e-2, 20) for one, state in zip(asked, (flat, strips)))
-    assert np.abs(strips.depth.ravel() - flat.depth).max() < 1e-9 * flat.depth.max()
-    assert np.abs(strips.force.ravel() - flat.force).max() < 1e-9 * LOAD
 
 
 def test_exact_a_rolled_pad_on_springs_evens_its_pressure_out():
@@ -121,3 +97,8 @@ def test_exact_files_hold_the_depth_of_every_strip(tmp_path):
         assert np.abs(sides[..., 2].mean(axis=1) - data.strip_offset.values[:, None]).max() < 1e-9
         assert np.abs(held - depth[:, :, None]).max() < 1e-6 * depth.max()
     assert "in every strip over the width" in (tmp_path / "out" / "report.html").read_text()
+
+
+def test_refuses_what_strips_do_not_wear_beside():
+    soft = TILTED + STRIPS + "[contact.shear]\n" + COULOMB + MODE + DRIVEN + WEAR
+    assert any("contact.strips with [contact.shear]" in line for line in mistakes(soft))

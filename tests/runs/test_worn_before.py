@@ -72,6 +72,14 @@ def test_exact_a_run_goes_on_on_another_mesh(place):
     assert found["worn_volume"].error < 1e-2 * whole["worn_volume"].value
 
 
+def test_exact_a_sweep_goes_on_from_each_of_two_runs(place):
+    ran(place, "wear.cycles=2e6").save(place / "long")
+    swept = pf.sweep(loads(SCENE, place / "a.toml", [HALF]), {"wear.start": ["one/result.nc", "long/result.nc"]})
+    for value, file in zip(swept["worn_volume"].values, ("one", "long")):
+        alone = ran(place, HALF, f"wear.start={file}/result.nc").measures["worn_volume"].value
+        assert value == pytest.approx(alone, rel=1e-12, abs=0)
+
+
 @pytest.mark.parametrize("sets, told", [
     (["wear.start=one/summary.json"], "not the result.nc of a run with [wear]"),
     (["wear.start=new.nc"], "not the result.nc of a run with [wear]"),
@@ -98,3 +106,11 @@ def test_refuses_a_trace_that_was_not_worn(place):
 def test_exact_without_an_error_before_the_error_is_not_known(place):
     folder.save(run(loads(SCENE, place / "a.toml", [HALF]), estimate=False), place / "rough")
     assert ran(place, HALF, "wear.start=rough/result.nc").measures["worn_volume"].error is None
+
+
+def test_refuses_to_go_on_where_the_coating_is_gone(place):
+    coat = 'substrate = "Ti-8Al-1Mo-1V"\n[contact.coating]\nmaterial = "WC-Co"\nthickness = "0.5 um"\n'
+    coated = SCENE.replace('substrate = "Ti-8Al-1Mo-1V"\n', coat)
+    pf.run(loads(coated, place / "a.toml", [HALF])).save(place / "gone")
+    with pytest.raises(PatchfemError, match="the coating of the upper piece was worn through;"):
+        pf.run(loads(coated, place / "a.toml", ["wear.start=gone/result.nc"]))

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from command_line import cli
 
 import patchfem as pf
 from patchfem.runs.patch.result import solve_all
@@ -115,3 +116,13 @@ def test_refuses_friction_over_the_wear_of_a_point():
     text = '[normal]\nload = "100 N"\n' + SCENE[SCENE.index("[friction]"):]
     with pytest.raises(SceneError, match=r"wear.friction: a \[normal\] contact has no area.*: use \[contact\]"):
         loads(text, "a.toml")
+
+
+def test_exact_a_sweep_takes_tables(tmp_path):
+    scene = tmp_path / "a.toml"
+    scene.write_text(SCENE)
+    answer = cli("sweep", scene, "--over", "wear.friction.coefficient_factor=[1,1],[1,0.5]", "-o", tmp_path / "out",
+                 "-q", "--set", "wear.jumps=4", "--json")
+    assert answer.code == 0, answer.err
+    rows = (tmp_path / "out" / "sweep.csv").read_text()
+    assert '"[1,0.5]"' in rows and "static_coefficient" in rows

@@ -5,7 +5,6 @@ import pytest
 from march_paths import share_one_loop
 from scene_texts import DRIVE, MODE, PIECE, mistakes
 
-from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.scene import loads
 
@@ -39,7 +38,7 @@ def one_loop(monkeypatch):
 
 
 def found(law="coulomb", keys="", yaw="30 rad/m", roll="0.01 mrad", method="auto"):
-    result = run(plan(loads(TEXT.format(law=law, keys=keys, yaw=yaw, roll=roll, method=method))))
+    result = run(loads(TEXT.format(law=law, keys=keys, yaw=yaw, roll=roll, method=method)))
     return result, result.measures
 
 
@@ -93,7 +92,7 @@ BEHIND = pytest.mark.parametrize("law", ['"coulomb"', '"elastic-plastic"\nbond_l
 
 
 def behind_shear(law, strips="", yaw="", method="march"):
-    return run(plan(loads(SOFT.format(law=law, strips=strips, yaw=yaw, method=method))), estimate=False)
+    return run(loads(SOFT.format(law=law, strips=strips, yaw=yaw, method=method)), estimate=False)
 
 
 @BEHIND

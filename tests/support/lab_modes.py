@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-STEP, SAMPLES = 1 / 2000, 8192
+STEP, SAMPLES = 1 / 2000, 4096
 OMEGA, ZETA, RESIDUE = 2 * np.pi * np.array([143.0, 260.0]), np.array([0.004, 0.01]), np.array([1.2, 0.6])
 TIME = STEP * np.arange(SAMPLES)
 
@@ -17,7 +17,7 @@ def driven(quantity: str, seed: int = 1) -> tuple:
     """
     lines = 2j * np.pi * np.fft.rfftfreq(SAMPLES, STEP)
     spectrum = np.zeros(lines.size, complex)
-    count = np.arange(10, 3000)
+    count = np.arange(5, 1500)
     spectrum[count] = np.exp(2j * np.pi * np.random.default_rng(seed).random(count.size)) * SAMPLES / 80
     total = np.zeros(SAMPLES)
     power = {"displacement": 0, "velocity": 1, "acceleration": 2}[quantity]

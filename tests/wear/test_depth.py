@@ -94,14 +94,6 @@ def test_order_two_against_the_exact_transient_of_a_punch():
     assert np.log2(errors[1] / errors[2]) == pytest.approx(2, abs=0.1)
 
 
-def test_exact_even_pressure_after_wearing_in():
-    press, _, area, rate, critical = flat()
-    depth = np.zeros(area.size)
-    for _ in range(40):
-        depth, force = jump(press, depth, rate, 10 * critical)
-    assert np.ptp(force / area) < 1e-12 * (force / area).mean()
-
-
 def test_exact_pressure_times_path_is_even_under_uneven_slip():
     """A yawing pad: p s = constant, the classical p ~ 1/s."""
     pair = bare_pair(32)

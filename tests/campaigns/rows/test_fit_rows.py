@@ -16,8 +16,8 @@ from patchfem.campaigns.rows.search import residual_of
 from patchfem.core import G_N, PatchfemError
 from patchfem.export.fits.rows import Starts, describe_answer
 from patchfem.model.model import build
+from patchfem.response.spectrum import reading
 from patchfem.runs.many.watched import Watcher
-from patchfem.runs.plan import plan
 from patchfem.runs.run import run
 from patchfem.scene.ranges import ranges
 from patchfem.scene.scene import SceneError, load, loads
@@ -190,31 +190,37 @@ def test_exact_a_watched_motion_is_that_of_a_run(tmp_path, rubbed):
 def test_exact_a_marched_motion_is_watched_as_it_runs():
     """Nothing is kept from before the window, and no bit of what is measured in it changes."""
     model = build(loads(RUBS, sets=["accuracy.method=march", "accuracy.steps_per_cycle=40", "drive.cycles=30"]))
-    seen, measures = Watcher(model, None)(model.rig.drive), run(plan(model)).measures
+    seen, measures = Watcher(model, None)(model.rig.drive), run(model).measures
     assert seen.acceleration == measures["absolute_acceleration_peak"].value
     assert seen.displacement == measures["relative_displacement_amplitude"].value
 
 
+@pytest.mark.parametrize("sets", [[], ["structure.mode.axial.accelerometer=0.7"]])
+def test_exact_what_a_window_shows_is_seen_without_one(sets):
+    model = build(loads(RUBS, sets=["accuracy.method=harmonic", *sets]))
+    drive = model.rig.drive
+    whole, part = (Watcher(model, None, None, windowed)(drive) for windowed in (True, False))
+    assert part.window is None and part[1:3] == pytest.approx(whole[1:3], rel=1e-13)
+    assert abs(part.fundamental) == pytest.approx(reading(whole.window, drive, 0.0, "fundamental"), rel=1e-8)
+    assert part.acceleration == pytest.approx(np.abs(whole.window.acceleration).max(), rel=1e-3)  # of 400 samples
+    assert part.displacement == pytest.approx(np.ptp(whole.window.slide) / 2, rel=1e-4)  # the gauge moves as the slide
+
+
 def test_rows_flagged_u_are_lower_bounds(tmp_path):
-    """What lies above a bound counts nothing, what lies below it as it is; left out it is not there at all."""
-    rows = [(*row[:4], "U" if row[0] == 143 else "") for row in linear_rows()]
-    path = table(tmp_path, rows)
-    cells = cells_of(path)
-    computed = Computed(Asked(scene_of(tmp_path, LINEAR), cells.conditions, free(*LINEAR_FREE), path))
+    """A computed response above a bound counts nothing, below it as any other; a row left out counts nothing."""
+    path = table(tmp_path, [(*row[:4], "U" if row[0] == 143 else "") for row in linear_rows()])
+    cells, scene = cells_of(path), scene_of(tmp_path, LINEAR)
+    computed = Computed(Asked(scene, cells.conditions, free(*LINEAR_FREE), path))
     every = np.ones(cells.row.size, bool)
-    sharp, flat = [141.0, 0.01], [141.0, 0.1]  # more, and less, at 143 Hz than was read
-    for values, more in ((sharp, True), (flat, False)):
-        logs = cells.logs(*computed(values, range(5)))
-        found = {what: residual_of(cells, computed, every, what)(values) for what in ("bound", "out", "read")}
-        assert np.array_equal(found["read"], logs)
-        assert np.array_equal(found["out"], logs[~cells.unstable])
-        assert np.all(logs[cells.unstable] > 0) == more
-        wanted = np.where(cells.unstable, np.minimum(logs, 0), logs)
-        assert np.array_equal(found["bound"], wanted)
-    stable = fitted(scene_of(tmp_path, LINEAR), path, free(*LINEAR_FREE), starts=1)
+    for damping, is_above in ((0.01, True), (0.1, False)):
+        logs = cells.logs(*computed([141.0, damping], range(5)))
+        found = {what: residual_of(cells, computed, every, what)([141.0, damping]) for what in ("bound", "out", "read")}
+        assert np.array_equal(found["read"], logs) and np.array_equal(found["out"], logs[~cells.unstable])
+        assert np.all(logs[cells.unstable] > 0) == is_above
+        assert np.array_equal(found["bound"], np.where(cells.unstable, np.minimum(logs, 0), logs))
+    stable = fitted(scene, path, free(*LINEAR_FREE), starts=1)
     whole, without = (stable.score(stable.logs, stable.left, stable=part)["fitted"] for part in (False, True))
-    among = ~cells.unstable
-    assert without["all"] == pytest.approx(np.sqrt(np.mean(stable.logs[among]**2))) and whole != without
+    assert without["all"] == pytest.approx(np.sqrt(np.mean(stable.logs[~cells.unstable]**2))) and whole != without
 
 
 @pytest.mark.parametrize("wanted", ["measured.acceleration_gain=0.5..2",
@@ -294,6 +300,13 @@ def test_exact_a_fit_goes_on_from_the_starts_that_are_done(tmp_path):
         assert np.array_equal(one.found.rms, first.found.rms)
 
 
+@pytest.mark.parametrize("text", ["[]", "3", "{", "[" * 100_000, '{"ends": {"all/0": [[1], 2]}}'])
+def test_exact_starts_of_another_shape_count_for_nothing(tmp_path, text):
+    """The first two once ended `fit --resume` with an internal fault."""
+    (tmp_path / "starts.json").write_text(text)
+    assert Starts(tmp_path / "starts.json", "one", True).known == {}
+
+
 def test_placebos_are_whole_fits_of_their_own(tmp_path):
     """The rows of a rig with a damping of 0.03, fitted with it and with another."""
     scene = scene_of(tmp_path, LINEAR, "structure.mode.axial.damping=0.03")
@@ -329,3 +342,16 @@ def test_exact_the_reading_and_the_gain_of_the_scene_are_those_of_the_instrument
     one, two = (fitted(scene, path, free(*LINEAR_FREE), starts=1, seed=seed) for seed in (0, 1))
     assert one.keys.fit.values == pytest.approx([141.0, 0.03], rel=1e-4)
     assert not np.array_equal(one.found.starts, two.found.starts)
+
+
+def test_exact_a_free_load_presses_the_patch_anew(tmp_path):
+    """The pressure of the patch carries the load of each model, 100 N and then 150 N."""
+    text = RUBS.replace("[normal]\nload", '[contact]\nlength = "10 mm"\nwidth = "10 mm"\nheight = "5 mm"\n'
+                        'element_size = "2.5 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\nload', 1)
+    text = text.replace("elastic-plastic", "coulomb").replace('bond_length = "0.5 um"\n', "")
+    path = table(tmp_path, [(143.0, 8 * G_N, 9 * G_N, 2e-5, "")])
+    computed = Computed(Asked(scene_of(tmp_path, text), cells_of(path).conditions, free("contact.load=50 N..200 N"),
+                              path))
+    for load_of in (100.0, 150.0):
+        patch = computed._pressed(computed.asked.model([load_of]))
+        assert patch.pressure.load == pytest.approx(load_of, rel=1e-3)

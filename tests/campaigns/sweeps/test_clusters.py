@@ -58,6 +58,30 @@ def test_exact_a_worker_in_another_folder_answers_from_the_files_of_the_scene(sc
     assert _answer(there, [0], (mine, Path("bench.toml")))["files"] != mine["files"]
 
 
+class Worn:
+    """A future of a scheduler that is gone, or one that failed."""
+
+    def __init__(self, status, error=None):
+        self.status, self.error = status, error
+
+    def exception(self):
+        return self.error
+
+
+def test_always_says_what_a_worker_has_otherwise():
+    here = Cluster.__new__(Cluster)
+    here.name, mine = "--executor dask:tcp://x:1", own_of(work(Path("a.toml")))
+    said = str(here._other(mine | {"patchfem": "0.3.0 (sources 12345678)", "files": "other"}, mine))
+    assert "a worker has patchfem 0.3.0 (sources 12345678), but this machine has patchfem " + mine["patchfem"] in said
+    assert "numpy" not in said and "files" not in said
+    assert "numpy 1.0" in str(here._other(mine | {"numpy": "1.0"}, mine))
+    assert "differ between a worker" in str(here._other(mine | {"files": "other"}, mine))
+    assert "is not installed on a worker" in str(here._other(AttributeError("no own_of"), mine))
+    with pytest.raises(Missing, match="the connection to the scheduler is lost"):
+        here._died(Worn("cancelled"))
+    assert "OSError: no" in here._died(Worn("error", OSError("no")))[1].reason
+
+
 SEEN = []
 
 

@@ -1,14 +1,15 @@
 """Patches with bonds behind shear, few points in place of all their nodes, beside the same cases run by themselves."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 from scene_texts import COATED, MODE, SECOND, SHEAR
 
 import patchfem as pf
-from patchfem.runs.many import gathered, many, one_by_one, patches
+from patchfem.runs.many import gathered, many, one_by_one
 from patchfem.runs.many.meshes import meshed
-from patchfem.runs.patch import static
+from patchfem.runs.rig.numerics import choose
 
 BONDS = '[friction]\nlaw = "nonlocal"\nreading = "stretch"\nstatic = 0.3\nkinetic = 0.3\nbond_length = "1 um"\n'
 DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 20\n'
@@ -60,18 +61,27 @@ def test_always_few_points_are_within_the_bars_of_all():
     assert count > 60 and outside == 0 and wide <= 0.03 * count
 
 
-def test_exact_patches_that_are_alike_are_pressed_once():
-    """Two tilts at three levels: two pressed patches, each with its tilt, and its levels share it."""
-    cases = meshed([pf.build(SCENE, **{"contact.tilt.angle": tilt, "drive.acceleration": 10.0 * level})
-                    for level in (1, 2, 3) for tilt in (1e-5, 3e-4)])
-    pressed = [one.patch.solved for one in patches.solved_together(cases)]
-    assert len({id(one) for one in pressed}) == 2 and all(one is pressed[k % 2] for k, one in enumerate(pressed))
-    alone = static.solved_patches([model.patch for model in cases[:2]], cases[0].accuracy.tolerance)
-    for one, other in zip(pressed, alone):
-        assert {name: m.value for name, m in one.measures.items()} == {name: m.value for name, m in
-                                                                       other.measures.items()}
-        np.testing.assert_array_equal(one.patches[0].pressure.sigma_n, other.patches[0].pressure.sigma_n)
-    assert pressed[0].measures["pressure_peak"].value < 0.9 * pressed[1].measures["pressure_peak"].value
+def test_a_table_of_measured_responses_keeps_no_batch_away_unless_it_cannot_be_read(tmp_path):
+    table = tmp_path / "rows.csv"
+    table.write_text("frequency [Hz],input [g],displacement [mil],flag\n143,5,0.4,\n")
+    beside = pf.build(SCENE + f'[measured]\nfile = "{table}"\n')
+    assert gathered.no_lanes(beside) == ""
+    lost = replace(beside, measured=(tmp_path / "none.csv", *beside.measured[1:]))
+    assert "table of measured responses cannot be read" in gathered.no_lanes(lost)
+    found = many.answers([lost], study=32)
+    assert "none.csv" in found.messages[0]
+
+
+def test_always_steps_that_are_not_pinned_are_doubled_in_lanes(monkeypatch):
+    """Where the displacement asks for more steps than a case begins with."""
+    free = SCENE.replace("steps_per_cycle = 200\n", "").replace("tolerance = 1e-2", "tolerance = 2e-3")
+    cases = meshed([pf.build(free, **{"drive.acceleration": 9.81 * level}) for level in (2.0, 3.5)])
+    monkeypatch.setattr(gathered, "choose", lambda model: replace(choose(model), steps=240))
+    found, real = gathered.solve(cases), one_by_one.solve(cases)
+    name, steps = "relative_displacement_amplitude", [found.numerics[k]["steps_per_cycle"] for k in range(2)]
+    assert max(steps) > 240 and {*steps} <= {240, 480, 960}
+    assert (found.errors[name] <= 2e-3 * found.values[name] + found.floors[name]).all()
+    assert beside(found, real)[2] == 0
 
 
 def test_always_what_lanes_do_not_take_runs_by_itself():

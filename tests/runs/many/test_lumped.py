@@ -6,9 +6,10 @@ from batch_beside import held_against
 from scene_texts import MODE
 
 from patchfem.api import base_of, build, load
+from patchfem.model.alike import Alike
 from patchfem.runs.many import one_by_one
 from patchfem.runs.many.answers import Answers
-from patchfem.runs.many.lumped import lumped
+from patchfem.runs.many.lumped import columns, lumped
 from patchfem.scene.sets import assignments
 
 DRIVE = '[drive]\nkind = "{kind}"\n{kind_size}\nfrequency = "140 Hz"\ncycles = 40\n'
@@ -59,19 +60,18 @@ def test_exact_batch_is_the_single_runs(law, count):
     held_against(cases, one_by_one.solve(cases), batch(cases))
 
 
-def test_exact_what_is_extrapolated_far_is_that_of_a_single_run(monkeypatch):
-    """Of two Coulomb cases one still changes; its steady estimate, beyond its tolerance, shows the last bits of the
-    extremes and phasors it is made of: the batch has those bits without a run by itself, and the same words."""
-    base = base_of(load(SCENE.format(law=LAWS["coulomb"], kind="base", kind_size=SIZES["base"])))
-    shared = ["drive.frequency=143 Hz", "structure.mode.axial.frequency=143 Hz", "structure.moving_mass=0.884 kg",
-              "drive.cycles=200", "structure.mode.axial.damping=0.003"]
-    cases = [build(base.changed([*shared, f"normal.load={load} N", f"drive.acceleration={push} m/s^2"]))
-             for load, push in (("69.0969899665552", 30), ("100", 60))]
-    ones = one_by_one.solve(cases)
-    assert "amplitude_steady has an estimated error" in ones.warnings[0][-1] and 1 not in ones.warnings
-    assert not lumped.refuses(cases[0])
-    monkeypatch.setattr(one_by_one, "solve", None)
-    held_against(cases, ones, batch(cases))
+def test_exact_cases_shared_by_threads_are_the_same_to_the_last_bit(monkeypatch):
+    from patchfem.runs.many.lumped import threads
+
+    cases = [one for one in models("coulomb", 3, 100) if one.rig.cycles == 20]
+    alone = lumped.solve(cases)
+    monkeypatch.setattr(threads, "LEAST", 8)
+    monkeypatch.setattr(threads, "cores", lambda: 3)
+    shared = lumped.solve(cases)
+    for name, values in alone.values.items():
+        np.testing.assert_array_equal(shared.values[name], values)
+        np.testing.assert_array_equal(shared.errors[name], alone.errors[name])
+    assert list(shared.outcome) == list(alone.outcome) and shared.reasons == alone.reasons
 
 
 def test_always_few_cells_are_told_from_many():
@@ -85,3 +85,15 @@ def test_always_few_cells_are_told_from_many():
             if np.isfinite(value[0]) and name not in ("energy_balance", "work_check"):
                 assert abs(value[0] - best.values[name][0]) <= found.errors[name][0] + found.floors[name][0], name
                 assert found.errors[name][0] <= 1e-3 * abs(value[0]) + found.floors[name][0], name
+
+
+def test_always_bonds_without_a_drift_are_not_warned_of_it():
+    """Where no case of a batch has a drift, there is no column of it."""
+    law = 'law = "nonlocal"\nstatic = 0.3\nbond_length = "1 um"'
+    model = build(load(SCENE.format(law=law, kind="base", kind_size=SIZES["base"])))
+    found = Answers.blank(3)
+    alike = Alike(None, model, np.zeros((3, 0)), None, np.arange(3))
+    assert not columns._by_law(alike, found).any()
+    found.measure("drift_per_cycle", "m")
+    found.values["drift_per_cycle"][1] = 1e-6
+    assert columns._by_law(alike, found).tolist() == [False, True, False]

@@ -7,7 +7,7 @@ from scene_texts import BENCH, COULOMB, PLASTIC, POINT, SHORT
 import patchfem as pf
 from patchfem.core import PatchfemError
 from patchfem.runs.many import many
-from patchfem.runs.many.answers import FAILED, Answers, joined_answers
+from patchfem.runs.many.answers import FAILED, Answers
 
 RIG = POINT + COULOMB + SHORT
 
@@ -56,6 +56,12 @@ def test_exact_a_failing_batch_is_made_up_for_by_single_runs(monkeypatch):
     assert "breaks: ZeroDivisionError" in said[0]
 
 
+def test_exact_a_batch_that_fails_to_look_at_a_model_leaves_it_to_a_single_run(monkeypatch):
+    batch = many.Batch("blind", lambda model: 1 / 0, lambda model: 0, lambda models, say: 1 / 0)
+    monkeypatch.setattr(many, "BATCHES", (batch,))
+    same(many.answers([pf.build(BENCH)]), 0, pf.run(BENCH))
+
+
 def test_exact_a_batch_gets_its_groups_and_gives_back_in_order(monkeypatch):
     seen = []
 
@@ -72,18 +78,6 @@ def test_exact_a_batch_gets_its_groups_and_gives_back_in_order(monkeypatch):
     monkeypatch.setattr(many, "BATCHES", (batch,))
     assert many.answers(models).values["load"].tolist() == loads
     assert seen == [[1.0, 3.0], [2.0, 4.0]]
-
-
-@pytest.mark.parametrize("order", [(0, 1, 2), (2, 0, 1)])
-def test_exact_parts_join_to_the_whole(order):
-    whole = many.answers([pf.build(RIG), pf.build(BENCH), PatchfemError("no")])
-    parts = [many.answers([pf.build(RIG)]), many.answers([pf.build(BENCH)]), many.answers([PatchfemError("no")])]
-    found = joined_answers(3, [([case], parts[case]) for case in order])
-    assert found.outcome.tolist() == whole.outcome.tolist() and found.messages == whole.messages
-    for name, values in whole.values.items():
-        np.testing.assert_array_equal(found.values[name], values)
-        np.testing.assert_array_equal(found.errors[name], whole.errors[name])
-    assert found.reasons == whole.reasons and found.notes == whole.notes
 
 
 def test_always_a_fault_of_one_case_leaves_the_others(monkeypatch):

@@ -1,20 +1,28 @@
 """Static patches pressed together, held against their own single runs: values, bars, warnings and notes."""
 
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scene_texts import COATING, PIECE
 
+from patchfem.campaigns.sweeps.asked import Asked
+from patchfem.campaigns.sweeps.cases import Cases
+from patchfem.campaigns.sweeps.executors import Here
+from patchfem.export.sweeps.run import swept
 from patchfem.model.model import build
 from patchfem.runs.many import many, one_by_one, patches
 from patchfem.runs.many.meshes import meshed
 from patchfem.runs.patch.grids import contact_extent
 from patchfem.runs.patch.ladder import solve_all
 from patchfem.scene import scene
+from patchfem.scene.axes import values_of
 
 TEXT = PIECE + '{}load = "{} N"\nsubstrate = "Ti-8Al-1Mo-1V"\n' + COATING + "{}\n[accuracy]\ntolerance = 1e-2\n"
 TILT, LINE = '[contact.tilt]\nangle = "{} rad"\n', '[contact.load_line]\noffset = "{} m"\n'
 SKIN = '[contact.asperities]\nlaw = "linear"\nnormal_stiffness = "1e14 Pa/m"\ntangential_ratio = 0.8\n'
+CROWN = '[contact.crown]\nradius = "2 m"\n'
 HOLDER = '[contact.holder]\nrotational_stiffness = "100 N m/rad"\n'
 PEAK = 1e-11  # of the pressure at an end of bare pieces, the mean over a cell of a micron: 1.5e-12 was seen
 PINNED = 'element_size = "0.2 mm"\n'  # no mesh has to be chosen
@@ -88,6 +96,23 @@ def test_exact_patches_solved_together_are_those_of_their_own(tables):
             for name in ("approach", "rotation", "load", "moment"):
                 assert getattr(mine.pressure, name) == pytest.approx(getattr(own.pressure, name), rel=1e-11)
             assert contact_extent(mine).places == pytest.approx(contact_extent(own).places, rel=1e-9)
+
+
+def test_exact_a_sweep_in_columns_is_that_of_its_models():
+    """The cases of a sweep are one model with columns of numbers; here the same as models of their own."""
+    values = [(-4.5, 2.0, 300.0), (-3.2, 0.4, 700.0), (-3.9, 20.0, 90.0)]
+    text = TEXT.format(PINNED, 100.0, TILT.format(1e-4) + CROWN)
+    keys = {"contact.tilt.angle": [f"{10**a!r} rad" for a, _, _ in values],
+            "contact.crown.radius": [f"{r!r} m" for _, r, _ in values],
+            "contact.load": [f"{load!r} N" for _, _, load in values]}
+    cases = Cases(tuple(values_of(key, texts, False) for key, texts in keys.items()), True)
+    found = swept(Asked(Path("patch.toml"), text), cases, Here())
+    models = meshed([build(scene.loads(text, sets=[f"{key}={texts[k]}" for key, texts in keys.items()]))
+                     for k in range(3)])
+    wanted = many.answers(models)
+    for name, column in wanted.values.items():
+        for mine, other in ((found.values[name], column), (found.errors[name], wanted.errors[name])):
+            assert mine == pytest.approx(other, rel=1e-12), name
 
 
 def test_refuses_a_profile_to_be_pressed_with_others(tmp_path):

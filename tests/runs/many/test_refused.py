@@ -110,3 +110,12 @@ def test_exact_a_batch_ends_as_single_runs_do(end):
     assert many.batch_of(model) is not None and found.outcome[0] == outcome
     assert ("relative_displacement_amplitude_steady" in found.values) == estimated
     assert bool(found.warnings) == (end == "remarked on")
+
+
+@pytest.mark.parametrize("end", ENDS)
+def test_exact_a_batch_of_elements_ends_as_single_runs_do(end):
+    """The same cases behind an elastic-plastic element, however they end."""
+    text = changed(*ENDS[end][0])
+    model = build(loads(text.replace('law = "coulomb"', 'law = "elastic-plastic"\nbond_length = "1 um"')))
+    assert many.batch_of(model) is not None
+    alike(model)

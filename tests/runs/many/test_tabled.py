@@ -33,6 +33,16 @@ def test_always_97_of_100_measures_lie_within_both_bars(family):
     assert len(misses) <= 0.03 * count
 
 
+def test_always_a_set_beyond_the_table_is_exact(monkeypatch):
+    """Sets of more elements than a table has room for, as of a finer mesh, march from yield to yield."""
+    models = meshes.meshed(drawn("frequency x load", 9, 3))
+    monkeypatch.setattr(tabled, "load", lambda _: type("Few", (), {"YIELDS": 8}))
+    found, ones = tabled.solve(models), sheared.solve(models)
+    assert all(one["engine"] == "piecewise" for one in found.numerics.values())
+    for name, column in ones.values.items():
+        np.testing.assert_array_equal(found.values[name], column)
+
+
 def test_always_a_patch_that_sticks_is_answered_in_lanes():
     """Its loop is a small difference, which changes by more than itself with the steps; the amplitude does not."""
     base = base_of(pf.load(PATCH))
