@@ -7,10 +7,9 @@ import numpy as np
 from ..core import PatchfemError, frozen_array
 from .profile import Profile
 
-N_ROUNDS = 40  # rounds of relaxation, the first half by the Laplacian; they settle single holes
-DAMPING = 0.6  # fraction of each round's change; the bi-Laplacian diverges from 5/8 on
+N_SWEEPS = 20  # relaxation sweeps by each operator; the heights of single holes have converged then
+DAMPING = 0.6  # fraction of each correction; relaxation by the bi-Laplacian diverges from 5/8 on
 RANK_TOL = 1e-12  # smaller singular values of the normal equations / count are round-off
-_LAPLACIAN = np.array([[0, -1, 0], [-1, 4, -1], [0, -1, 0]])  # times minus the squared step
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -54,25 +53,25 @@ class Areal:
 def filled(z, missing) -> np.ndarray:
     """Fill missing heights (m, n) with a smooth surface.
 
-    The nearest heights are relaxed towards a zero bi-Laplacian, which a single hole reaches to the
-    fourth order of the step.
+    The height of the nearest measured point is relaxed by the Laplace equation first and then by the
+    biharmonic equation, which reproduces a single missing height to the fourth order of the step.
     """
-    from scipy.ndimage import distance_transform_edt
-    from scipy.signal import convolve2d
+    from scipy.ndimage import convolve, distance_transform_edt
 
     if not missing.any():
         return z
     nearest = distance_transform_edt(missing, return_distances=False, return_indices=True)
     padded = np.pad(z[tuple(nearest)], 2, "reflect", reflect_type="odd")
+    heights = padded.ravel()
     rows, columns = np.nonzero(missing)
-    bilaplacian = convolve2d(_LAPLACIAN, _LAPLACIAN)
-    for turn in range(N_ROUNDS):
-        stencil = np.pad(_LAPLACIAN, 1) if turn < N_ROUNDS // 2 else bilaplacian
-        residual = 0.0
-        for (down, right), weight in np.ndenumerate(stencil):
-            if weight:
-                residual = residual + weight * padded[rows + down, columns + right]
-        padded[rows + 2, columns + 2] -= DAMPING * residual / stencil[2, 2]
+    holes = (rows + 2) * padded.shape[1] + columns + 2
+    laplacian = np.pad([[0, -1, 0], [-1, 4, -1], [0, -1, 0]], 1)
+    for stencil in (laplacian, convolve(laplacian, laplacian, mode="constant")):
+        down, right = np.nonzero(stencil)
+        offsets = (down - 2) * padded.shape[1] + right - 2
+        terms = list(zip(offsets, stencil[down, right] * (DAMPING / stencil[2, 2])))
+        for _ in range(N_SWEEPS):
+            heights[holes] -= sum(weight * heights[holes + offset] for offset, weight in terms)
     return padded[2:-2, 2:-2]
 
 

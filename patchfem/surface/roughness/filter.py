@@ -74,14 +74,12 @@ def mean_surface(z: np.ndarray, cutoffs: tuple) -> np.ndarray:
 
     Cut-offs in steps along y and x.
     """
-    from scipy.signal import oaconvolve
-
     known = ~np.isnan(z)
     sums = []
     for values in (np.where(known, z, 0.0), known.astype(float)):
         for axis, cutoff in enumerate(cutoffs):
             _, weight = _weights(cutoff, z.shape[axis])
-            values = oaconvolve(values, np.expand_dims(weight, 1 - axis), "same", axes=axis)
+            values = _convolve(values, weight, axis)
         sums.append(values)
     return np.divide(*sums, out=np.full(z.shape, np.nan), where=known)
 
@@ -103,18 +101,27 @@ def mean_line(z: np.ndarray, cutoff: float, *, tilted: bool = False) -> np.ndarr
     (n,) array [m]
         A million samples take 0.2 s.
     """
-    from scipy.signal import oaconvolve
-
     offsets, weight = _weights(cutoff, z.size)
     ones = np.ones(z.size)
-    sum_w = oaconvolve(ones, weight, "same")
-    sum_wz = oaconvolve(z, weight, "same")
+    sum_w = _convolve(ones, weight)
+    sum_wz = _convolve(z, weight)
     if not tilted:
         return sum_wz / sum_w
-    sum_wt = oaconvolve(ones, -offsets * weight, "same")  # a convolution reverses the weights
-    sum_wtt = oaconvolve(ones, offsets**2 * weight, "same")
-    sum_wtz = oaconvolve(z, -offsets * weight, "same")
+    sum_wt = _convolve(ones, -offsets * weight)  # a convolution reverses the weights
+    sum_wtt = _convolve(ones, offsets**2 * weight)
+    sum_wtz = _convolve(z, -offsets * weight)
     return (sum_wz * sum_wtt - sum_wtz * sum_wt) / (sum_w * sum_wtt - sum_wt**2)
+
+
+def _convolve(values, weights, axis: int = 0) -> np.ndarray:
+    """Convolve values with centred weights (2 k + 1,) along an axis, zero beyond the ends."""
+    from scipy.fft import irfft, next_fast_len, rfft
+
+    count = values.shape[axis]
+    size = next_fast_len(count + weights.size - 1, real=True)
+    spectrum = rfft(np.moveaxis(values, axis, -1), size) * rfft(weights, size)
+    first = weights.size // 2
+    return np.moveaxis(irfft(spectrum, size)[..., first : first + count], -1, axis)
 
 
 def _weights(cutoff: float, count: int) -> tuple[np.ndarray, np.ndarray]:
