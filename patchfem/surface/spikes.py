@@ -3,12 +3,11 @@
 import numpy as np
 
 from .areal import Areal, filled
-from .profile import MAD_TO_DEVIATION
+from .profile import CHUNK, MAD_TO_DEVIATION
 
-THRESHOLDS = (10.0, 40.0, 160.0)  # standard deviations; at the lowest a slope may join spikes
+THRESHOLDS = (10.0, 40.0, 160.0)  # standard deviations; a high one parts a spike from a slope
 MAX_SPIKE_POINTS = 12  # larger groups of points are features of the surface
-N_SAMPLED = 100_000  # heights whose scatter about the medians is measured; more do not change it
-CHUNK = 131_072  # medians computed at a time, which limits the memory
+N_SAMPLED = 100_000  # heights from which the scatter about the medians is estimated
 WINDOW = 5  # points along each side of a median
 
 
@@ -21,14 +20,33 @@ def spikes_of(scan: Areal) -> np.ndarray:
     known = ~scan.missing
     z = filled(scan.z, scan.missing)
     scatter = _scatter_about_medians(z, known)
-    spikes = np.zeros(z.shape, bool)
     if not scatter > 0:
-        return spikes
-    distance = _far_distances(z, known, THRESHOLDS[0] * scatter)
+        return np.zeros(z.shape, bool)
+    return find_isolated(scan.z, _far_distances(z, known, THRESHOLDS[0] * scatter), scatter)
+
+
+def find_isolated(z, distance, deviation: float) -> np.ndarray:
+    """Find small groups of heights that stand off all of their neighbours, as no slope does.
+
+    Parameters
+    ----------
+    z : (m, n) array [m]
+        Heights or depths, NaN where missing.
+    distance : (m, n) array [m]
+        Distance of each height from what it should be.
+    deviation : float [m]
+        Standard deviation of the distance of a good height.
+
+    Returns
+    -------
+    (m, n) bool array
+    """
+    found = np.zeros(z.shape, bool)
     for threshold in THRESHOLDS:
         with np.errstate(invalid="ignore"):
-            spikes |= apart(scan.z, distance > threshold * scatter, threshold * scatter)
-    return spikes
+            far = distance > threshold * deviation
+        found |= _select_isolated(z, far, threshold * deviation)
+    return found
 
 
 def _median_distances(z, places) -> np.ndarray:
@@ -66,20 +84,8 @@ def _far_distances(z, known, threshold: float) -> np.ndarray:
     return out
 
 
-def apart(z, far, threshold: float) -> np.ndarray:
-    """Select the far heights that form small groups off all of their neighbours, as no slope does.
-
-    Parameters
-    ----------
-    z : (m, n) array [m]
-    far : (m, n) bool array
-    threshold : float [m]
-        A group stands off its neighbours by half of it.
-
-    Returns
-    -------
-    (m, n) bool array
-    """
+def _select_isolated(z, far, threshold: float) -> np.ndarray:
+    """Select groups of far heights (m, n) that differ from all neighbours by half a threshold [m]."""
     from scipy.ndimage import find_objects, label
 
     groups, _ = label(far, np.ones((3, 3)))

@@ -15,15 +15,15 @@ def aligned(depth, noise: float) -> ScanAlignment:
     worn, grown = find_change(depth, used, noise)
     used &= ~worn & ~grown
     return ScanAlignment(
-        guess=None,
+        placement=None,
         state=np.zeros(6),
         depth=depth,
         noise=noise,
-        used=used,
+        unworn=used,
         worn=worn,
         grown=grown,
         region=np.ones(depth.shape, bool),
         covariance=np.zeros((3, 3)),
         errors=scan_errors(depth, used, np.zeros(3)),
-        likeness=1.0,
+        correlation=1.0,
     )

@@ -211,11 +211,11 @@ def _values_data(values: dict) -> dict:
 
 def _scans_data(change: Change) -> dict:
     """Return how scans were aligned, their track and the heights left out."""
-    guess = None if change.found is None else change.found.guess
+    placement = None if change.alignment is None else change.alignment.placement
     registration = _values_data(change.registration)
     registration |= {
-        "mirrored": bool(guess and guess.mirrored),
-        "turned": bool(guess and guess.turned),
+        "mirrored": bool(placement and placement.mirrored),
+        "turned": bool(placement and placement.is_inverted),
     }
     track = None
     if change.track is not None:
@@ -260,9 +260,9 @@ def write_trace(path: Path, trace: Profile) -> Path:
 def write_difference(folder: Path, comparison: Comparison) -> None:
     """Write the worn depth of two aligned scans as difference.x3p and difference.csv."""
     change = comparison.change
-    if change is None or change.found is None:
+    if change is None or change.alignment is None:
         return
-    scan = (change.before.x, change.before.y, change.found.depth)
+    scan = (change.before.x, change.before.y, change.alignment.depth)
     text = "worn depth: height before minus height after, once the surfaces are aligned"
     write_x3p(folder / "difference.x3p", *scan, text)
     write_columns(folder / "difference.csv", *scan)
@@ -354,7 +354,7 @@ def _pictures(part: Comparison) -> list:
     out = []
     if part.alignment is not None:
         out += _aligned_pictures(part)
-    elif part.change is not None and part.change.found is not None:
+    elif part.change is not None and part.change.alignment is not None:
         out += _scan_pictures(part.change)
     elif isinstance(part.before, Profile):
         caption = (

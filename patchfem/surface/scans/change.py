@@ -1,4 +1,4 @@
-"""Two areal scans before and after in one frozen record: place, map, measures, and what they prove in words."""
+"""Changes between two areal scans: alignment, depth map, volumes, and the verdict on wear in words."""
 
 from dataclasses import dataclass, field, replace
 
@@ -8,37 +8,42 @@ from ...core import PatchfemError, frozen_array, say
 from ..areal import Areal
 from ..compare.robust import REACH
 from ..quantity import Quantity, around, refused
-from ..spikes import apart, spikes_of
+from ..spikes import find_isolated, spikes_of
 from .alignment import ScanAlignment, align_scans
-from .search import CLEAR, variant
+from .search import MIN_SIGNIFICANCE, transform_scan
 from .track import ScanTrack, measure_scan_track
-from .volumes import Volumes, measure_volumes, no_values
+from .volumes import Volumes, measure_volumes, refuse_measures
 
-SHIFT = (
-    "shift along {}: position of a point in the second scan (after wear) minus its position in the first, after "
-    "rotation about the middle of the first scan"
-)
-ROTATION = "rotation of the second scan (after wear) relative to the first, anticlockwise"
-ALIKE = 0.95  # correlation of the unworn heights of both scans above which they show the same place
-ALIKE_UNCLEAR = (
-    0.98  # the same where the search is no clearer than chance, as on a lay that repeats itself
-)
-SPECK_THRESHOLDS = (
-    12.0,
-    48.0,
-    192.0,
-)  # heights of a speck above its neighbours, in standard deviations of the noise
-MIN_UNSEEN = 0.1  # fraction of the worn part without heights above which a sentence says so
-HALF_TURN = 0.2  # rad from pi within which a scan is called rotated by 180 degrees
+PLACEMENT = {  # name: (unit, definition)
+    "shift_x": (
+        "m",
+        "shift along x: position of a point in the second scan (after wear) minus its position in "
+        "the first, after rotation about the middle of the first scan",
+    ),
+    "shift_y": (
+        "m",
+        "shift along y: position of a point in the second scan (after wear) minus its position in "
+        "the first, after rotation about the middle of the first scan",
+    ),
+    "rotation": (
+        "rad",
+        "rotation of the second scan (after wear) relative to the first, anticlockwise",
+    ),
+}
+HIDDEN = "mean depth of uniform or wedge-shaped wear that may have remained hidden"
+MIN_CORRELATION = 0.95  # of the unworn heights of two scans that show the same place
+MIN_CORRELATION_UNSURE = 0.98  # the same where the search found no significant place
+MIN_UNMEASURED = 0.1  # fraction of the worn part without heights that a sentence reports
+HALF_TURN_TOL = 0.2  # [rad] difference from pi below which a scan counts as turned by 180 degrees
 N_DIGITS = 4  # digits of volumes in sentences
-WORN, NONE = "worn", "no wear shown"
+WORN = "worn"
+NONE = "no wear shown"
 GREW = "material grew, or the files are in the wrong order"
 ELSEWHERE = "not comparable point by point"
-HIDDEN = "mean depth of uniform or wedge-shaped wear that may have remained hidden"
 OPEN = "changed: either one part is worn, or another part has grown"
 EITHER = "in each of two parts the scans agree up to a plane, and either part may be the unworn one"
 UNSURE = "the scans agree up to a plane: uniform or wedge-shaped wear would look the same"
-GROWN = "apart from what grew, the scans agree up to a plane: uniform or wedge-shaped wear would look the same"
+GROWN = f"apart from what grew, {UNSURE}"
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,12 +54,13 @@ class Change:
     ----------
     before, after : Areal
         The scans without spikes.
-    found : ScanAlignment or None
+    alignment : ScanAlignment or None
     volumes : Volumes or None
-        None, as `found`, where the scans show no common place; `why` says the reason.
+        None, like `alignment`, if the scans show no common place.
     why : str
+        Reason why the scans are not comparable, "" if they are.
     removed : tuple of int
-        Heights left out of each scan as spikes; specks of the depths count with the scan after.
+        Heights of each scan that are left out as spikes; specks in the depth count for the second.
     registration : dict of Quantity
         Shift and rotation by name.
     track : ScanTrack or None
@@ -63,7 +69,7 @@ class Change:
 
     before: Areal
     after: Areal
-    found: ScanAlignment | None
+    alignment: ScanAlignment | None
     volumes: Volumes | None
     why: str = ""
     removed: tuple = (0, 0)
@@ -74,116 +80,111 @@ class Change:
     def values(self) -> dict:
         """Every `Quantity` by its name."""
         if self.volumes is None:
-            return no_values(self.why)
+            return refuse_measures(self.why)
         values = self.volumes.values
         if values["worn_volume"].low > 0:
             return values
-        blank = no_values(_why_no_wear(self.volumes))
-        return (
-            blank | {"grown_volume": values["grown_volume"]}
-            if values["grown_volume"].low > 0
-            else blank
-        )
+        blank = refuse_measures(_why_no_wear(self.volumes))
+        if values["grown_volume"].low > 0:
+            blank["grown_volume"] = values["grown_volume"]
+        return blank
 
 
 def compare_scans(before: Areal, after: Areal, keep_spikes: bool = False) -> Change:
-    """Compare two scans place by place.
+    """Compare two scans point by point.
 
-    The scans are aligned as they are, mirrored, or inverted; where no place is common, the record says
-    why. Spikes are left out unless `keep_spikes`.
+    The second scan is tried as given, mirrored and inverted. Spikes are left out unless
+    `keep_spikes`. If the scans show no common place, the record states why.
     """
     removed = (0, 0)
     if not keep_spikes:
-        before, n_before = without_spikes(before)
-        after, n_after = without_spikes(after)
+        before, n_before = remove_spikes(before)
+        after, n_after = remove_spikes(after)
         removed = n_before, n_after
     try:
-        found, volumes, n_specks = _aligned(before, after, keep_spikes)
-        if (
-            found.guess.turned
-            and volumes.values["grown_volume"].value > volumes.values["worn_volume"].value
-        ):
-            before, guess = (
-                variant(before, "", True),
-                found.guess,
-            )  # the heights of the first scan are inverted then
-            found, volumes, n_specks = _aligned(before, variant(after, "", True), keep_spikes)
-            found = replace(found, guess=guess)
+        alignment, volumes, n_specks = _align_and_measure(before, after, keep_spikes)
+        values = volumes.values
+        placement = alignment.placement
+        if placement.is_inverted and values["grown_volume"].value > values["worn_volume"].value:
+            # more grew than wore off, so the heights of the first scan point into the material
+            before = transform_scan(before, "", True)
+            inverted = transform_scan(after, "", True)
+            alignment, volumes, n_specks = _align_and_measure(before, inverted, keep_spikes)
+            alignment = replace(alignment, placement=placement)
     except PatchfemError as error:
-        return Change(before, after, None, None, str(error), removed, _placement(None, str(error)))
+        why = str(error)
+        registration = {name: refused(*meaning, why) for name, meaning in PLACEMENT.items()}
+        return Change(before, after, None, None, why, removed, registration)
     track = None
     if volumes.values["worn_volume"].low > 0:
-        track = measure_scan_track(
-            found, volumes.filled, volumes.worn, (before.x, before.y), volumes.error
-        )
+        axes = (before.x, before.y)
+        track = measure_scan_track(alignment, volumes.filled, volumes.worn, axes, volumes.error)
     removed = removed[0], removed[1] + n_specks
-    return Change(before, after, found, volumes, "", removed, _placement(found, ""), track)
+    return Change(before, after, alignment, volumes, "", removed, _registration(alignment), track)
 
 
-def _aligned(before: Areal, after: Areal, keep_spikes: bool) -> tuple:
-    """Return alignment, volumes and the number of specks left out; PatchfemError where no place is common."""
-    found = align_scans(before, after)
-    least = ALIKE if found.guess.clear > CLEAR else ALIKE_UNCLEAR
-    if found.likeness <= least:
+def _align_and_measure(before: Areal, after: Areal, keep_spikes: bool) -> tuple:
+    """Return alignment, volumes and number of specks; raises PatchfemError without a common place."""
+    alignment = align_scans(before, after)
+    is_sure = alignment.placement.significance > MIN_SIGNIFICANCE
+    min_correlation = MIN_CORRELATION if is_sure else MIN_CORRELATION_UNSURE
+    if alignment.correlation <= min_correlation:
         raise PatchfemError(
             "the two scans show no common area: the heights that agree up to a plane have a "
-            f"correlation of {found.likeness:.3f}, but only values above {least:g} are significant; scan "
-            "the same area before and after wear, including unworn parts beside the rubbed part"
+            f"correlation of {alignment.correlation:.3f}, but only values above {min_correlation:g} "
+            "are significant; scan the same area before and after wear, including unworn parts "
+            "beside the rubbed part"
         )
-    found, n_specks = (found, 0) if keep_spikes else without_specks(found)
-    return found, measure_volumes(found, before.x, before.y), n_specks
+    n_specks = 0
+    if not keep_spikes:
+        alignment, n_specks = remove_specks(alignment)
+    return alignment, measure_volumes(alignment, before.x, before.y), n_specks
 
 
-def without_specks(found: ScanAlignment) -> tuple:
-    """Return an alignment without specks of the depths, and how many heights these are.
+def remove_specks(alignment: ScanAlignment) -> tuple:
+    """Return an alignment without specks of the depth, and their number of heights.
 
-    A speck is a few heights side by side that stand off all of their neighbours, as dust, dropouts
-    and what is left of a spike do and worn tops do not.
+    A speck is a small group of heights that differs from all of its neighbours, such as dust, a
+    dropout or the remainder of a spike. Worn asperities do not differ like this.
     """
-    specks = np.zeros(found.depth.shape, bool)
-    for threshold in SPECK_THRESHOLDS:
-        with np.errstate(invalid="ignore"):
-            far = np.abs(found.depth) > threshold * found.noise
-        specks |= apart(found.depth, far, threshold * found.noise)
+    specks = find_isolated(alignment.depth, np.abs(alignment.depth), alignment.noise)
     if not specks.any():
-        return found, 0
-    other = None if found.other is None else without_specks(found.other)[0]
-    depth = np.where(specks, np.nan, found.depth)
-    return replace(found, depth=depth, used=found.used & ~specks, other=other), int(specks.sum())
+        return alignment, 0
+    alternative = alignment.alternative
+    if alternative is not None:
+        alternative, _ = remove_specks(alternative)
+    depth = np.where(specks, np.nan, alignment.depth)
+    unworn = alignment.unworn & ~specks
+    out = replace(alignment, depth=depth, unworn=unworn, alternative=alternative)
+    return out, int(specks.sum())
 
 
-def _placement(found: ScanAlignment | None, why: str) -> dict:
+def _registration(alignment: ScanAlignment) -> dict:
     """Return shift and rotation as quantities by name."""
-    texts = {
-        "shift_x": ("m", SHIFT.format("x")),
-        "shift_y": ("m", SHIFT.format("y")),
-        "rotation": ("rad", ROTATION),
-    }
-    if found is None:
-        return {name: refused(*text, why) for name, text in texts.items()}
-    values = (*found.shift, found.angle)
-    errors = np.sqrt(np.diag(found.covariance))[[1, 2, 0]]
+    values = (*alignment.shift, alignment.angle)
+    errors = np.sqrt(np.diag(alignment.covariance))[[1, 2, 0]]
     return {
-        name: around(value, error, *texts[name])
-        for name, value, error in zip(texts, values, errors)
+        name: around(value, error, *PLACEMENT[name])
+        for name, value, error in zip(PLACEMENT, values, errors)
     }
 
 
-def without_spikes(scan: Areal) -> tuple:
-    """Return a scan without its spikes (`spikes_of`), and how many there were."""
-    missing, spikes = scan.missing, spikes_of(scan)
-    if not spikes.any():
+def remove_spikes(scan: Areal) -> tuple:
+    """Return a scan without its spikes (`spikes_of`), and the number of them."""
+    spikes = spikes_of(scan)
+    count = int(spikes.sum())
+    if not count:
         return scan, 0
-    z = np.where(spikes, np.nan, scan.z)
     note = (
-        f"{scan.source}: {spikes.sum()} of {(~missing).sum()} heights are spikes or dropouts and are left out; "
-        "use --keep-spikes to keep them"
+        f"{scan.source}: {count} of {(~scan.missing).sum()} heights are spikes or dropouts and are "
+        "left out; use --keep-spikes to keep them"
     )
-    return replace(scan, z=frozen_array(z), notes=(*scan.notes, note)), int(spikes.sum())
+    z = frozen_array(np.where(spikes, np.nan, scan.z))
+    return replace(scan, z=z, notes=(*scan.notes, note)), count
 
 
 def hidden_wear(change: Change) -> Quantity:
-    """Return why no number tells what uniform wear or a wedge may hide."""
+    """Return the wear that a plane may hide, which has no value, with the reason."""
     if change.volumes is None:
         return refused("m", HIDDEN, change.why)
     if change.volumes.values["worn_volume"].low > 0:
@@ -192,154 +193,157 @@ def hidden_wear(change: Change) -> Quantity:
 
 
 def _why_no_wear(volumes: Volumes) -> str:
-    """Return why no wear is shown."""
-    if volumes.open:
+    """State why no wear is shown."""
+    if volumes.is_ambiguous:
         return EITHER
     return GROWN if volumes.values["grown_volume"].low > 0 else UNSURE
 
 
 def headline(change: Change) -> str:
-    """Return the verdict on wear or growth of two scans, in a few words."""
+    """Return the verdict on wear or growth in a few words."""
     if change.volumes is None:
         return ELSEWHERE
     worn, grown = (change.volumes.values[name] for name in ("worn_volume", "grown_volume"))
     if grown.low > 0 and grown.value > 2 * worn.value:
         return GREW
-    if change.volumes.open:
+    if change.volumes.is_ambiguous:
         return OPEN
     return WORN if worn.low > 0 else NONE
 
 
 def sentences(change: Change) -> list:
-    """Return the verdict on wear or growth of two scans, in sentences."""
+    """Return the verdict on wear or growth in sentences."""
     if change.volumes is None:
         return [f"Worn volume: not available; {change.why}."]
+    alignment = change.alignment
     grown = change.volumes.values["grown_volume"]
-    out = [*_variants(change), *_wear(change)]
+    out = [*_describe_placement(change), *_describe_wear(change)]
     if change.track is not None and not change.track.why:
         out.append(_describe_track(change.track))
     if grown.low > 0:
-        order = ", or the two files are in the wrong order." if headline(change) == GREW else "."
+        order = ", or the two files are in the wrong order" if headline(change) == GREW else ""
         out.append(
-            f"{_volume(grown)} of material lie above the first scan (before wear): pile-up or deposits{order}"
+            f"{_format_volume(grown)} of material lie above the first scan (before wear): pile-up "
+            f"or deposits{order}."
         )
-    share = (
-        100
-        * float(change.found.used.sum())
-        / max(float(np.isfinite(change.found.depth).sum()), 1.0)
-    )
+    n_measured = max(float(np.isfinite(alignment.depth).sum()), 1.0)
     out.append(
-        f"Depths are measured from the {share:.0f} % of the heights that agree within "
-        f"{say(REACH * change.found.noise, 3)} once a plane is subtracted; if these heights also wore, "
-        "uniformly or as a wedge, the true depths are larger by the wear of these heights."
+        f"Depths are measured from the {100 * alignment.unworn.sum() / n_measured:.0f} % of the "
+        f"heights that agree within {say(REACH * alignment.noise, 3)} once a plane is subtracted; "
+        "if these heights also wore, uniformly or as a wedge, the true depths are larger by the "
+        "wear of these heights."
     )
-    if change.found.other is not None and not change.volumes.open:
+    if alignment.alternative is not None and not change.volumes.is_ambiguous:
         out.append(
-            "Another part of the scans may be unworn instead, for example where two planes meet in an edge; the "
-            "intervals cover both cases."
+            "Another part of the scans may be unworn instead, for example where two planes meet in "
+            "an edge; the intervals cover both cases."
         )
     return out
 
 
-def _wear(change: Change) -> list:
-    """Return what is known of the wear, as sentences."""
+def _describe_wear(change: Change) -> list:
+    """Describe the wear, or why none is shown, in sentences."""
     values = change.volumes.values
     worn, grown = values["worn_volume"], values["grown_volume"]
     if worn.low > 0:
-        share = 100 * values["worn_share"].value
         text = (
-            f"Worn: {_volume(worn)} over {share:.3g} % of the region that both scans "
-            f"show, {_length(values['worn_depth_mean'])} on average over that region, "
-            f"{_length(values['worn_depth_max'])} at the deepest place."
+            f"Worn: {_format_volume(worn)} over {100 * values['worn_share'].value:.3g} % of the "
+            f"region that both scans show, {_format_length(values['worn_depth_mean'])} on average "
+            f"over that region, {_format_length(values['worn_depth_max'])} at the deepest place."
         )
-        return [text, *_unseen(change)]
-    if change.volumes.open:
+        return [text, *_describe_unmeasured(change)]
+    if change.volumes.is_ambiguous:
         return [
-            f"It is not known which part is unworn: {EITHER}. If the first part is unworn, up to {_upper_end(worn)} "
-            f"wore off the second part; if the second part is unworn, up to {_upper_end(grown)} grew on the first "
-            "part. To tell the two cases apart, scan farther beyond the rubbed part."
+            f"It is not known which part is unworn: {EITHER}. If the first part is unworn, up to "
+            f"{_format_upper_bound(worn)} wore off the second part; if the second part is unworn, "
+            f"up to {_format_upper_bound(grown)} grew on the first part. To tell the two cases "
+            "apart, scan farther beyond the rubbed part."
         ]
     return [
-        "Worn volume: no wear detected. Uniform wear of any depth would give the same two scans. Wedge-shaped "
-        "wear would also give the same two scans if the worn part was mounted level for the second scan. To "
-        "tell wear from no wear, scan an unworn part beside the rubbed part before and after wear."
+        "Worn volume: no wear detected. Uniform wear of any depth would give the same two scans. "
+        "Wedge-shaped wear would also give the same two scans if the worn part was mounted level "
+        "for the second scan. To tell wear from no wear, scan an unworn part beside the rubbed "
+        "part before and after wear."
     ]
 
 
-def _unseen(change: Change) -> list:
-    """Return the fraction of the worn area with missing heights, as a sentence."""
+def _describe_unmeasured(change: Change) -> list:
+    """State the fraction of the worn area whose heights are missing."""
     worn = change.volumes.worn
-    share = float((worn & ~np.isfinite(change.found.depth)).sum()) / max(float(worn.sum()), 1.0)
-    if share <= MIN_UNSEEN:
+    missing = (worn & ~np.isfinite(change.alignment.depth)).sum()
+    fraction = float(missing) / max(float(worn.sum()), 1.0)
+    if fraction <= MIN_UNMEASURED:
         return []
     return [
-        f"{100 * share:.0f} % of the worn part has no heights in one scan or lies next to a hole: the depth there "
-        "is taken from the nearest heights, so a deeper place may be missed."
+        f"{100 * fraction:.0f} % of the worn part has no heights in one scan or lies next to a "
+        "hole: the depth there is taken from the nearest heights, so a deeper place may be missed."
     ]
 
 
 def _describe_track(track: ScanTrack) -> str:
-    """Return the wear track as a sentence."""
+    """Describe the wear track in a sentence."""
     values = track.values
     text = (
         f"A track at {np.degrees(values['direction'].value):.1f} degrees from x: on average over "
-        f"{track.sections} sections it is {_length(values['width'])} wide and {_length(values['depth_mean'])} deep, "
-        f"with its floor at {_length(values['depth_floor'])}; "
+        f"{track.sections} sections it is {_format_length(values['width'])} wide and "
+        f"{_format_length(values['depth_mean'])} deep, with its floor at "
+        f"{_format_length(values['depth_floor'])}; "
     )
     if values["volume"].value is None:
         return text + f"its volume is not known: {values['volume'].reason}."
     return (
-        text
-        + f"{_length(values['length'])} long, so that area times length is {_volume(values['volume'])}."
+        f"{text}{_format_length(values['length'])} long, so that area times length is "
+        f"{_format_volume(values['volume'])}."
     )
 
 
-def _variants(change: Change) -> list:
-    """Return how the second scan was mirrored, rotated or inverted, as sentences."""
-    out, guess = [], change.found.guess
-    if guess.mirrored:
+def _describe_placement(change: Change) -> list:
+    """State in sentences whether the second scan is mirrored, rotated or inverted."""
+    out = []
+    placement = change.alignment.placement
+    if placement.mirrored:
         out.append(
-            f"The second scan (after wear) is mirrored: its {guess.mirrored} counts from the other end."
+            f"The second scan (after wear) is mirrored: its {placement.mirrored} counts from the "
+            "other end."
         )
-    if abs(abs(change.registration["rotation"].value) - np.pi) < HALF_TURN:
+    if abs(abs(change.registration["rotation"].value) - np.pi) < HALF_TURN_TOL:
         out.append("The second scan (after wear) is rotated by 180 degrees.")
-    if guess.turned:
+    if placement.is_inverted:
         out.append(
-            "In one scan the heights point out of the material, in the other scan into the material. One scan "
-            "was inverted here: the one with which more material is lost than gained. Check in which file the "
-            "heights point into the material."
+            "In one scan the heights point out of the material, in the other scan into the "
+            "material. One scan was inverted here: the one with which more material is lost than "
+            "gained. Check in which file the heights point into the material."
         )
     return out
 
 
 def describe_variant(change: Change) -> str:
-    """Return what was mirrored or inverted, for the headline."""
-    if change.found is None:
+    """State for the headline whether a scan was mirrored or inverted."""
+    if change.alignment is None:
         return ""
-    words = ["mirrored"] * bool(change.found.guess.mirrored) + [
-        "turned over"
-    ] * change.found.guess.turned
+    placement = change.alignment.placement
+    words = ["mirrored"] * bool(placement.mirrored) + ["turned over"] * placement.is_inverted
     return f"one scan is {' and '.join(words)} relative to the other" if words else ""
 
 
-def _upper_end(volume: Quantity) -> str:
-    """Return the upper end of a volume as words."""
-    scale, unit = _unit_of(volume)
-    return f"{volume.high * scale:.{N_DIGITS}g} {unit}"
-
-
-def _unit_of(volume: Quantity) -> tuple:
-    """Return how many units a cubic metre has, and the unit: um^3, or mm^3 from a thousandth of one on."""
+def _choose_unit(volume: Quantity) -> tuple:
+    """Choose the factor and the unit of a volume: mm^3 from a thousandth of one on, else um^3."""
     return (1e9, "mm^3") if max(volume.high, 0.0) >= 1e-12 else (1e18, "um^3")
 
 
-def _volume(volume: Quantity) -> str:
-    """Return a volume with its interval as words."""
-    scale, unit = _unit_of(volume)
-    value, low, high = (f"{one * scale:.{N_DIGITS}g}" for one in volume[:3])
+def _format_upper_bound(volume: Quantity) -> str:
+    """Format the upper bound of a volume."""
+    factor, unit = _choose_unit(volume)
+    return f"{volume.high * factor:.{N_DIGITS}g} {unit}"
+
+
+def _format_volume(volume: Quantity) -> str:
+    """Format a volume with its interval."""
+    factor, unit = _choose_unit(volume)
+    value, low, high = (f"{bound * factor:.{N_DIGITS}g}" for bound in volume[:3])
     return f"{value} {unit} ({low} to {high})"
 
 
-def _length(length: Quantity) -> str:
-    """Return a length with its interval as words."""
+def _format_length(length: Quantity) -> str:
+    """Format a length with its interval."""
     return f"{say(length.value)} ({say(length.low)} to {say(length.high)})"

@@ -1,9 +1,10 @@
-"""Errors of a map of depths, of what is summed over it, and of the place: a bootstrap over blocks of tiles.
+"""Errors of the depth map and of the alignment of two scans, by a block bootstrap.
 
-Means of the unworn depths in tiles of the map are drawn in square blocks (Kuensch, Annals of Statistics
-17 (1989) 1217; blocks of a field: Hall, Stochastic Processes and their Applications 20 (1985) 231), whose
-side follows the correlation of the tiles. The plane of the unworn heights is fitted to each drawn field,
-as it was to the scans, so that one set of draws gives the interval of every mean and volume.
+The mean unworn depths of square tiles are drawn in blocks of tiles with random signs (Kuensch,
+Annals of Statistics 17 (1989) 1217; fields: Hall, Stochastic Processes and their Applications 20
+(1985) 231). The side of a block follows the correlation length of the tiles. A plane is fitted to
+each drawn field, as it was to the scans, so that the same draws give the interval of every mean and
+every volume.
 """
 
 from typing import NamedTuple
@@ -14,133 +15,139 @@ from ..compare.errors import N_DRAWS, block_length, correlation_length, student_
 from ..compare.robust import BIWEIGHT
 from .model import PLACE, Parameter, ScanModel
 
-N_TILES = 40  # tiles along the shorter side of a map
-MIN_TILE = 4  # heights along a side of a tile
-FILLED = 0.3  # fraction of unworn heights of a tile that counts
-MAX_BLOCK = 1 / 3  # of the tiles along the shorter side: nine blocks are few, but show slow errors
-N_PARTS = (
-    6  # parts along each side; the scatter of their scores gives the errors of rotation and shift
-)
-N_LINES = 200  # lines of the map whose correlation is that of neighbouring heights
-UNKNOWN = 1e-5  # smallest eigenvalue over the largest below which a direction of the place is not determined
-SEED = 1989
+N_TILES = 40  # tiles along the shorter side of the depth map
+MIN_TILE_SIDE = 4  # heights along the side of a tile; smaller maps have fewer tiles
+MIN_UNWORN_FRACTION = 0.3  # fraction of unworn heights that a tile needs to enter the bootstrap
+MAX_BLOCK_FRACTION = 1 / 3  # side of a block / shorter side of the map: leaves nine blocks
+N_PARTS = 6  # parts along each side whose summed scores give the covariance of the alignment
+N_LINES = 200  # lines of the map from which the correlation of neighbouring heights is estimated
+MIN_EIGENVALUE = 1e-5  # relative to the largest; below it the surface does not fix that direction
+MAX_CORRELATION_AREA = 100.0  # heights; longer correlations are those of the drawn fields
 
 
 class ScanErrors(NamedTuple):
-    """Drawn errors of the depth.
+    """Drawn errors of a depth map.
 
     Attributes
     ----------
     fields : (draws, rows, columns) array [m]
         Mean error of the depth in each tile.
     tile : int
-        Heights along a side of a tile.
-    alike : float
-        Number of neighbouring heights that err alike.
+        Heights along the side of a tile.
+    correlation_area : float
+        Number of neighbouring heights whose errors are fully correlated.
     """
 
     fields: np.ndarray
     tile: int
-    alike: float
+    correlation_area: float
 
-    def of_sum(self, weight, noise: float) -> np.ndarray:
-        """Return the drawn errors (draws,) of the sum of weight (m, n) times depth; noise [m] of a depth.
+    def error_of_sum(self, weight, noise: float) -> np.ndarray:
+        """Draw errors (draws,) of the weighted sum of the depths.
 
-        The errors of heights within a tile are added as those of alike neighbours.
+        Parameters
+        ----------
+        weight : (m, n) array
+        noise : float
+            Standard deviation [m] of one depth, whose errors within a tile add to those of the
+            fields.
+
+        Returns
+        -------
+        (draws,) array
         """
-        sums = _tile_sums(weight, self.tile)
-        own = noise * float(np.sqrt(self.alike * (weight**2).sum()))
-        random = np.random.default_rng(SEED + 1)
-        return np.tensordot(self.fields, sums, 2) + own * random.standard_normal(len(self.fields))
+        random = np.random.default_rng(1990)
+        own = noise * float(np.sqrt(self.correlation_area * (weight**2).sum()))
+        own = own * random.standard_normal(len(self.fields))
+        return np.tensordot(self.fields, _sum_tiles(weight, self.tile), 2) + own
 
 
-def scan_errors(depth, used, doubt) -> ScanErrors:
-    """Draw errors of a map of depths.
+def scan_errors(depth, unworn, plane_error) -> ScanErrors:
+    """Draw errors of a depth map.
 
     Parameters
     ----------
     depth : (m, n) array [m]
-    used : (m, n) bool array
-        Unworn heights.
-    doubt : (3,) array [m]
-        Standard deviation of level and slopes of the plane by wear that hides beside what changed.
+    unworn : (m, n) bool array
+    plane_error : (3,) array [m]
+        Standard deviations of the offset and the slopes of the plane due to undetected wear.
+
+    Returns
+    -------
+    ScanErrors
     """
-    tile = max(min(depth.shape) // N_TILES, MIN_TILE)
-    count = _tile_sums(used.astype(float), tile)
-    sums = _tile_sums(np.where(used, depth, 0.0), tile)
-    valid = count >= FILLED * tile**2
+    tile = max(min(depth.shape) // N_TILES, MIN_TILE_SIDE)
+    count = _sum_tiles(unworn.astype(float), tile)
+    sums = _sum_tiles(np.where(unworn, depth, 0.0), tile)
+    valid = count >= MIN_UNWORN_FRACTION * tile**2
     if valid.sum() < 12:
         valid = count > 0
     means = np.where(valid, sums / np.maximum(count, 1), 0.0)
     v, u = (np.linspace(-1, 1, size) for size in means.shape)
-    forms = np.stack(np.broadcast_arrays(1.0, u, v[:, None])).reshape(3, -1)
-    weight = np.where(valid, count, 0.0).ravel()
-    fit = np.linalg.pinv((forms * weight) @ forms.T) @ (forms * weight)
-    means = np.where(valid, means - (fit @ means.ravel() @ forms).reshape(means.shape), 0.0)
+    plane = np.stack(np.broadcast_arrays(1.0, u, v[:, None])).reshape(3, -1)
+    weighted = plane * np.where(valid, count, 0.0).ravel()
+    fit = np.linalg.pinv(weighted @ plane.T) @ weighted
+    means = np.where(valid, means - (fit @ means.ravel() @ plane).reshape(means.shape), 0.0)
     length = (_correlation_along(means, valid) + _correlation_along(means.T, valid.T)) / 2
     side = min(means.shape)
-    block = max(min(block_length(length, side), int(MAX_BLOCK * side)), 1)
-    fields = _draw_blocks(means, valid, block)
-    moved = np.tensordot(fields.reshape(len(fields), -1), fit, ([1], [1]))
-    random = np.random.default_rng(SEED + 2)
-    moved += random.standard_normal((len(fields), 1)) * doubt
-    fields -= (moved @ forms).reshape(fields.shape)
+    block = max(min(block_length(length, side), int(MAX_BLOCK_FRACTION * side)), 1)
+    fields = _draw_fields(means, valid, block)
+    steps = np.tensordot(fields.reshape(len(fields), -1), fit, ([1], [1]))
+    random = np.random.default_rng(1991)
+    steps += random.standard_normal((len(fields), 1)) * plane_error
+    fields -= (steps @ plane).reshape(fields.shape)
     n_blocks = max(valid.sum() / block**2, 4.0)
-    return ScanErrors(fields * student_factor(n_blocks), tile, _alike(depth, used))
+    return ScanErrors(fields * student_factor(n_blocks), tile, _correlation_area(depth, unworn))
 
 
-def _tile_sums(values, tile: int) -> np.ndarray:
-    """Return the sums of values (m, n) over tiles."""
+def _sum_tiles(values, tile: int) -> np.ndarray:
+    """Sum values (m, n) over square tiles."""
     rows, columns = (np.arange(0, size, tile) for size in values.shape)
     return np.add.reduceat(np.add.reduceat(values, rows, axis=0), columns, axis=1)
 
 
 def _correlation_along(values, present) -> float:
-    """Return the correlation length of values (m, n) along their rows, in samples."""
+    """Estimate the correlation length of values (m, n) along their rows, in points."""
     gap = ((0, 0), (0, values.shape[1]))
     return correlation_length(
         np.pad(values, gap).ravel(), np.pad(present, gap).ravel(), values.shape[1] // 2
     )
 
 
-def _alike(depth, used) -> float:
-    """Return the correlation area of the errors of a map of depths, in heights."""
-    lengths = []
-    for values, present in ((depth, used), (depth.T, used.T)):
+def _correlation_area(depth, unworn) -> float:
+    """Estimate the number of neighbouring heights whose errors are fully correlated."""
+    area = 1.0
+    for values, present in ((depth, unworn), (depth.T, unworn.T)):
         lines = np.unique(np.linspace(0, len(values) - 1, min(len(values), N_LINES)).astype(int))
         values, present = values[lines], present[lines]
-        lengths.append(_correlation_along(np.where(present, values, 0.0), present))
-    return float(np.prod(lengths)) if np.prod(lengths) < 100 else 100.0
+        area *= _correlation_along(np.where(present, values, 0.0), present)
+    return min(area, MAX_CORRELATION_AREA)
 
 
-def _draw_blocks(means, valid, block: int) -> np.ndarray:
+def _draw_fields(means, valid, block: int) -> np.ndarray:
     """Draw fields (draws, rows, columns) from square blocks of tiles with random signs."""
-    random = np.random.default_rng(SEED)
-    pool = means[valid]
-    whole = np.where(valid, means, random.choice(pool, means.shape))
+    random = np.random.default_rng(1989)
+    whole = np.where(valid, means, random.choice(means[valid], means.shape))
     full = np.lib.stride_tricks.sliding_window_view(valid, (block, block)).mean(axis=(2, 3))
     starts = np.argwhere(full >= min(0.5, full.max()))
     rows, columns = (-(-size // block) for size in means.shape)
     chosen = starts[random.integers(0, len(starts), (N_DRAWS, rows, columns))]
     signs = random.choice([-1.0, 1.0], (N_DRAWS, rows, columns))
     along = np.arange(block)
-    values = whole[
-        chosen[..., 0, None, None] + along[:, None], chosen[..., 1, None, None] + along
-    ]  # (draws, rows, columns, block, block)
-    fields = (
-        (values * signs[..., None, None])
-        .swapaxes(2, 3)
-        .reshape(N_DRAWS, rows * block, columns * block)
-    )
+    blocks = whole[chosen[..., 0, None, None] + along[:, None], chosen[..., 1, None, None] + along]
+    blocks = (blocks * signs[..., None, None]).swapaxes(
+        2, 3
+    )  # draw, row, row in block, column, ...
+    fields = blocks.reshape(N_DRAWS, rows * block, columns * block)
     return fields[:, : means.shape[0], : means.shape[1]].copy()
 
 
 def placement_covariance(model: ScanModel, state, scale: float, changed) -> np.ndarray:
-    """Return the covariance (3, 3) of angle and shift of a biweight fit.
+    """Estimate the covariance (3, 3) of rotation and shift of a biweight fit.
 
-    The scores of the heights are summed in 36 parts of the scan, whose sums scatter independently
-    (sandwich estimate by clusters; Liang and Zeger, Biometrika 73 (1986) 13). A direction in which
-    the heights do not change, as along a straight lay, may be anywhere within half a scan.
+    The scores of the heights are summed in 36 parts of the scan, which count as independent
+    (sandwich estimate by clusters; Liang and Zeger, Biometrika 73 (1986) 13). Along a direction in
+    which the heights do not change, such as a straight lay, the error is half a scan.
 
     Parameters
     ----------
@@ -150,6 +157,11 @@ def placement_covariance(model: ScanModel, state, scale: float, changed) -> np.n
         Standard deviation [m] of the unworn depths.
     changed : (k,) bool array
         Heights without weight.
+
+    Returns
+    -------
+    (3, 3) array
+        Of angle [rad] and shift [m].
     """
     depth, jacobian = model.linearize(state)
     off = depth / (BIWEIGHT * scale)
@@ -161,21 +173,14 @@ def placement_covariance(model: ScanModel, state, scale: float, changed) -> np.n
     part = np.clip(((model.at / model.before.half + 1) / 2 * N_PARTS).astype(int), 0, N_PARTS - 1)
     part = part[:, 0] + N_PARTS * part[:, 1]
     sums = np.array([np.bincount(part, column, N_PARTS**2) for column in scores.T])
-    used = np.bincount(part, inside, N_PARTS**2) > 0
-    n_parts = max(int(used.sum()), len(normal) + 2)
-    inverse = np.linalg.pinv(normal, rcond=UNKNOWN, hermitian=True)
-    covariance = (
-        inverse
-        @ sums
-        @ sums.T
-        @ inverse
-        * n_parts
-        / (n_parts - len(normal))
-        * student_factor(n_parts) ** 2
-    )
+    n_parts = int((np.bincount(part, inside, N_PARTS**2) > 0).sum())
+    n_parts = max(n_parts, len(normal) + 2)
+    inverse = np.linalg.pinv(normal, rcond=MIN_EIGENVALUE, hermitian=True)
+    widening = n_parts / (n_parts - len(normal)) * student_factor(n_parts) ** 2
+    covariance = inverse @ sums @ sums.T @ inverse * widening
     covariance /= np.outer(size, size)
     values, vectors = np.linalg.eigh(normal)
-    for vector in vectors.T[values < UNKNOWN * values.max()]:
+    for vector in vectors.T[values < MIN_EIGENVALUE * values.max()]:
         vector = vector / size
         moved = np.abs(vector[[Parameter.SHIFT_X, Parameter.SHIFT_Y]]).max()
         covariance += np.outer(vector, vector) * (model.reach / max(moved, 1e-300)) ** 2

@@ -1,7 +1,7 @@
-"""Model of a second scan: where places of the first scan lie on it, and how its datum differs.
+"""Depth of a second scan below a first one as a function of rotation, shift and plane.
 
-A place p of the first scan, from the middle of that scan, lies in the second one at R(angle) p + shift,
-from the same point, with R anticlockwise. The depth of the second scan below the first one there is
+A point p of the first scan, measured from the middle of that scan, lies in the second scan at
+R(angle) p + shift, measured from the same point; R turns anticlockwise. The depth there is
 
     w(p) = z_before(p) - z_after(R p + shift) + offset + slope_x u + slope_y v,
 
@@ -17,21 +17,18 @@ import numpy as np
 from ...core import PatchfemError
 from ..areal import Areal, filled
 
-MIN_HEIGHTS = 400  # fewer common heights are no comparison
-N_POINTS = 60_000  # heights of a fit: a shift is known to a few thousandths of a pixel then
-N_TILES = 8  # tiles along each side, whose modes give the starts of a fit
-MIN_TILE = 12  # heights of such a tile
-ROUNDING = 1e-9  # of the scatter of the heights: smaller differences are rounding
-SLOPE_NOISE = 0.05  # noise over signal that a slope of the first scan may have
-MAX_SMOOTHING = 8.0  # pixels: largest standard deviation of the Gaussian that gives slopes
-MIN_SMOOTHING = 0.7  # pixels: the same, smallest
-LONG_WAVES = (
-    0.05  # of the shorter side: standard deviation of the Gauss filter whose mean gives no slope
-)
-MAX_STEP = 4.0  # pixels that a step of the fit may move a place
-RIM = 2  # pixels at the border of a scan where cubic interpolation is inaccurate
-CHUNK = 1 << 20  # heights of a map that are read at a time
-SEED = 2
+MIN_HEIGHTS = 400  # heights; fewer in common do not determine the alignment
+N_POINTS = 60_000  # heights of a fit, which fix a shift to a few thousandths of a pixel
+N_TILES = 8  # tiles along each side, whose modes are the starting points of a robust fit
+MIN_TILE_HEIGHTS = 12  # heights; the mode of fewer is too uncertain
+ROUND_OFF = 1e-9  # fraction of the scatter of the heights; smaller differences are round-off
+SLOPE_NOISE = 0.05  # noise / rms of the slopes of the first scan that smoothing should reach
+MIN_SMOOTHING = 0.7  # pixels; standard deviation of the narrowest Gaussian that gives slopes
+MAX_SMOOTHING = 8.0  # pixels; standard deviation of the widest one
+LONG_WAVES = 0.05  # of the shorter side; Gaussian filter whose mean contributes no slope
+MAX_STEP = 4.0  # pixels; largest displacement in one step of the fit
+BORDER = 2  # pixels; cubic interpolation is inaccurate this close to the border of a scan
+BLOCK = 1 << 20  # heights of a depth map that are computed at a time, which limits the memory
 
 
 class Parameter(IntEnum):
@@ -64,29 +61,36 @@ class Raster(NamedTuple):
 
     @property
     def half(self) -> np.ndarray:
-        """Half of the sides (x, y) [m]."""
+        """Half lengths of the sides along x and y [m]."""
         return np.array([np.ptp(self.x), np.ptp(self.y)]) / 2
 
     @property
     def steps(self) -> np.ndarray:
-        """Distances of columns and of rows [m]."""
+        """Distances between neighbouring columns and between neighbouring rows [m]."""
         return np.array([np.ptp(self.x) / (self.x.size - 1), np.ptp(self.y) / (self.y.size - 1)])
 
 
 def raster_of(scan: Areal) -> Raster:
-    """Return the heights of a scan about their mean."""
+    """Return the raster of a scan with heights about their mean."""
     return Raster(scan.x, scan.y, scan.z - np.nanmean(scan.z))
 
 
 def rotation(angle: float) -> np.ndarray:
-    """Return the matrix (2, 2) of a rotation, anticlockwise > 0."""
+    """Return the matrix (2, 2) of an anticlockwise rotation by an angle [rad]."""
     return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
 
 
 class ScanModel:
-    """Depth of a second scan below a first one, at some heights of the first, as a function of a state (6,)."""
+    """Depth of a second scan below a first one at a random sample of heights of the first.
 
-    shifts = ()  # the fit to images knows the place; least trimmed squares move the plane alone
+    Parameters
+    ----------
+    before, after : Raster
+    n_points : int
+        Size of the sample.
+    """
+
+    shifts = ()  # the robust fit of the plane keeps the place, which the fit to images determined
 
     def __init__(self, before: Raster, after: Raster, n_points: int = N_POINTS):
         from scipy.ndimage import binary_erosion, gaussian_filter, spline_filter
@@ -95,21 +99,22 @@ class ScanModel:
         self.after = after
         missing = np.isnan(after.z)
         self.spline = spline_filter(filled(after.z, missing), 3)
-        self.known = (~missing).astype(np.float32)
-        for edge in (np.s_[:RIM], np.s_[-RIM:], np.s_[:, :RIM], np.s_[:, -RIM:]):
-            self.known[edge] = 0.0
+        self.known = np.zeros(missing.shape, np.float32)
+        inner = (slice(BORDER, -BORDER),) * 2
+        self.known[inner] = ~missing[inner]
         self.is_cut = False
-        self.least = max(ROUNDING * float(np.nanstd(before.z)), 1e-300)
-        rows, columns = np.nonzero(binary_erosion(~np.isnan(before.z)))
-        chosen = np.random.default_rng(SEED).permutation(rows.size)[:n_points]
+        self.least = max(ROUND_OFF * float(np.nanstd(before.z)), 1e-300)
+        missing = np.isnan(before.z)
+        rows, columns = np.nonzero(binary_erosion(~missing))
+        chosen = np.random.default_rng(2).permutation(rows.size)[:n_points]
         self.rows, self.columns = rows[chosen], columns[chosen]
-        z = filled(before.z, np.isnan(before.z))
+        z = filled(before.z, missing)
         self.short_waves = z - gaussian_filter(z, LONG_WAVES * min(z.shape), truncate=3.0)
-        self._take_slopes(MIN_SMOOTHING)
+        self._compute_slopes(MIN_SMOOTHING)
 
     @property
     def at(self) -> np.ndarray:
-        """Places (k, 2) [m] of the heights from the middle of the first scan."""
+        """Points (k, 2) [m] of the sample, from the middle of the first scan."""
         x, y = self.before.x - self.before.middle[0], self.before.y - self.before.middle[1]
         return np.column_stack([x[self.columns], y[self.rows]])
 
@@ -118,56 +123,53 @@ class ScanModel:
         """Half of the diagonal of the first scan [m]."""
         return float(np.hypot(*self.before.half))
 
-    def _take_slopes(self, sigma: float) -> None:
-        """Take slopes of the first scan, without its long waves, from Gaussian derivatives over `sigma` pixels.
+    def _compute_slopes(self, sigma: float) -> None:
+        """Compute slopes of the short waves of the first scan by Gaussian derivatives.
 
-        Smooth wear and slow errors of a scan have long waves and would move the place by their slopes.
+        Smooth wear and slow errors of an instrument have long waves, whose slopes would shift the
+        place. sigma: standard deviation of the Gaussian in pixels.
         """
         from scipy.ndimage import gaussian_filter
 
-        z = self.short_waves
         parts = [
-            gaussian_filter(z, sigma, order)[self.rows, self.columns] for order in ((0, 1), (1, 0))
+            gaussian_filter(self.short_waves, sigma, order)[self.rows, self.columns]
+            for order in ((0, 1), (1, 0))
         ]
         self.slopes = np.column_stack(parts) / self.before.steps
 
     def smooth_slope(self, scale: float) -> None:
-        """Take slopes so smooth that the noise [m] of the heights leaves little in them.
+        """Smooth the slopes until the noise [m] of the heights contributes little to them.
 
-        A slope between noisy neighbours errs together with their heights and makes the steps of the
-        fit too short. The variance of a Gaussian derivative of white noise of variance 1 is
-        1 / (8 pi sigma^4).
+        Noise in the slopes correlates with noise in the depth and shortens the steps of the fit.
+        The variance of a Gaussian derivative of white noise of variance 1 is 1 / (8 pi sigma^4).
         """
-        steep = float(np.sqrt((self.slopes**2).mean())) * float(self.before.steps.mean())
-        sigma = np.sqrt(scale / (np.sqrt(8 * np.pi) * SLOPE_NOISE * max(steep, 1e-300)))
-        self._take_slopes(float(np.clip(sigma, MIN_SMOOTHING, MAX_SMOOTHING)))
+        slope = float(np.sqrt((self.slopes**2).mean())) * float(self.before.steps.mean())
+        sigma = np.sqrt(scale / (np.sqrt(8 * np.pi) * SLOPE_NOISE * max(slope, 1e-300)))
+        self._compute_slopes(float(np.clip(sigma, MIN_SMOOTHING, MAX_SMOOTHING)))
 
     def places(self, at, state) -> np.ndarray:
-        """Return rows and columns (2, k) in the second scan of places (k, 2) [m] from the middle of the first."""
-        x, y = (
-            at @ rotation(state[Parameter.ANGLE]).T
-            + state[[Parameter.SHIFT_X, Parameter.SHIFT_Y]]
-            + self.before.middle
-        ).T
-        rows = np.interp(y, self.after.y, np.arange(self.after.y.size), -9.0, -9.0)
+        """Map points (k, 2) [m] from the middle of the first scan to rows and columns of the second."""
+        shift = state[[Parameter.SHIFT_X, Parameter.SHIFT_Y]]
+        x, y = (at @ rotation(state[Parameter.ANGLE]).T + shift + self.before.middle).T
+        pairs = ((y, self.after.y), (x, self.after.x))
         return np.array(
-            [rows, np.interp(x, self.after.x, np.arange(self.after.x.size), -9.0, -9.0)]
+            [np.interp(where, axis, np.arange(axis.size), -9.0, -9.0) for where, axis in pairs]
         )
 
     def overlap(self, places) -> np.ndarray:
-        """Return whether all four neighbours of a place in the second scan are known."""
+        """Return whether all four neighbours of each place in the second scan were measured."""
         from scipy.ndimage import map_coordinates
 
         return map_coordinates(self.known, places, order=1, mode="constant", cval=0.0) > 0.999
 
     def read(self, places) -> np.ndarray:
-        """Return the heights [m] of the second scan at places (2, k)."""
+        """Interpolate the heights [m] of the second scan at rows and columns (2, k)."""
         from scipy.ndimage import map_coordinates
 
         return map_coordinates(self.spline, places, order=3, prefilter=False, mode="mirror")
 
     def linearize(self, state) -> tuple:
-        """Return the depth (k,) [m] and its Jacobian (k, 6) at the heights that lie on the second scan."""
+        """Return the depth (k,) [m] and its Jacobian (k, 6) at the sampled heights in the overlap."""
         at, slopes, z = self.at, self.slopes, self.before.z[self.rows, self.columns]
         places = self.places(at, state)
         if not self.is_cut:
@@ -181,55 +183,47 @@ class ScanModel:
         return depth, np.column_stack([np.ones(depth.size), along, by_angle, by_shift])
 
     def limit(self, step, free) -> np.ndarray:
-        """Limit a step of the fit to a few pixels."""
-        most = MAX_STEP * float(self.before.steps.max())
-        bounds = {
-            Parameter.ANGLE: most / self.reach,
-            Parameter.SHIFT_X: most,
-            Parameter.SHIFT_Y: most,
-        }
-        bound = np.array([bounds.get(k, np.inf) for k in free])
+        """Limit a step of the fit to a displacement of a few pixels."""
+        shift = MAX_STEP * float(self.before.steps.max())
+        bound = np.array([np.inf, np.inf, np.inf, shift / self.reach, shift, shift])[list(free)]
         return np.clip(step, -bound, bound)
 
     def tolerances(self, scale: float) -> np.ndarray:
         """Return the changes (6,) of the parameters that change the depth by `scale` [m]."""
-        moved = scale / max(float(np.sqrt((self.slopes**2).mean())), 1e-12)
-        return np.array([scale, scale, scale, moved / self.reach, moved, moved])
+        shift = scale / max(float(np.sqrt((self.slopes**2).mean())), 1e-12)
+        return np.array([scale, scale, scale, shift / self.reach, shift, shift])
 
     def blocks(self, count: int) -> list:
-        """Return the blocks of heights whose modes give the starts of a fit: tiles of the first scan."""
+        """Return the sampled heights of each tile, whose modes are starting points of a fit."""
         part = np.clip(((self.at / self.before.half + 1) / 2 * N_TILES).astype(int), 0, N_TILES - 1)
         tile = part[:, 0] + N_TILES * part[:, 1]
         order = np.argsort(tile, kind="stable")
         parts = np.split(order, np.flatnonzero(np.diff(tile[order])) + 1)
-        return [part for part in parts if part.size >= MIN_TILE]
+        return [part for part in parts if part.size >= MIN_TILE_HEIGHTS]
+
+    def _select(self, chosen) -> "ScanModel":
+        """Return the model of the chosen heights alone."""
+        out = copy(self)
+        out.rows = self.rows[chosen]
+        out.columns = self.columns[chosen]
+        out.slopes = self.slopes[chosen]
+        return out
 
     def cut(self, state) -> "ScanModel":
-        """Return the model of the heights that lie on the second scan in a state, of these alone."""
-        out = copy(self)
+        """Return the model of the heights that lie on the second scan in a state."""
         inside = self.overlap(self.places(self.at, state))
         if inside.sum() < MIN_HEIGHTS:
             raise PatchfemError("hardly any heights of the two scans coincide")
-        out.rows, out.columns, out.slopes = (
-            self.rows[inside],
-            self.columns[inside],
-            self.slopes[inside],
-        )
+        out = self._select(inside)
         out.is_cut = True
         return out
 
     def thinned(self, count: int) -> "ScanModel":
-        """Return the model with about so many heights; they are in random order."""
-        out = copy(self)
-        out.rows, out.columns, out.slopes = (
-            self.rows[:count],
-            self.columns[:count],
-            self.slopes[:count],
-        )
-        return out
+        """Return the model of the first heights; their order is random."""
+        return self._select(slice(count))
 
     def map_depth(self, state) -> np.ndarray:
-        """Return the depth (m, n) [m] at all heights of the first scan, NaN where one is missing."""
+        """Compute the depth (m, n) [m] at all heights of the first scan, NaN where one is missing."""
         out = np.empty(self.before.z.shape)
         for part, at in self._parts():
             places = self.places(at, state)
@@ -240,22 +234,22 @@ class ScanModel:
         return out + self.plane_map(state)
 
     def map_overlap(self, state) -> np.ndarray:
-        """Return whether each place (m, n) of the first scan lies within the second one, measured or not."""
+        """Return whether each point (m, n) of the first scan lies within the second one."""
         out = np.empty(self.before.z.shape, bool)
         for part, at in self._parts():
             out[part] = (self.places(at, state) >= 0).all(axis=0).reshape(out[part].shape)
         return out
 
     def _parts(self):
-        """Yield rows of the first scan as a slice, and their places (k, 2) [m] from its middle."""
+        """Yield rows of the first scan as a slice, with their points (k, 2) [m] from its middle."""
         x, y = self.before.x - self.before.middle[0], self.before.y - self.before.middle[1]
-        count = max(CHUNK // x.size, 1)
+        count = max(BLOCK // x.size, 1)
         for first in range(0, y.size, count):
             part = slice(first, first + count)
             yield part, np.stack(np.broadcast_arrays(x, y[part, None]), axis=-1).reshape(-1, 2)
 
     def plane_map(self, state) -> np.ndarray:
-        """Return the plane (m, n) [m] of a state."""
+        """Compute the plane (m, n) [m] of a state."""
         u = (self.before.x - self.before.middle[0]) / self.before.half[0]
         v = (self.before.y - self.before.middle[1]) / self.before.half[1]
         return state[0] + state[1] * u + state[2] * v[:, None]

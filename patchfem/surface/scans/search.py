@@ -1,10 +1,10 @@
-"""Coarse search for the place of a scan on another one: shifts, rotations by some degrees, mirrored or inverted scans.
+"""Coarse search for the place of a second scan on a first one.
 
-Heights are averaged over pixels and their long waves are taken off. What lies above the median is cut
-off, as wear does. All wavelengths are then made about equally strong, so that a lay that repeats itself
-does not hide the marks that do not (phase correlation; Kuglin and Hines, Proc. IEEE Conf. Cybernetics
-and Society (1975) 163). The masked correlation at every shift is computed by Fourier transforms for each
-rotation.
+Shifts, rotations by some degrees and by 180 degrees, mirrored and inverted scans are tried. Heights
+are averaged over pixels, and long waves are subtracted. Heights above the median are clipped, as
+wear removes them. The spectrum is whitened, so that a periodic lay does not hide the valleys that
+mark a place (phase correlation; Kuglin and Hines, Proc. IEEE Conf. Cybernetics and Society (1975)
+163). The masked correlation at every shift is computed by Fourier transforms for each rotation.
 """
 
 from dataclasses import replace
@@ -16,80 +16,90 @@ from ..areal import Areal
 from .model import raster_of, rotation
 
 SIZE = 224  # pixels along the longer side of the images
-ANGLES = np.radians(
-    np.arange(-6.0, 6.01, 0.5)
-)  # rad: rotations that are tried; a step is a pixel at an edge
-FINER_ANGLES = np.radians(
-    [-0.375, -0.25, -0.125, 0.125, 0.25, 0.375]
-)  # rad: tried about the best of them
-OVERLAP = 0.35  # fraction of the smaller scan that lies on the other one, at least
-LONG_WAVES = (
-    0.03  # of the shorter side: standard deviation of the Gauss filter that takes long waves off
-)
-DEEP = 3.0  # standard deviations of a valley beyond which its depth counts no more: a groove marks no place
-WHITENING_FLOOR = 0.3  # of the root mean square of a spectrum, added to what it is divided by
+ANGLES = np.radians(np.arange(-12, 13) / 2)  # [rad] -6 to 6 degrees; half a degree is one pixel
+FINE_ANGLES = np.radians(np.arange(-3, 4) / 8)  # [rad] added to the best angle
+MIN_OVERLAP = 0.35  # fraction of the smaller image that must lie on the other one
+LONG_WAVES = 0.03  # of the shorter side; Gaussian filter whose mean is subtracted
+MAX_VALLEY_DEPTH = 3.0  # standard deviations; deeper grooves and scratches mark no place
+WHITENING_FLOOR = 0.3  # of the rms of a spectrum; waves weaker than this are not amplified
 WHITENING_WIDTH = 1.5  # pixels of the spectrum over which its power is averaged
-TAPER = 0.25  # exponent of the Hann window that tapers the edges of an image
-CLEAR = 10.0  # standard deviations above the likeness at other shifts; wrong places of a periodic lay reach 9
-SURE = 14.0  # the same, beyond which no other variant is tried
-MAX_GUESSES = 8  # places that are returned
-MAX_OF_VARIANT = 3  # places of a variant
-ANGLE_APART = 0.02  # rad: smallest difference of two rotations that count as two candidates
-PIXELS_APART = 4  # pixels: smallest difference of two shifts that count as two candidates
+TAPER = 0.25  # exponent of the Hann window, whose tapered rim stays narrow
+MIN_SIGNIFICANCE = 10.0  # standard deviations; false places on a periodic lay reach 9
+MAX_PLACEMENTS = 8  # placements that are fitted; the true one is among these in all made scans
+MAX_PER_VARIANT = 3  # placements of one mirrored or inverted variant
+MIN_ANGLE_DISTANCE = 0.02  # [rad] two placements nearer than this are one
+MIN_PIXEL_DISTANCE = 4  # pixels; the same for their shifts
 
 
-class Guess(NamedTuple):
-    """A place of a scan on another one.
+class Placement(NamedTuple):
+    """Coarse place of the second scan on the first one.
 
-    angle [rad], shift (2,) [m]: see `model`; mirrored: "x" or "y" where that axis of the second scan
-    was mirrored first, else ""; turned: whether its heights were inverted; likeness: correlation of
-    the valleys there; clear: standard deviations of the likeness at other shifts by which it lies
-    above their mean.
+    angle [rad], shift (2,) [m]: as defined in `model`; mirrored: axis of the second scan that was
+    mirrored first, "x", "y" or ""; is_inverted: whether its heights changed sign; correlation: of
+    the valleys; significance: standard deviations by which it exceeds that at other shifts.
     """
 
     angle: float
     shift: np.ndarray
     mirrored: str
-    turned: bool
-    likeness: float
-    clear: float
+    is_inverted: bool
+    correlation: float
+    significance: float
 
 
-def variant(scan: Areal, mirrored: str, turned: bool) -> Areal:
-    """Return a scan mirrored in x or y about its centre, and with inverted heights if `turned`."""
+def transform_scan(scan: Areal, mirrored: str, is_inverted: bool) -> Areal:
+    """Mirror a scan in x or y about its middle, and change the sign of its heights if inverted."""
     x = scan.x[0] + scan.x[-1] - scan.x[::-1] if mirrored == "x" else scan.x
     y = scan.y[0] + scan.y[-1] - scan.y[::-1] if mirrored == "y" else scan.y
     z = {"": scan.z, "x": scan.z[:, ::-1], "y": scan.z[::-1]}[mirrored]
-    return replace(scan, x=x, y=y, z=-z if turned else z)
+    return replace(scan, x=x, y=y, z=-z if is_inverted else z)
 
 
-def guesses(before: Areal, after: Areal) -> list:
-    """Find the likeliest places of a scan on another one, as given, mirrored, inverted, or turned by 180 degrees.
+def find_placements(before: Areal, after: Areal) -> list:
+    """Find the placements of the second scan with the highest correlation.
 
-    A single place is returned where it is clear.
+    The scan is tried as given, mirrored, inverted, and rotated by 180 degrees, until one placement
+    is significant; this one is then returned alone.
     """
-    step = step_of(before, after)
-    search = _Search(*valleys(*image(before, step)))
+    step = pixel_size(before, after)
+    search = _Search(*whiten_valleys(*resample_image(before, step)))
     out = []
-    for turned in (False, True):
+    for is_inverted in (False, True):
         for mirrored, half_turn in (("", 0.0), ("x", 0.0), ("y", 0.0), ("", np.pi)):
-            other = variant(after, mirrored, turned)
-            away = raster_of(other).middle - raster_of(before).middle
-            for peak in search.find_peaks(*valleys(*image(other, step)), half_turn):
-                shift = away + rotation(peak.angle) @ (step * peak.lag)
-                out.append(Guess(peak.angle, shift, mirrored, turned, peak.likeness, peak.clear))
-            if max(guess.clear for guess in out) > SURE:
-                return [max(out, key=lambda guess: guess.clear)]
-    return sorted(out, key=lambda guess: -guess.likeness)[:MAX_GUESSES]
+            other = transform_scan(after, mirrored, is_inverted)
+            offset = raster_of(other).middle - raster_of(before).middle
+            image = whiten_valleys(*resample_image(other, step))
+            for peak in search.find_peaks(*image, half_turn):
+                shift = offset + rotation(peak.angle) @ (step * peak.lag)
+                variant = (shift, mirrored, is_inverted)
+                out.append(Placement(peak.angle, *variant, peak.correlation, peak.significance))
+            best = max(out, key=lambda placement: placement.significance)
+            if best.significance > MIN_SIGNIFICANCE:
+                return [best]
+    return sorted(out, key=lambda placement: -placement.correlation)[:MAX_PLACEMENTS]
 
 
-def step_of(*scans: Areal) -> float:
+def pixel_size(*scans: Areal) -> float:
     """Return the pixel size [m] of the images of a search."""
     return max(max(np.ptp(scan.x), np.ptp(scan.y)) for scan in scans) / SIZE
 
 
-def image(scan: Areal, step: float) -> tuple:
-    """Return the mean heights (m, n) [m] over pixels of a step [m], and whether half of each was measured."""
+def resample_image(scan: Areal, step: float) -> tuple:
+    """Average a scan over pixels.
+
+    Parameters
+    ----------
+    scan : Areal
+    step : float
+        Pixel size [m].
+
+    Returns
+    -------
+    z : (m, n) array [m]
+        Mean heights, 0 where less than half of a pixel was measured.
+    known : (m, n) bool array
+        Whether at least half of the pixel was measured.
+    """
     from scipy.ndimage import map_coordinates, uniform_filter
 
     known = ~scan.missing
@@ -106,13 +116,13 @@ def image(scan: Areal, step: float) -> tuple:
 
 
 def _even_axis(axis, step: float) -> np.ndarray:
-    """Return places about the middle of an axis at an even step [m]."""
+    """Return evenly spaced positions about the middle of an axis; step in [m]."""
     count = max(int(np.ptp(axis) / step + 1e-6) + 1, 2)
     return (axis[0] + axis[-1]) / 2 + step * (np.arange(count) - (count - 1) / 2)
 
 
-def without_waves(z, known, sigma: float) -> np.ndarray:
-    """Return heights less their mean in a Gauss filter over `sigma` pixels; 0 where none was measured."""
+def subtract_long_waves(z, known, sigma: float) -> np.ndarray:
+    """Subtract the Gaussian mean over `sigma` pixels; unmeasured pixels become 0."""
     from scipy.ndimage import gaussian_filter
 
     weight = gaussian_filter(known.astype(float), sigma, truncate=3.0)
@@ -120,34 +130,35 @@ def without_waves(z, known, sigma: float) -> np.ndarray:
     return np.where(known, z - mean, 0.0)
 
 
-def valleys(z, known) -> tuple:
-    """Return the whitened valleys of an image about their mean, and what was measured."""
+def whiten_valleys(z, known) -> tuple:
+    """Return the valleys of an image with a whitened spectrum about their mean, and the mask."""
     from scipy.fft import irfft2, rfft2
     from scipy.ndimage import gaussian_filter
 
-    flat = without_waves(z, known, LONG_WAVES * min(z.shape))
+    flat = subtract_long_waves(z, known, LONG_WAVES * min(z.shape))
     flat = flat - np.median(flat[known])
-    low = np.where(known, np.clip(flat, -DEEP * 1.4826 * np.median(np.abs(flat[known])), 0.0), 0.0)
+    deepest = -MAX_VALLEY_DEPTH * 1.4826 * np.median(np.abs(flat[known]))
+    valleys = np.where(known, np.clip(flat, deepest, 0.0), 0.0)
     window = np.outer(*(np.hanning(count + 2)[1:-1] ** TAPER for count in z.shape))
-    waves = rfft2(low * window)
-    power = np.abs(waves) ** 2
+    spectrum = rfft2(valleys * window)
+    power = np.abs(spectrum) ** 2
     floor = max(WHITENING_FLOOR * np.sqrt(power.mean()), 1e-300)
-    waves = waves / (np.sqrt(gaussian_filter(power, WHITENING_WIDTH)) + floor)
-    low = irfft2(waves, z.shape)
-    return np.where(known, low - low[known].mean(), 0.0), known
+    spectrum = spectrum / (np.sqrt(gaussian_filter(power, WHITENING_WIDTH)) + floor)
+    valleys = irfft2(spectrum, z.shape)
+    return np.where(known, valleys - valleys[known].mean(), 0.0), known
 
 
 class _Peak(NamedTuple):
-    """A likely place: angle [rad], lag (2,) in pixels along x and y, likeness, and how clear it is (`Guess`)."""
+    """Maximum of the correlation at an angle [rad] and a lag (2,) in pixels along x and y."""
 
     angle: float
     lag: np.ndarray
-    likeness: float
-    clear: float
+    correlation: float
+    significance: float
 
 
 class _Search:
-    """Masked correlation of a fixed image with others."""
+    """Masked normalized correlation of a fixed image with other images."""
 
     def __init__(self, z, known):
         self.z = z
@@ -155,7 +166,7 @@ class _Search:
         self.size = None
 
     def _prepare(self, shape) -> None:
-        """Transform the fixed image for images of a shape."""
+        """Transform the fixed image for correlation with images of a shape."""
         from scipy.fft import next_fast_len, rfft2
 
         size = tuple(next_fast_len(a + b, real=True) for a, b in zip(self.z.shape, shape))
@@ -170,8 +181,8 @@ class _Search:
         )
         self.lags = np.ix_(self.rows % size[0], self.columns % size[1])
 
-    def likeness(self, z, known) -> np.ndarray:
-        """Return the correlation at every lag, -1 where the images have too little in common."""
+    def correlate(self, z, known) -> np.ndarray:
+        """Return the correlation at every lag, -1 where the images overlap too little."""
         from scipy.fft import irfft2, rfft2
 
         self._prepare(z.shape)
@@ -185,63 +196,72 @@ class _Search:
             (fixed_known, moved_squares),
             (fixed_known, moved_known),
         )
-        product, one, two, count = (irfft2(a * b, self.size)[self.lags] for a, b in pairs)
-        square = np.maximum(one, 0.0) * np.maximum(two, 0.0)
-        enough = (count > OVERLAP * min(self.known.sum(), known.sum())) & (
-            square > 1e-12 * square.max()
-        )
-        return np.where(enough, product / np.sqrt(np.where(enough, square, 1.0)), -1.0)
+        product, first, second, count = (irfft2(a * b, self.size)[self.lags] for a, b in pairs)
+        square = np.maximum(first, 0.0) * np.maximum(second, 0.0)
+        valid = count > MIN_OVERLAP * min(self.known.sum(), known.sum())
+        valid &= square > 1e-12 * square.max()
+        return np.where(valid, product / np.sqrt(np.where(valid, square, 1.0)), -1.0)
 
-    def _likeness_turned(self, z, known, angle: float) -> np.ndarray:
-        """Return the likeness of an image that is turned by an angle [rad]."""
+    def _correlate_rotated(self, z, known, angle: float) -> np.ndarray:
+        """Return the correlation with an image that is rotated back by an angle [rad]."""
         from scipy.ndimage import rotate
 
-        # rows count along y, so a positive angle of `rotate` turns the image back
         z, known = (
             rotate(part.astype(float), np.degrees(angle), reshape=False, order=1)
             for part in (z, known)
         )
         known = known > 0.5
-        return self.likeness(np.where(known, z, 0.0), known)
+        return self.correlate(np.where(known, z, 0.0), known)
 
     def find_peaks(self, z, known, half_turn: float) -> list:
-        """Find the likeliest places of an image; half_turn [rad]: pi where it is turned by 180 degrees first."""
+        """Find the highest maxima of the correlation over angle and lag.
+
+        half_turn: pi if the image is rotated by 180 degrees first, else 0.
+        """
         if half_turn:
             z, known = np.rot90(z, 2), np.rot90(known, 2)
-        tried = [_top_of(self._likeness_turned(z, known, angle), angle) for angle in ANGLES]
-        _, angle, top = max(tried)
-        like = self._likeness_turned(z, known, angle)
-        for finer in angle + FINER_ANGLES:
-            tried.append(_top_of(self._likeness_turned(z, known, finer), finer))
-        rows, columns = np.indices(like.shape)
-        beside = np.maximum(abs(rows - top[0]), abs(columns - top[1])) > PIXELS_APART
-        others = np.arctanh(np.clip(like[beside & (like > -1.0)], -0.999999, 0.999999))
+        tried = [_find_maximum(self._correlate_rotated(z, known, angle), angle) for angle in ANGLES]
+        best = max(tried)
+        values = self._correlate_rotated(z, known, best.angle)
+        for angle in best.angle + FINE_ANGLES[FINE_ANGLES != 0]:
+            tried.append(_find_maximum(self._correlate_rotated(z, known, angle), angle))
+        rows, columns = np.indices(values.shape)
+        distance = np.maximum(abs(rows - best.row), abs(columns - best.column))
+        others = values[(distance > MIN_PIXEL_DISTANCE) & (values > -1.0)]
+        others = np.arctanh(np.clip(others, -0.999999, 0.999999))
         centre = np.subtract(z.shape, self.z.shape)[::-1] / 2
         out = []
-        for likeness, angle, at in _distinct(tried):
-            lag = np.array([self.columns[at[1]], self.rows[at[0]]]) - centre
-            clear = (np.arctanh(min(likeness, 0.999999)) - others.mean()) / max(
-                float(others.std()), 1e-9
-            )
-            out.append(_Peak(angle + half_turn, lag, likeness, float(clear)))
+        for maximum in _select_distinct(tried):
+            lag = np.array([self.columns[maximum.column], self.rows[maximum.row]]) - centre
+            excess = np.arctanh(min(maximum.value, 0.999999)) - others.mean()
+            significance = float(excess / max(float(others.std()), 1e-9))
+            out.append(_Peak(maximum.angle + half_turn, lag, maximum.value, significance))
         return out
 
 
-def _top_of(like, angle: float) -> tuple:
-    """Return the largest likeness of a map, the angle [rad], and its row and column."""
-    top = np.unravel_index(np.argmax(like), like.shape)
-    return float(like[top]), float(angle), top
+class _Maximum(NamedTuple):
+    """Largest correlation of an image that is rotated by an angle [rad], and where it lies."""
+
+    value: float
+    angle: float
+    row: int
+    column: int
 
 
-def _distinct(tried: list) -> list:
-    """Return the likeliest (likeness, angle, lag) that differ from each other in angle or lag."""
+def _find_maximum(values, angle: float) -> _Maximum:
+    row, column = np.unravel_index(np.argmax(values), values.shape)
+    return _Maximum(float(values[row, column]), float(angle), int(row), int(column))
+
+
+def _select_distinct(tried: list) -> list:
+    """Select the largest maxima that differ from each other in angle or lag."""
     kept = []
-    for one in sorted(tried, reverse=True):
+    for new in sorted(tried, reverse=True):
         is_new = all(
-            abs(one[1] - other[1]) > ANGLE_APART
-            or np.abs(np.subtract(one[2], other[2])).max() > PIXELS_APART
+            abs(new.angle - other.angle) > MIN_ANGLE_DISTANCE
+            or max(abs(new.row - other.row), abs(new.column - other.column)) > MIN_PIXEL_DISTANCE
             for other in kept
         )
-        if is_new and len(kept) < MAX_OF_VARIANT:
-            kept.append(one)
+        if is_new and len(kept) < MAX_PER_VARIANT:
+            kept.append(new)
     return kept

@@ -1,4 +1,4 @@
-"""The wear track of two areal scans: direction from the map of depths, and sizes of the sections across it."""
+"""Wear track of two areal scans: its direction, and the sizes of the sections across it."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -10,20 +10,19 @@ from ..profile import runs_of
 from ..quantity import SIDE, Quantity, around, mean_of, refused
 from .alignment import ScanAlignment
 
-N_SMOOTH = 40  # parts of the shorter side, one of which smooths the depths before their direction is sought
-N_DIRECTION = 400  # heights along the shorter side from which the direction is sought
-COHERENT = 0.5  # coherence of the gradients of a track: 1 where it is straight, 0 for a round pit
-DEEP = 5.0  # standard deviations of the mean section beyond which it is in the track
-SHALLOW = 0.2  # of the largest depth of the mean section, below which it is beside the track
-MIN_KNOWN = 0.3  # fraction of the sections that are measured at a place, at least
-BESIDE = 0.1  # of the width of the track that is measured on either side, at least
-MIN_PART = 0.6  # fraction of the lost area of the mean section that lies in the track
-MAX_SECTIONS = 1000  # sections of a turned map
-MAX_PLACES = 4000  # places of a section
-END_PART = 0.1  # fraction of the length at either end of a track that the sections leave out
-N_GROUPS = 16  # groups of neighbouring sections that are measured one by one
-MIN_GROUPS = 6  # groups of which a mean is taken
-END_AREA = 0.5  # of the median lost area, where a track ends along its direction
+SMOOTHING = 0.025  # of the shorter side; Gaussian filter of the depths before their gradient
+N_DIRECTION = 400  # heights along the shorter side from which the direction is found
+MIN_COHERENCE = 0.5  # coherence of the gradients: 1 for a straight track, 0 for a round pit
+MIN_DEVIATIONS = 5.0  # standard deviations of the mean section that a deep place exceeds
+MIN_DEPTH = 0.2  # fraction of the largest depth of the mean section that a deep place exceeds
+MIN_MEASURED = 0.3  # fraction of the sections that must be measured at a place of the mean section
+MIN_MARGIN = 0.1  # of the width of the track that must be measured beside it
+MIN_AREA = 0.6  # fraction of the lost area of the mean section that a single track holds
+MAX_SECTIONS = 1000  # sections of the rotated map; more do not change the means
+MAX_PLACES = 4000  # places of a section, which limits the memory
+END_FRACTION = 0.1  # of the length of the track at each end, where sections are not measured
+N_GROUPS = 16  # groups of neighbouring sections, each of which is measured once
+MIN_GROUPS = 6  # fewer groups give no interval by their scatter
 TEXTS = {  # name: (unit, definition)
     "direction": (
         "rad",
@@ -64,17 +63,17 @@ SIGNED = ("from", "to", "area_net")  # sizes that may be negative
 
 @dataclass(frozen=True, eq=False)
 class ScanTrack:
-    """The track of two scans.
+    """Wear track of two scans.
 
     Attributes
     ----------
     values : dict of Quantity
         By the names of TEXTS.
     scatter : dict of float
-        Standard deviation of one group of sections by name.
+        Standard deviation of a single group of sections by name.
     across, section, spread : (k,) array [m]
-        Places of a section, the mean section, and the standard deviation of the sections about it;
-        NaN where too few are measured.
+        Places across the track, mean depth of the sections, and their standard deviation; NaN where
+        too few sections are measured.
     sections : int
         Number of sections.
     why : str
@@ -90,8 +89,8 @@ class ScanTrack:
     why: str = ""
 
 
-class _TurnedMap(NamedTuple):
-    """Depths (v, u) [m] at places along (v,) and across (u,) [m] a track, from the middle of the map."""
+class _RotatedMap(NamedTuple):
+    """Depth (v, u) [m] at places along (v,) and across (u,) [m] a track, from the middle of the map."""
 
     depth: np.ndarray
     along: np.ndarray
@@ -104,7 +103,10 @@ class _TurnedMap(NamedTuple):
 
 
 class _Length(NamedTuple):
-    """Where a track begins and ends along its direction [m], whether it is cut by the map, and its length [m]."""
+    """Ends of a track along its direction and its length with bounds [m].
+
+    is_cut: whether the track runs over the edge of the map.
+    """
 
     first: float
     last: float
@@ -114,176 +116,189 @@ class _Length(NamedTuple):
     high: float
 
 
-def measure_scan_track(found: ScanAlignment, depth, worn, axes: tuple, error: float) -> ScanTrack:
-    """Measure the wear track in a map of depths, as of a reciprocating ball or pin.
+def measure_scan_track(
+    alignment: ScanAlignment, depth, worn, axes: tuple, error: float
+) -> ScanTrack:
+    """Measure the wear track in a depth map, such as that of a reciprocating ball or pin.
 
-    The direction is that along which the smoothed depths change least, the weak axis of their
-    structure tensor sum(grad d grad d^T) (Bigun and Granlund 1987). The map is read in sections across
-    it. Those between the ends of the track are averaged in groups of neighbours, and each group is
-    measured as a trace is (`compare.section`). A value is the mean over the groups; its interval is
-    Student's t of their scatter, with the error of the plane, which all groups share.
+    The track runs along the weak axis of the structure tensor sum(grad d grad d^T) of the smoothed
+    depth d (Bigun and Granlund 1987). The map is divided into sections across this direction. Those
+    between the ends of the track are averaged in groups of neighbours, and each group is measured
+    like a trace (`compare.section`). A value is the mean over the groups. Its interval combines
+    Student's t of their scatter with the error of the plane, which all groups share.
 
-    The volume is the mean lost area times the length of the track, in the manner of ISO 18535 and
-    ASTM G133. Where the track runs over the edge of the scans, neither is known.
+    The volume is the mean lost area times the length of the track, as in ISO 18535 and ASTM G133.
+    If the track runs over the edge of the scans, neither is known.
 
     Parameters
     ----------
-    found : ScanAlignment
+    alignment : ScanAlignment
     depth : (m, n) array [m]
-        Missing depths filled, NaN beyond the common region.
+        Missing depths filled, NaN outside the common region.
     worn : (m, n) bool array
     axes : tuple
         x (n,) and y (m,) [m].
     error : float
-        Standard deviation [m] of the mean depth of the worn part by plane and slow errors.
+        Standard deviation [m] of the mean depth of the worn part due to the plane.
+
+    Returns
+    -------
+    ScanTrack
     """
-    angle, coherence = direction_of(depth, worn, *axes)
-    if coherence < COHERENT:
-        return _no_track("the worn part has no single direction, so it is no track")
-    turned = _turn(depth, *axes, angle)
-    section = _mean_section(turned.depth, MIN_KNOWN)
-    most = np.isfinite(turned.depth).sum(axis=0).max()
-    span = _deep_span(section, found.noise / np.sqrt(max(most, 1)))
+    angle, coherence = find_direction(depth, worn, *axes)
+    if coherence < MIN_COHERENCE:
+        return _refuse_track("the worn part has no single direction, so it is no track")
+    rotated = _rotate_map(depth, *axes, angle)
+    section = _mean_section(rotated.depth)
+    most = np.isfinite(rotated.depth).sum(axis=0).max()
+    span = _find_deep_span(section, alignment.noise / np.sqrt(max(most, 1)))
     if span is None:
-        return _no_track("the worn part is not one strip with unworn surface on both sides")
-    whole = np.isfinite(turned.depth[:, span[0] : span[1] + 1]).all(axis=1)
-    length = _measure_length(turned, span, whole)
-    cut = 0.0 if length.is_cut else END_PART * (length.last - length.first)
-    inner = (turned.along >= length.first + cut) & (turned.along <= length.last - cut)
-    rows = np.flatnonzero(whole & inner)
+        return _refuse_track("the worn part is not one strip with unworn surface on both sides")
+    complete = np.isfinite(rotated.depth[:, span[0] : span[1] + 1]).all(axis=1)
+    length = _measure_length(rotated, span, complete)
+    cut = 0.0 if length.is_cut else END_FRACTION * (length.last - length.first)
+    inner = (rotated.along >= length.first + cut) & (rotated.along <= length.last - cut)
+    rows = np.flatnonzero(complete & inner)
     groups = np.array_split(rows, max(min(N_GROUPS, rows.size // 4), 1))
     measured = []
     along = []
     for group in groups:
-        sizes = _measure_group(turned, group, span) if group.size else None
+        sizes = _measure_group(rotated, group, span) if group.size else None
         if sizes is not None:
             measured.append(sizes)
-            along.append(float(turned.along[group].mean()))
+            along.append(float(rotated.along[group].mean()))
     if len(measured) < MIN_GROUPS:
-        return _no_track(
-            f"{len(measured)} groups of complete sections cross the worn part; at least {MIN_GROUPS} are needed"
+        return _refuse_track(
+            f"{len(measured)} groups of complete sections cross the worn part; at least "
+            f"{MIN_GROUPS} are needed"
         )
-    values, scatter = _means_of_groups(measured, error, turned.step)
-    values["direction"] = _direction(angle, measured, along, turned.step)
-    values |= _volume(values["area_gross"], length)
-    section = _mean_section(turned.depth[rows], MIN_KNOWN)
-    squares = _mean_section((turned.depth[rows] - section) ** 2, MIN_KNOWN)
-    ordered = {name: values[name] for name in TEXTS}
+    means = {
+        name: mean_of([sizes[name] for sizes in measured], TEXTS[name][1]) for name in measured[0]
+    }
+    values = _widen_by_plane_error(means, error, rotated.step)
+    values["direction"] = _measure_direction(angle, measured, along, rotated.step)
+    values |= _measure_volume(values["area_gross"], length)
+    section = _mean_section(rotated.depth[rows])
+    variance = _mean_section((rotated.depth[rows] - section) ** 2)
     return ScanTrack(
-        ordered, scatter, turned.across, section, np.sqrt(np.maximum(squares, 0.0)), rows.size
+        values={name: values[name] for name in TEXTS},
+        scatter={name: mean.scatter for name, mean in means.items()},
+        across=rotated.across,
+        section=section,
+        spread=np.sqrt(np.maximum(variance, 0.0)),
+        sections=rows.size,
     )
 
 
-def _no_track(why: str) -> ScanTrack:
+def _refuse_track(why: str) -> ScanTrack:
     nothing = np.zeros(0)
-    values = {name: refused(unit, text, why) for name, (unit, text) in TEXTS.items()}
+    values = {name: refused(*meaning, why) for name, meaning in TEXTS.items()}
     return ScanTrack(values, {}, nothing, nothing, nothing, 0, why)
 
 
-def direction_of(depth, worn, x, y) -> tuple:
-    """Return the angle [rad] of the worn part from x anticlockwise, above -pi/2 to pi/2, and its coherence, 0 to 1."""
+def find_direction(depth, worn, x, y) -> tuple:
+    """Find the direction of the worn part.
+
+    Returns its angle [rad] from x anticlockwise, above -pi/2 to pi/2, and the coherence, 0 to 1, of
+    the gradients.
+    """
     from scipy.ndimage import binary_dilation, gaussian_filter
 
     every = max(min(depth.shape) // N_DIRECTION, 1)
     depth, worn, x, y = depth[::every, ::every], worn[::every, ::every], x[::every], y[::every]
     known = np.isfinite(depth)
-    sigma = max(min(depth.shape) / N_SMOOTH, 2.0)
+    sigma = max(min(depth.shape) * SMOOTHING, 2.0)
     weight = gaussian_filter(known.astype(float), sigma, mode="constant")
-    smooth = gaussian_filter(np.where(known, depth, 0.0), sigma, mode="constant") / np.maximum(
-        weight, 1e-9
-    )
-    up, along = np.gradient(smooth, y, x)
-    at = (
-        binary_dilation(worn, iterations=int(2 * sigma)) & known & (weight > 0.999)
-    )  # gradients lean at the rim
-    xx, yy, xy = (
-        float((one * other)[at].sum()) for one, other in ((along, along), (up, up), (along, up))
-    )
+    smooth = gaussian_filter(np.where(known, depth, 0.0), sigma, mode="constant")
+    smooth /= np.maximum(weight, 1e-9)
+    by_y, by_x = np.gradient(smooth, y, x)
+    near = binary_dilation(worn, iterations=int(2 * sigma))
+    near &= known & (weight > 0.999)  # the gradients of the smoothed depth are wrong at the rim
+    xx = float((by_x**2)[near].sum())
+    yy = float((by_y**2)[near].sum())
+    xy = float((by_x * by_y)[near].sum())
     if xx + yy <= 0:
         return 0.0, 0.0
     angle = float(np.arctan2(2 * xy, xx - yy)) / 2 + np.pi / 2
     return angle - np.pi * (angle > np.pi / 2), float(np.hypot(xx - yy, 2 * xy) / (xx + yy))
 
 
-def _turn(depth, x, y, angle: float) -> _TurnedMap:
-    """Read the map along and across a direction, linearly between its heights."""
+def _rotate_map(depth, x, y, angle: float) -> _RotatedMap:
+    """Interpolate the map linearly along and across a direction."""
     from scipy.ndimage import map_coordinates
 
     ahead = np.array([np.cos(angle), np.sin(angle)])
     beside = np.array([-ahead[1], ahead[0]])
     beside *= np.sign(beside[np.argmax(np.abs(beside))])
     half = np.array([np.ptp(x), np.ptp(y)]) / 2
-    cell = max(np.ptp(x) / (x.size - 1), np.ptp(y) / (y.size - 1))
+    step = max(np.ptp(x) / (x.size - 1), np.ptp(y) / (y.size - 1))
 
     def places(direction, most: int) -> np.ndarray:
         reach = float(np.abs(direction) @ half)
-        return np.linspace(-reach, reach, int(np.clip(2 * reach / cell + 1, 3, most)))
+        return np.linspace(-reach, reach, int(np.clip(2 * reach / step + 1, 3, most)))
 
     along, across = places(ahead, MAX_SECTIONS), places(beside, MAX_PLACES)
-    at = [
-        (half[k] + along[:, None] * ahead[k] + across * beside[k])
-        / (2 * half[k])
-        * (depth.shape[1 - k] - 1)
-        for k in range(2)
-    ]
-    return _TurnedMap(map_coordinates(depth, at[::-1], order=1, cval=np.nan), along, across)
+    indices = []
+    for axis in (1, 0):  # rows of the map count along y
+        position = half[axis] + along[:, None] * ahead[axis] + across * beside[axis]
+        indices.append(position / (2 * half[axis]) * (depth.shape[1 - axis] - 1))
+    return _RotatedMap(map_coordinates(depth, indices, order=1, cval=np.nan), along, across)
 
 
-def _mean_section(depth, min_known: float) -> np.ndarray:
-    """Return the mean of sections (k, u), NaN where less than a fraction of the most are measured."""
+def _mean_section(depth, min_measured: float = MIN_MEASURED) -> np.ndarray:
+    """Average sections (k, u), NaN where too few of them are measured."""
     known = np.isfinite(depth)
     count = known.sum(axis=0)
     mean = np.where(known, depth, 0.0).sum(axis=0) / np.maximum(count, 1)
-    return np.where(count > min_known * count.max(), mean, np.nan)
+    return np.where(count > min_measured * count.max(), mean, np.nan)
 
 
-def _deep_span(section, noise: float):
-    """Return first and last place of the deep part of a section that lost most.
+def _find_deep_span(section, noise: float) -> tuple | None:
+    """Find the first and last place of the deepest part of a mean section.
 
-    None where it has no shallow places at a side, or other parts lost as much together.
+    None if no unworn part lies on either side of it, or if other parts lost as much in total.
     """
     known = np.flatnonzero(np.isfinite(section))
     if known.size < 16:
         return None
-    deep = np.nan_to_num(section) > max(DEEP * noise, SHALLOW * np.nanmax(section))
+    deep = np.nan_to_num(section) > max(MIN_DEVIATIONS * noise, MIN_DEPTH * np.nanmax(section))
     runs = runs_of(deep)
     if not runs:
         return None
     first, last = max(runs, key=lambda run: float(section[run[0] : run[1] + 1].sum()))
-    if section[first : last + 1].sum() < MIN_PART * section[deep].sum():
+    if section[first : last + 1].sum() < MIN_AREA * section[deep].sum():
         return None
-    beside = max(BESIDE * (last - first), 4)
-    has_sides = first - known[0] > beside and known[-1] - last > beside
+    margin = max(MIN_MARGIN * (last - first), 4)
+    has_sides = first - known[0] > margin and known[-1] - last > margin
     return (first, last) if has_sides and last - first > 4 else None
 
 
-def _measure_length(turned: _TurnedMap, span: tuple, whole) -> _Length:
-    """Measure the length of the track between the points where the lost area is half of its median.
+def _measure_length(rotated: _RotatedMap, span: tuple, complete) -> _Length:
+    """Measure the length between the places where the lost area is half of its median.
 
-    The ends of its interval are those of three quarters and of a quarter of the median.
+    The bounds are the lengths between three quarters and between one quarter of the median.
     """
     from scipy.ndimage import median_filter
 
-    at = np.flatnonzero(whole)
+    at = np.flatnonzero(complete)
     if at.size < 8:
         return _Length(0.0, 0.0, True, 0.0, 0.0, 0.0)
-    area = median_filter(turned.depth[at, span[0] : span[1] + 1].sum(axis=1), 5)
-    middle = float(np.median(area[area > 0.25 * np.quantile(area, 0.95)]))
-    along = turned.along[at]
+    area = median_filter(rotated.depth[at, span[0] : span[1] + 1].sum(axis=1), 5)
+    median = float(np.median(area[area > 0.25 * np.quantile(area, 0.95)]))
+    along = rotated.along[at]
     ends = []
-    for share in (END_AREA, 1.5 * END_AREA, 0.5 * END_AREA):
-        runs = runs_of(area > share * middle)
+    for fraction in (0.5, 0.75, 0.25):
+        runs = runs_of(area > fraction * median)
         ends.append(max(runs, key=lambda run: run[1] - run[0]) if runs else (0, 0))
-    lengths = (float(along[last] - along[first]) for first, last in ends)
     first, last = ends[0]
-    return _Length(
-        float(along[first]), float(along[last]), first < 2 or last > at.size - 3, *lengths
-    )
+    is_cut = first < 2 or last > at.size - 3
+    lengths = (float(along[last] - along[first]) for first, last in ends)
+    return _Length(float(along[first]), float(along[last]), is_cut, *lengths)
 
 
-def _measure_group(turned: _TurnedMap, rows, span: tuple) -> dict | None:
-    """Measure the mean of neighbouring sections; None where it does not show the whole track."""
-    section = _mean_section(turned.depth[rows], 0.5)
+def _measure_group(rotated: _RotatedMap, rows, span: tuple) -> dict | None:
+    """Measure the mean of neighbouring sections; None if it does not show the whole track."""
+    section = _mean_section(rotated.depth[rows], 0.5)
     first, last = span
     known = np.flatnonzero(np.isfinite(section))
     known = known[(known > first - 2 * (last - first)) & (known < last + 2 * (last - first))]
@@ -292,64 +307,67 @@ def _measure_group(turned: _TurnedMap, rows, span: tuple) -> dict | None:
         return None
     outside = np.ones(high - low, bool)
     outside[first - low : last + 1 - low] = False
-    line = section_of_depths(turned.across[low:high], section[low:high], outside)
-    sizes = measure_track(line, (first - low, last - low), (0, high - low))
-    if any(one.value is None for one in sizes.values()) or sizes["width"].value < 4 * turned.step:
-        return None
-    return sizes
+    trace = section_of_depths(rotated.across[low:high], section[low:high], outside)
+    sizes = measure_track(trace, (first - low, last - low), (0, high - low))
+    is_known = all(size.value is not None for size in sizes.values())
+    return sizes if is_known and sizes["width"].value >= 4 * rotated.step else None
 
 
-def _means_of_groups(measured: list, error: float, cell: float) -> tuple:
-    """Return the means over the groups as `Quantity`, and the scatter of a group.
+def _widen_by_plane_error(means: dict, error: float, step: float) -> dict:
+    """Widen the intervals of the means by what all groups share.
 
-    error [m]: of the depths, which all groups share; cell [m]: distance of the places of a section,
-    to half of which all ends are known.
+    Parameters
+    ----------
+    means : dict of Mean
+    error : float
+        Standard deviation [m] of the mean depth due to the plane.
+    step : float
+        Distance [m] of neighbouring places, to half of which the ends are known.
+
+    Returns
+    -------
+    dict of Quantity
     """
-    means = {name: mean_of([one[name] for one in measured], TEXTS[name][1]) for name in measured[0]}
     width = means["width"].mean.value
-    step = max(means["step"].mean.value, 1e-300)
+    depth = max(means["step"].mean.value, 1e-300)
     values = {}
-    for name, one in means.items():
-        shared = error * (1.0 if TEXTS[name][0] == "m" else width)
-        if name in ("from", "to", "width"):  # where a parabola as deep as the step meets the plane
-            shared = float(np.hypot(error * width / (2 * step), cell / 2))
-        side = float(np.hypot(one.mean.high - one.mean.value, SIDE * shared))
-        least = -np.inf if name in SIGNED else 0.0
-        values[name] = one.mean._replace(
-            low=max(one.mean.value - side, least), high=one.mean.value + side
+    for name, average in means.items():
+        shared = error if TEXTS[name][0] == "m" else error * width
+        if name in ("from", "to", "width"):  # a parabola of this depth meets the plane at its ends
+            shared = float(np.hypot(error * width / (2 * depth), step / 2))
+        mean = average.mean
+        reach = float(np.hypot(mean.high - mean.value, SIDE * shared))
+        low = mean.value - reach
+        values[name] = mean._replace(
+            low=low if name in SIGNED else max(low, 0.0), high=mean.value + reach
         )
-    return values, {name: one.scatter for name, one in means.items()}
+    return values
 
 
-def _direction(angle: float, measured: list, along: list, cell: float) -> Quantity:
-    """Return the direction; its error is that of a line through the middles of the groups, known to half a cell [m]."""
-    middle = np.array([(one["from"].value + one["to"].value) / 2 for one in measured])
-    base = np.column_stack([np.ones(len(along)), along])
-    fit, left = np.linalg.lstsq(base, middle, rcond=None)[:2]
-    scatter = float(np.sqrt(left[0] / max(middle.size - 2, 1))) if left.size else 0.0
-    spread = max(float(np.sqrt(((base[:, 1] - base[:, 1].mean()) ** 2).sum())), 1e-300)
-    return around(
-        angle, float(np.hypot(max(scatter, cell / 2) / spread, fit[1])), *TEXTS["direction"]
-    )
+def _measure_direction(angle: float, measured: list, along: list, step: float) -> Quantity:
+    """Return the direction with the error of a line through the middles of the groups."""
+    middle = np.array([(sizes["from"].value + sizes["to"].value) / 2 for sizes in measured])
+    (slope, _), covariance = np.polyfit(along, middle, 1, cov="unscaled")
+    residual = middle - np.polyval((slope, _), along)
+    scatter = float(np.sqrt(residual @ residual / max(middle.size - 2, 1)))
+    error = max(scatter, step / 2) * float(np.sqrt(covariance[0, 0]))
+    return around(angle, float(np.hypot(error, slope)), *TEXTS["direction"])
 
 
-def _volume(area: Quantity, length: _Length) -> dict:
-    """Return length and volume of the track, refused where it runs over the edge of the scans."""
+def _measure_volume(area: Quantity, length: _Length) -> dict:
+    """Return length and volume of the track, refused if it runs over the edge of the scans."""
     if length.is_cut:
         why = (
             "the track leaves the region that both scans show, so its volume must be computed as "
             "lost area times stroke"
         )
         return {name: refused(*TEXTS[name], why) for name in ("length", "volume")}
-    off = float(
-        np.hypot(
-            (area.high - area.value) / area.value, (length.high - length.low) / 2 / length.value
-        )
-    )
+    area_error = (area.high - area.value) / area.value
+    length_error = (length.high - length.low) / 2 / length.value
+    relative_error = float(np.hypot(area_error, length_error))
     volume = area.value * length.value
+    bounds = (max(volume * (1 - relative_error), 0.0), volume * (1 + relative_error))
     return {
         "length": Quantity(length.value, length.low, length.high, *TEXTS["length"]),
-        "volume": Quantity(
-            volume, max(volume * (1 - off), 0.0), volume * (1 + off), *TEXTS["volume"]
-        ),
+        "volume": Quantity(volume, *bounds, *TEXTS["volume"]),
     }

@@ -1,4 +1,4 @@
-"""Volumes, fraction and depths of what wore off and of what grew, from a map of depths."""
+"""Volumes, fractions and depths of what wore off and of what grew, from a depth map."""
 
 from typing import NamedTuple
 
@@ -7,38 +7,35 @@ import numpy as np
 from ..compare.errors import N_DRAWS
 from ..quantity import SIDE, Quantity, around, refused
 from .alignment import MARGIN, ScanAlignment
-from .wear import hidden_depth, mean_of_square, widen
+from .wear import detection_limit, mean_of_square, widen
 
-FEET = 3  # heights by which a changed part is widened, because its edges are below the noise
-HIDDEN = (
-    0.5  # of the depth that noise hides, the mean depth of wear that runs out beside the worn part
-)
-WALL = 0.5  # of the depth beside it, by which a missing wall may be deeper or less deep, all walls alike
-BLUNT = 4.0  # standard deviations below the deepest height within which a height may be the deepest
-SEED = 1991
-TEXTS = {
-    "worn_volume": "volume of material lost in the region that both scans show",
-    "grown_volume": "volume of material above the first scan (before wear), such as pile-up or deposits",
-    "worn_share": "worn area divided by the area of the region that both scans show",
-    "worn_depth_mean": "worn volume divided by the area of the region that both scans show",
-    "worn_depth_max": "largest worn depth, after taking the median of every 3 x 3 measured heights",
-}
-UNITS = {
-    "worn_volume": "m3",
-    "grown_volume": "m3",
-    "worn_share": "1",
-    "worn_depth_mean": "m",
-    "worn_depth_max": "m",
+RIM = 3  # heights around a changed part that belong to its volume, because its edges are shallow
+MAX_DEFICIT = 8.0  # standard deviations below the deepest height that noise can reverse
+MEASURES = {  # name: (unit, definition)
+    "worn_volume": ("m3", "volume of material lost in the region that both scans show"),
+    "grown_volume": (
+        "m3",
+        "volume of material above the first scan (before wear), such as pile-up or deposits",
+    ),
+    "worn_share": ("1", "worn area divided by the area of the region that both scans show"),
+    "worn_depth_mean": (
+        "m",
+        "worn volume divided by the area of the region that both scans show",
+    ),
+    "worn_depth_max": (
+        "m",
+        "largest worn depth, after taking the median of every 3 x 3 measured heights",
+    ),
 }
 
 
 class Volumes(NamedTuple):
-    """Measures of a map of depths.
+    """Measures of a depth map.
 
-    values: `Quantity` by the names of TEXTS; worn, grown: (m, n) bool arrays; filled (m, n) [m]: the
-    depths, missing ones from their neighbours, NaN beyond the common region; error [m]: standard
-    deviation of the mean depth of the worn part by the plane and slow errors; open: whether both of
-    two parts may be the unworn one, and neither wear nor growth shows in both cases.
+    values: `Quantity` by the names of MEASURES; worn, grown: (m, n) bool arrays; filled (m, n) [m]:
+    depth with missing values taken from the nearest point, NaN outside the common region; error
+    [m]: standard deviation of the mean depth of the worn part due to the plane; is_ambiguous:
+    whether either of two parts may be the unworn one, so that neither wear nor growth is shown.
     """
 
     values: dict
@@ -46,70 +43,65 @@ class Volumes(NamedTuple):
     grown: np.ndarray
     filled: np.ndarray
     error: float = 0.0
-    open: bool = False
+    is_ambiguous: bool = False
 
 
-def no_values(reason: str) -> dict:
-    """Return the measures without values, and why."""
-    return {name: refused(UNITS[name], text, reason) for name, text in TEXTS.items()}
+def refuse_measures(reason: str) -> dict:
+    """Return all measures without values, with the reason."""
+    return {name: refused(*meaning, reason) for name, meaning in MEASURES.items()}
 
 
-def measure_volumes(found: ScanAlignment, x, y) -> Volumes:
-    """Measure a map of depths at x (n,) and y (m,) [m].
+def measure_volumes(alignment: ScanAlignment, x, y) -> Volumes:
+    """Measure a depth map at x (n,) and y (m,) [m].
 
-    Volumes are sums of the depths over the worn, or grown, heights and those beside them. Their
-    errors are those of the drawn fields (`errors`), and of steep walls, which instruments miss.
-    Where another part may be the unworn one, the intervals reach to what that gives.
+    A volume is the sum of the depths over the changed points and those around them. Its error
+    combines the drawn errors of the depth (`errors`) with that of steep walls, which instruments
+    miss. If another part may be unworn instead, each interval also covers the result for that part.
     """
-    first = _measure(found, x, y)
-    if found.other is None:
+    first = _measure(alignment, x, y)
+    if alignment.alternative is None:
         return first
-    second = _measure(found.other, x, y)
+    second = _measure(alignment.alternative, x, y)
     both = {}
-    for name, one in first.values.items():
+    for name, value in first.values.items():
         other = second.values[name]
-        both[name] = one._replace(low=min(one.low, other.low), high=max(one.high, other.high))
-    shown = [
+        both[name] = value._replace(low=min(value.low, other.low), high=max(value.high, other.high))
+    is_shown = [
         any(values[name].low > 0 for name in ("worn_volume", "grown_volume"))
         for values in (first.values, second.values, both)
     ]
-    return first._replace(values=both, open=shown[0] and shown[1] and not shown[2])
+    return first._replace(values=both, is_ambiguous=is_shown == [True, True, False])
 
 
-def _measure(found: ScanAlignment, x, y) -> Volumes:
-    inside = found.region
+def _measure(alignment: ScanAlignment, x, y) -> Volumes:
+    inside = alignment.region
     cell = np.where(inside, np.gradient(y)[:, None] * np.gradient(x)[None, :], 0.0)
     area = float(cell.sum())
-    nearest = _nearest_known(found.depth)
-    filled = np.where(inside, found.depth[nearest], np.nan)
-    worn, grown = found.worn[nearest] & inside, found.grown[nearest] & inside
+    nearest = _nearest_known(alignment.depth)
+    filled = np.where(inside, alignment.depth[nearest], np.nan)
     depth = np.where(inside, filled, 0.0)
-    walls = _doubt_of_walls(found, worn), _doubt_of_walls(found, grown)
-    hidden = hidden_depth(found.depth, found.used)
-    values = {}
-    parts = (
-        ("worn_volume", worn, grown, 1.0, walls[0]),
-        ("grown_volume", grown, worn, -1.0, walls[1]),
-    )
-    for name, mask, other, sign, doubt in parts:
-        weight = sign * cell * (widen(mask, FEET) & ~other)
-        beside = widen(mask, int(MARGIN * min(mask.shape))) & (weight == 0.0) & ~other
-        unseen = HIDDEN * hidden * float(cell[beside].sum())
-        values[name] = _volume(found, weight, depth, float((cell * doubt).sum()), unseen, name)
-    values["worn_share"] = _share(found, cell, worn, walls[0] > 0)
-    mean = (one / area for one in values["worn_volume"][:3])
-    values["worn_depth_mean"] = Quantity(*mean, "m", TEXTS["worn_depth_mean"])
-    values["worn_depth_max"] = _largest(found, worn)
+    worn = alignment.worn[nearest] & inside
+    grown = alignment.grown[nearest] & inside
+    walls = _wall_error(alignment, worn)
+    volume = _measure_volume(alignment, cell, depth, worn, grown, walls)
+    growth = _measure_volume(alignment, cell, -depth, grown, worn, _wall_error(alignment, grown))
+    mean = (bound / area for bound in volume)
+    values = {
+        "worn_volume": Quantity(*volume, *MEASURES["worn_volume"]),
+        "grown_volume": Quantity(*growth, *MEASURES["grown_volume"]),
+        "worn_share": _measure_share(alignment, cell, worn, walls > 0, nearest),
+        "worn_depth_mean": Quantity(*mean, *MEASURES["worn_depth_mean"]),
+        "worn_depth_max": _measure_largest(alignment, worn),
+    }
     error = 0.0
     if worn.any():
-        error = float(np.std(found.errors.of_sum(np.where(worn, cell, 0.0), 0.0))) / float(
-            cell[worn].sum()
-        )
+        draws = alignment.errors.error_of_sum(np.where(worn, cell, 0.0), 0.0)
+        error = float(np.std(draws)) / float(cell[worn].sum())
     return Volumes(values, worn, grown, filled, error)
 
 
 def _nearest_known(depth) -> tuple:
-    """Return the row and column indices (m, n) of the valid depth nearest to each point."""
+    """Return the row and column indices (m, n) of the measured depth nearest to each point."""
     from scipy.ndimage import distance_transform_edt
 
     return tuple(
@@ -117,111 +109,122 @@ def _nearest_known(depth) -> tuple:
     )
 
 
-def _volume(
-    found: ScanAlignment, weight, depth, doubt: float, unseen: float, name: str
-) -> Quantity:
-    """Sum weight (m, n) [m2] times depth [m], with its interval.
+def _measure_volume(alignment: ScanAlignment, cell, depth, changed, opposite, walls) -> tuple:
+    """Sum the depth over a changed part and its rim.
 
-    doubt [m3]: of missing walls; unseen [m3]: what noise may hide beside the weighted heights.
+    Parameters
+    ----------
+    alignment : ScanAlignment
+    cell : (m, n) array [m2]
+        Area of each point.
+    depth : (m, n) array [m]
+        Positive where the part changed.
+    changed, opposite : (m, n) bool array
+        Points that changed, and those that changed in the opposite sense.
+    walls : (m, n) array [m]
+        Error of the depth of missing walls.
+
+    Returns
+    -------
+    tuple
+        Volume and bounds of its interval [m3].
     """
-    volume = float((weight * depth).sum())
-    deviation = float(np.std(found.errors.of_sum(weight, found.noise)))
+    weight = cell * (widen(changed, RIM) & ~opposite)
     if not weight.any():
-        return Quantity(
-            0.0, 0.0, SIDE * found.noise * float(np.abs(weight).max(initial=0.0)), "m3", TEXTS[name]
-        )
-    reach = SIDE * deviation + doubt
-    return Quantity(
-        max(volume, 0.0),
-        max(volume - reach, 0.0),
-        max(volume + reach + unseen, 0.0),
-        "m3",
-        TEXTS[name],
-    )
+        return 0.0, 0.0, 0.0
+    beside = widen(changed, int(MARGIN * min(changed.shape))) & (weight == 0.0) & ~opposite
+    # wear that runs out beside the part is half as deep on average as that which is just detected
+    undetected = detection_limit(alignment.depth, alignment.unworn) / 2 * float(cell[beside].sum())
+    volume = float((weight * depth).sum())
+    deviation = float(np.std(alignment.errors.error_of_sum(weight, alignment.noise)))
+    reach = SIDE * deviation + float((cell * walls).sum())
+    bounds = (volume, volume - reach, volume + reach + undetected)
+    return tuple(max(bound, 0.0) for bound in bounds)
 
 
-def _doubt_of_walls(found: ScanAlignment, changed) -> np.ndarray:
-    """Return the uncertainty (m, n) [m] of the depth where the heights of a steep wall are missing.
+def _wall_error(alignment: ScanAlignment, changed) -> np.ndarray:
+    """Estimate the error (m, n) [m] of the depth where the heights of a steep wall are missing.
 
-    A wall is missing where a height that is unknown lies about as far from a deep height, or a high
-    one, as from one that did not change. It may be as deep as the deep one, or not deep at all.
+    A missing point belongs to a wall if its distances to the deep part and to the unchanged part
+    are similar. Its depth lies between zero and that of the deep part, so half of that depth is
+    the error, alike for all walls.
     """
     from scipy.ndimage import distance_transform_edt
 
-    known = np.isfinite(found.depth)
-    missing = found.region & ~known
+    known = np.isfinite(alignment.depth)
+    missing = alignment.region & ~known
     if not missing.any() or not (changed & known).any() or not (known & ~changed).any():
         return np.zeros(changed.shape)
-    size = np.where(changed & known, np.abs(found.depth), 0.0)
-    from_deep, place = distance_transform_edt(
+    size = np.where(changed & known, np.abs(alignment.depth), 0.0)
+    to_deep, place = distance_transform_edt(
         size <= np.median(size[size > 0]) / 2, return_indices=True
     )
-    from_unchanged = distance_transform_edt(~(known & ~changed))
-    is_wall = missing & (from_deep < 2 * from_unchanged) & (from_unchanged < 2 * from_deep)
-    return np.where(is_wall, WALL * size[tuple(place)], 0.0)
+    to_unchanged = distance_transform_edt(~(known & ~changed))
+    is_wall = missing & (to_deep < 2 * to_unchanged) & (to_unchanged < 2 * to_deep)
+    return np.where(is_wall, size[tuple(place)] / 2, 0.0)
 
 
-def _share(found: ScanAlignment, cell, worn, walls) -> Quantity:
-    """Return the worn fraction of the common region.
+def _measure_share(alignment: ScanAlignment, cell, worn, walls, nearest) -> Quantity:
+    """Measure the worn fraction of the common region.
 
-    The area above a threshold shrinks linearly with the threshold at the edge of round wear. The areas
-    above three and six standard deviations of the mean of 3 x 3 depths give that above none, which is
-    known to half of the distance, and to half a height around the worn part.
+    Near the edge of round wear the area above a threshold falls linearly with the threshold. The
+    areas above three and six standard deviations of the mean of 3 x 3 depths are extrapolated to a
+    threshold of zero. The error is half of this extrapolation and half a point around the part.
     """
     area = float(cell.sum())
-    nearest = _nearest_known(found.depth)
-    mean, known = mean_of_square(found.depth, 3)
-    even = (mean * np.sqrt(known))[nearest]
-    quiet = found.used & ~widen(worn, FEET)
-    scatter = float(even[quiet].std()) if quiet.any() else found.noise / 3
-    near = widen(worn, FEET) & found.region
-    share, less = (float(cell[near & (even > k * scatter)].sum()) / area for k in (3.0, 6.0))
-    rim = float(cell[widen(worn, 1) & ~worn].sum()) / area
-    value = min(2 * share - less, 1.0)
-    reach = (value - share + rim) / 2 + WALL * float(cell[walls].sum()) / area
-    return Quantity(
-        value, max(value - reach, 0.0), min(value + reach, 1.0), "1", TEXTS["worn_share"]
+    mean, measured = mean_of_square(alignment.depth, 3)
+    mean = (mean * np.sqrt(measured))[nearest]
+    reference = alignment.unworn & ~widen(worn, RIM)
+    scatter = float(mean[reference].std()) if reference.any() else alignment.noise / 3
+    near = widen(worn, RIM) & alignment.region
+    above_three, above_six = (
+        float(cell[near & (mean > k * scatter)].sum()) / area for k in (3.0, 6.0)
     )
+    rim = float(cell[widen(worn, 1) & ~worn].sum()) / area
+    value = min(2 * above_three - above_six, 1.0)
+    reach = (value - above_three + rim + float(cell[walls].sum()) / area) / 2
+    low, high = max(value - reach, 0.0), min(value + reach, 1.0)
+    return Quantity(value, low, high, *MEASURES["worn_share"])
 
 
-def _largest(found: ScanAlignment, worn) -> Quantity:
-    """Return the largest median depth of 3 x 3 heights, less what noise adds to the largest of many.
+def _measure_largest(alignment: ScanAlignment, worn) -> Quantity:
+    """Measure the largest median depth of 3 x 3 heights, less the bias of a maximum over noise.
 
     The noise of the medians is drawn from those of unworn heights.
     """
     from scipy.ndimage import median_filter
 
-    text = TEXTS["worn_depth_max"]
-    known = np.isfinite(found.depth)
+    meaning = MEASURES["worn_depth_max"]
+    known = np.isfinite(alignment.depth)
     if not (worn & known).any():
-        return Quantity(0.0, 0.0, 2 * SIDE * found.noise, "m", text)
-    medians = median_filter(np.where(known, found.depth, 0.0), 3)
-    pool = medians[found.used & ~widen(~known, 1)]
-    pool = pool if pool.size > 100 else medians[found.used]
-    scatter = float(pool.std()) if pool.size > 1 else found.noise / 2
-    here = medians[worn & known]
-    top = float(here.max())
-    near = here[here > top - 2 * BLUNT * scatter]
-    random = np.random.default_rng(SEED)
-    peaks = (
-        np.array([(near + random.choice(pool, near.size)).max() for _ in range(N_DRAWS)])
-        if pool.size
-        else near
-    )
-    clean = _shrink(near, scatter)
-    excess = (
-        float(np.mean([(clean + random.choice(pool, near.size)).max() for _ in range(N_DRAWS)]))
-        - clean.max()
-    )
-    error = float(np.hypot(peaks.std(), excess / 2))
-    level = float(np.std(found.errors.of_sum(worn / worn.sum(), 0.0)))
-    value = around(top - excess, float(np.hypot(error, level)), "m", text, 0.0)
-    finest = float(found.depth[worn & known].max())
-    return value._replace(high=max(value.high, finest + scatter))
+        return Quantity(0.0, 0.0, 2 * SIDE * alignment.noise, *meaning)
+    medians = median_filter(np.where(known, alignment.depth, 0.0), 3)
+    unworn = medians[alignment.unworn & ~widen(~known, 1)]
+    if unworn.size <= 100:
+        unworn = medians[alignment.unworn]
+    scatter = float(unworn.std()) if unworn.size > 1 else alignment.noise / 2
+    inside = medians[worn & known]
+    largest = float(inside.max())
+    deep = inside[inside > largest - MAX_DEFICIT * scatter]
+    random = np.random.default_rng(1991)
+
+    def draw_maxima(values) -> np.ndarray:
+        return np.array(
+            [(values + random.choice(unworn, values.size)).max() for _ in range(N_DRAWS)]
+        )
+
+    maxima = draw_maxima(deep)
+    noiseless = _shrink_scatter(deep, scatter)
+    bias = float(draw_maxima(noiseless).mean()) - noiseless.max()
+    level = float(np.std(alignment.errors.error_of_sum(worn / worn.sum(), 0.0)))
+    error = float(np.sqrt(maxima.var() + (bias / 2) ** 2 + level**2))
+    value = around(largest - bias, error, *meaning, 0.0)
+    deepest_single = float(alignment.depth[worn & known].max())
+    return value._replace(high=max(value.high, deepest_single + scatter))
 
 
-def _shrink(values, scatter: float) -> np.ndarray:
-    """Return values (k,) with the scatter about their mean that they have without noise of a standard deviation."""
-    seen = float(values.var())
-    share = np.sqrt(max(seen - scatter**2, 0.0) / max(seen, 1e-300))
-    return values.mean() + share * (values - values.mean())
+def _shrink_scatter(values, scatter: float) -> np.ndarray:
+    """Shrink values (k,) towards their mean by the part of their variance that is noise."""
+    variance = float(values.var())
+    factor = np.sqrt(max(variance - scatter**2, 0.0) / max(variance, 1e-300))
+    return values.mean() + factor * (values - values.mean())

@@ -1,84 +1,82 @@
-"""Which heights of a map of depths changed: deeper, or higher, than noise by the mean of the depths around them."""
+"""Detection of worn and grown heights in a depth map, by means over squares of rising size."""
 
 import numpy as np
 
 from ..compare.section import sure_of
 
-# heights along the sides of the squares: deep and narrow changes show in small ones
-SIDES = (3, 9, 25, 63)
-CLIPPED = 8.0  # limit of a height in standard deviations, so that a single outlier is no change
-MIN_KNOWN = 0.25  # smallest fraction of valid heights in a square
-MIN_QUIET = 50  # smallest number of unworn squares for an estimate of their scatter
+SQUARE_SIDES = (3, 9, 25, 63)  # heights; small squares show narrow deep wear, large ones wide wear
+MAX_RELATIVE_DEPTH = 8.0  # standard deviations; clipping keeps one outlier from passing for wear
+MIN_MEASURED = 0.25  # fraction of the heights of a square; with fewer its mean is not tested
+MIN_UNWORN_SQUARES = 50  # fewer squares do not determine the scatter of a mean
 
 
-def find_change(depth, used, noise: float) -> tuple:
-    """Find the heights of a map of depths with material loss and those with material gain.
+def find_change(depth, unworn, noise: float) -> tuple:
+    """Find the heights that lost material and those that gained material.
 
     Parameters
     ----------
     depth : (m, n) array [m]
-        NaN where a height is missing.
-    used : (m, n) bool array
-        Heights that are unworn by their own depth; their squares give the scatter of a mean.
+        Worn depth, NaN where a height is missing.
+    unworn : (m, n) bool array
+        Heights that agree with the plane; the scatter of their means is the reference.
     noise : float
         Standard deviation [m] of an unworn depth.
 
     Returns
     -------
     worn, grown : (m, n) bool array
-        Missing heights too, where those around them changed.
+        Missing heights are included where the squares around them changed.
     """
-    relative = np.clip(depth / noise, -CLIPPED, CLIPPED).astype(np.float32)
-    worn, grown = (_find_beyond(relative, used, sign) for sign in (1.0, -1.0))
+    relative = np.clip(depth / noise, -MAX_RELATIVE_DEPTH, MAX_RELATIVE_DEPTH).astype(np.float32)
+    worn = _find_deep_squares(relative, unworn)
+    grown = _find_deep_squares(-relative, unworn)
     return worn & ~grown, grown & ~worn
 
 
-def _find_beyond(relative, used, sign: float) -> np.ndarray:
-    """Find heights whose squares lie beyond the scatter of unworn squares, small squares first.
+def _find_deep_squares(relative, unworn) -> np.ndarray:
+    """Find heights whose squares are deeper than unworn squares scatter, small squares first.
 
-    Heights that changed by a smaller square do not count in a larger one, which would carry them
-    into its neighbours.
+    A height that a smaller square shows is left out of larger squares, which would spread its depth
+    over unworn neighbours.
     """
-    sure = sure_of(relative.size)
+    threshold = sure_of(relative.size)
     changed = np.zeros(relative.shape, bool)
-    for side in SIDES:
+    for side in SQUARE_SIDES:
         if side > min(relative.shape) // 3:
             break
-        mean, known = mean_of_square(np.where(changed, np.nan, relative), side)
-        quiet = (mean_of_square(np.where(used & ~changed, 1.0, 0.0), side)[0] > 0.5) & (
-            known > MIN_KNOWN
-        )
-        if quiet.sum() < MIN_QUIET:
+        mean, measured = mean_of_square(np.where(changed, np.nan, relative), side)
+        unworn_fraction, _ = mean_of_square(np.where(unworn & ~changed, 1.0, 0.0), side)
+        is_tested = measured > MIN_MEASURED
+        reference = is_tested & (unworn_fraction > 0.5)
+        if reference.sum() < MIN_UNWORN_SQUARES:
             break
-        even = mean * np.sqrt(known)  # means of fewer heights scatter more
-        scatter = max(1.4826 * float(np.median(np.abs(even[quiet]))), 1 / side)
-        changed |= widen((known > MIN_KNOWN) & (sign * even > sure * scatter), side // 4)
+        mean = mean * np.sqrt(measured)  # a mean of fewer heights scatters more
+        scatter = max(1.4826 * float(np.median(np.abs(mean[reference]))), 1 / side)
+        changed |= widen(is_tested & (mean > threshold * scatter), side // 4)
     return changed
 
 
-def hidden_depth(depth, used) -> float:
-    """Return the mean depth [m] of wear over wide squares that noise and slow errors hide."""
-    sides = [side for side in SIDES if side <= min(depth.shape) // 3]
-    mean, known = mean_of_square(np.where(used, depth, np.nan), sides[-1])
-    quiet = known > 0.5
-    return sure_of(depth.size) * float(mean[quiet].std()) if quiet.any() else 0.0
+def detection_limit(depth, unworn) -> float:
+    """Return the mean depth [m] below which wear over the widest square is not detected."""
+    side = max(side for side in SQUARE_SIDES if side <= min(depth.shape) // 3)
+    mean, measured = mean_of_square(np.where(unworn, depth, np.nan), side)
+    reference = mean[measured > 0.5]
+    return sure_of(depth.size) * float(reference.std()) if reference.size else 0.0
 
 
 def mean_of_square(values, side: int) -> tuple:
-    """Return the mean of the known values (m, n) in the square around each place, and the known fraction."""
+    """Return the mean of the measured values in the square around each point, and their fraction."""
     from scipy.ndimage import uniform_filter
 
-    known = np.isfinite(values)
-    share = np.maximum(uniform_filter(known.astype(np.float32), side, mode="constant"), 1e-6)
-    mean = (
-        uniform_filter(np.where(known, values, 0.0).astype(np.float32), side, mode="constant")
-        / share
-    )
-    return mean, share
+    measured = np.isfinite(values)
+    fraction = uniform_filter(measured.astype(np.float32), side, mode="constant")
+    fraction = np.maximum(fraction, 1e-6)
+    filled = np.where(measured, values, 0.0).astype(np.float32)
+    return uniform_filter(filled, side, mode="constant") / fraction, fraction
 
 
 def widen(mask, count: int) -> np.ndarray:
-    """Widen a mask (m, n) by so many places on each side."""
+    """Widen a mask (m, n) by a number of points on each side."""
     from scipy.ndimage import maximum_filter
 
     return maximum_filter(mask, 2 * count + 1) if count else mask

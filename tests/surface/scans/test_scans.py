@@ -16,7 +16,7 @@ from patchfem.surface.areal import Areal, filled
 from patchfem.surface.files.read import read_surface
 from patchfem.surface.scans import change, search
 from patchfem.surface.scans.model import rotation
-from patchfem.surface.scans.search import variant
+from patchfem.surface.scans.search import transform_scan
 
 STEP, COUNT, COARSE, FULL = 1e-6, 200, 112, search.SIZE
 SIDE = STEP * (COUNT - 1)
@@ -91,8 +91,8 @@ def test_exact_a_groove_between_unworn_parts_has_its_volume_and_its_place(worn):
 @pytest.mark.share(0)
 @pytest.mark.parametrize("mirrored, turned", [("x", False), ("y", True)])
 def test_exact_a_scan_that_is_mirrored_or_turned_over_has_the_same_volume(grooved, worn, mirrored, turned):
-    other = change.compare_scans(grooved[0], variant(grooved[1], mirrored, turned))
-    assert (other.found.guess.mirrored, other.found.guess.turned) == (mirrored, turned)
+    other = change.compare_scans(grooved[0], transform_scan(grooved[1], mirrored, turned))
+    assert (other.alignment.placement.mirrored, other.alignment.placement.is_inverted) == (mirrored, turned)
     assert other.values["worn_volume"].value == pytest.approx(worn.values["worn_volume"].value, rel=1e-6)
     assert mirrored in change.sentences(other)[0] and ("turned over" in change.describe_variant(other)) == turned
 
@@ -102,7 +102,7 @@ def test_exact_a_scan_that_is_turned_half_round_is_found(grooved, worn):
     scan = grooved[1]
     half = Areal(scan.x, scan.y, scan.z[::-1, ::-1], scan.source)
     found = change.compare_scans(grooved[0], half)
-    assert abs(abs(found.registration["rotation"].value) - np.pi) < 0.04 and not found.found.guess.mirrored
+    assert abs(abs(found.registration["rotation"].value) - np.pi) < 0.04 and not found.alignment.placement.mirrored
     assert found.values["worn_volume"].value == pytest.approx(worn.values["worn_volume"].value, rel=1e-6)
 
 
@@ -133,7 +133,7 @@ def test_always_either_side_of_an_edge_may_be_the_unworn_one():
         return 0.8e-6 * np.clip((x - 0.55 * SIDE) / SIDE, 0.0, None)
     found = change.compare_scans(*scans(wedge))
     truth, volume = common(0.03, (12e-6, -18e-6), wedge), found.values["worn_volume"]
-    assert volume.low <= truth <= volume.high and found.found.other is not None
+    assert volume.low <= truth <= volume.high and found.alignment.alternative is not None
     assert any("edge" in text for text in change.sentences(found))
 
 
@@ -177,7 +177,7 @@ def test_always_spikes_are_left_out_and_pits_are_not(grooved):
     z[100, 100] -= 5e-6
     x, y = np.meshgrid(np.arange(COUNT), np.arange(COUNT))
     z -= 2e-6 * (np.hypot(x - 110, y - 110) < 4)
-    kept, count = change.without_spikes(Areal(scan.x, scan.y, z, "a scan"))
+    kept, count = change.remove_spikes(Areal(scan.x, scan.y, z, "a scan"))
     assert np.isnan(kept.z[50:52, 60:62]).all() and np.isnan(kept.z[100, 100])
     assert np.isfinite(kept.z[110, 110]) == np.isfinite(scan.z[110, 110]) and count <= 8
 
@@ -194,7 +194,7 @@ def test_always_a_spike_on_a_slope_is_left_out():
     axis, draw = STEP * np.arange(60), np.random.default_rng(3)
     z = 5e-2 * axis + 2e-2 * axis[:, None] + 1e-10 * draw.normal(size=(60, 60))
     z[30:32, 20:22] += 12e-6
-    kept, count = change.without_spikes(Areal(axis, axis, z, "a scan"))
+    kept, count = change.remove_spikes(Areal(axis, axis, z, "a scan"))
     assert count == 4 and np.isnan(kept.z[30:32, 20:22]).all()
 
 
@@ -222,9 +222,10 @@ def test_exact_a_scan_beside_itself_shows_no_change(grooved, tmp_path):
     assert "two or four traces are needed, or two areal scans" in cli("compare", file, tmp_path / "trace.csv").err
 
 
-@pytest.mark.parametrize("clear, least", [(3.0, change.ALIKE_UNCLEAR), (30.0, change.ALIKE)])
+@pytest.mark.parametrize("clear, least", [(3.0, change.MIN_CORRELATION_UNSURE), (30.0, change.MIN_CORRELATION)])
 def test_always_a_refused_place_names_the_likeness_that_it_wants(grooved, worn, monkeypatch, clear, least):
-    found = replace(worn.found, likeness=least - 0.004, guess=worn.found.guess._replace(clear=clear))
+    found = replace(worn.alignment, correlation=least - 0.004,
+                    placement=worn.alignment.placement._replace(significance=clear))
     monkeypatch.setattr(change, "align_scans", lambda before, after: found)
     why = change.compare_scans(*grooved).why
     assert f"of {least - 0.004:.3f}, but only values above {least:g} " in why
@@ -274,10 +275,10 @@ def test_always_the_verb_tells_volumes_and_draws_maps(grooved, worn, tmp_path, c
     found = worn
     files = [read_surface(tmp_path / "out" / f"difference.{end}") for end in ("x3p", "csv")]
     for one in files:
-        there = np.isfinite(found.found.depth)
+        there = np.isfinite(found.alignment.depth)
         rows, columns = (np.isin(np.round(axis, 12), np.round(kept, 12)) for axis, kept in
                          ((found.before.y, one.y), (found.before.x, one.x)))
         assert not there[~rows].any() and not there[:, ~columns].any()  # a row without a height has none in columns
-        wanted = found.found.depth[np.ix_(rows, columns)]
+        wanted = found.alignment.depth[np.ix_(rows, columns)]
         assert one.z.shape == wanted.shape and np.array_equal(np.isnan(one.z), np.isnan(wanted))
         assert np.nanmax(np.abs(one.z - wanted)) < 1e-15

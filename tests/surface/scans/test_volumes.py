@@ -5,7 +5,6 @@ import pytest
 from made_scans import aligned
 from scipy.ndimage import gaussian_filter
 
-from patchfem.surface.scans import volumes
 from patchfem.surface.scans.volumes import measure_volumes
 
 STEP, COUNT, NOISE = 1e-6, 240, 20e-9
@@ -23,18 +22,15 @@ def noisy(depth, seed=0, sigma=0.0):
 
 
 @pytest.mark.parametrize("from_depth", [0.1, 0.3])
-def test_always_a_pit_whose_steep_wall_is_missing_has_its_volume_in_the_interval(
-    monkeypatch, from_depth
-):
-    """Of a flat-bottomed pit the wall, deeper than a share of the floor, has no heights."""
+def test_always_a_pit_whose_steep_wall_is_missing_has_its_volume_in_the_interval(from_depth):
+    """The wall of a flat-bottomed pit, below a fraction of the depth of its floor, has no heights."""
     r = np.hypot(X - 120e-6, Y - 110e-6)
     pit = 1e-6 * np.clip((60e-6 - r) / 25e-6, 0.0, 1.0) ** 0.7
     depth = np.where((pit > from_depth * 1e-6) & (pit < 0.98e-6), np.nan, noisy(pit))
     truth = float(pit.sum()) * STEP**2
     found = measure_volumes(aligned(depth, NOISE), AXIS, AXIS).values["worn_volume"]
     assert 0.5 * truth < found.low <= truth <= found.high
-    monkeypatch.setattr(volumes, "WALL", 0.0)
-    assert not measure_volumes(aligned(depth, NOISE), AXIS, AXIS).values["worn_volume"].high > truth
+    assert found.high - found.value > 0.1 * truth  # the noise of the depths alone gives 1 %
 
 
 @pytest.mark.parametrize("sigma", [0.0, 4.0])
