@@ -63,14 +63,6 @@ def test_exact_halves_of_a_mirrored_piece_give_the_whole(columns):
     assert halves.inside.entries <= 0.7 * whole.inside.entries
 
 
-def test_exact_every_node_is_eliminated_once_but_those_kept():
-    piece = of_size(41, 29, seed=3)
-    gone = np.concatenate([stack.own.ravel() for stack in piece.factor.inside.stacks])
-    kept = piece.factor.inside.ring
-    assert np.array_equal(kept, np.arange(41) * 29)
-    assert np.array_equal(np.sort(np.concatenate([gone, kept])), np.arange(41 * 29))
-
-
 def test_order_fronts_of_a_square_grid_grow_as_n_log_n():
     kept = []
     for n in (33, 65, 129):

@@ -6,11 +6,9 @@ from functools import cache
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pieces import HEIGHT, LENGTH, TITANIUM, bare, refined_middle
-from skfem import Basis, ElementQuad1, ElementVector, MeshQuad
-from skfem.models.elasticity import linear_elasticity
 
 from patchfem.contact.gaps import crown
 from patchfem.contact.unilateral import press
@@ -115,33 +113,6 @@ def test_exact_patch_test_on_held_blocks_without_poisson_effect(one, other, stif
         assert state.sigma_n == pytest.approx(LOAD / LENGTH, rel=limit or rounding(nn))
         closing = LOAD / LENGTH * (HEIGHT / YOUNG + 0.7 * HEIGHT / (stiff * YOUNG))
         assert state.approach == pytest.approx(closing, rel=1e-12)
-
-
-def rolling(x, height, young, poisson):
-    """(m, m) compliance of a plane-stress block on a smooth far face, free to spread; assembled by scikit-fem alone."""
-    mesh = MeshQuad.init_tensor(x, np.linspace(0, height, 5))
-    basis = Basis(mesh, ElementVector(ElementQuad1()))
-    stiff = linear_elasticity(young * poisson / (1 - poisson**2), young / 2 / (1 + poisson)).assemble(basis).toarray()
-    far = np.flatnonzero(mesh.p[1] == height)
-    held = np.append(basis.nodal_dofs[1, far], basis.nodal_dofs[0, far[0]])
-    free = np.setdiff1d(np.arange(stiff.shape[0]), held)
-    face = np.flatnonzero(mesh.p[1] == 0)
-    face = basis.nodal_dofs[1, face[np.argsort(mesh.p[0, face])]]
-    pick = np.searchsorted(free, face)
-    return np.linalg.inv(stiff[np.ix_(free, free)])[np.ix_(pick, pick)]
-
-
-@settings(settings.get_profile("costly"))
-@given(one=cells, other=cells, stiff=st.sampled_from([0.01, 1.0, 100.0]))
-def test_exact_patch_test_on_rollers_with_unlike_spreading(one, other, stiff):
-    x_low, x_high = nodes(one), nodes(other)
-    low, high = rolling(x_low, HEIGHT, YOUNG, 0.32), rolling(x_high, HEIGHT, stiff * YOUNG, 0.2)
-    soft = softness(x_low, low, x_low), softness(x_high, high, x_high)
-    for x, limit in ((common_grid(x_low, x_high, *soft), 1e-12), (x_low, None), (x_high, None)):
-        nn = forced((low,), x_low, (high,), x_high, x)
-        state = pressed(x, (nn + nn.T) / 2, np.zeros(x.size))
-        assert state.sigma_n == pytest.approx(LOAD / LENGTH, rel=limit or rounding(nn))
-        assert state.approach == pytest.approx(LOAD / LENGTH * HEIGHT / YOUNG * (1 + 1 / stiff), rel=1e-12)
 
 
 def crooked(sizes, seed):
@@ -262,25 +233,13 @@ def hertz(x, nn, young_low, young_high):
 
 
 @pytest.mark.parametrize("young_low, young_high", [(1, 1), (1, 100), (100, 1), (1, 5)])
-@pytest.mark.parametrize("fine", [17, 24, 40, pytest.param(160, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("fine", [17, 24, 40])
 def test_exact_hertz_on_unlike_meshes_within_four_in_a_thousand(fine, young_low, young_high):
     (x_low, low), (x_high, high) = block(16, young_low * YOUNG), block(fine, young_high * YOUNG)
     joined = mortar.mortar(low, x_low, high, x_high)
     ripple, peak, _ = hertz(joined.x, joined.nn, young_low * YOUNG, young_high * YOUNG)
     assert ripple <= 4e-3 and peak <= 1e-3
     assert joined.ripple <= 5e-3
-
-
-def test_order_hertz_pressure_on_unlike_meshes_in_the_mean_square_is_one():
-    errors, counts = [], np.array([8, 16, 32])
-    for count in counts:
-        (x_low, low), (x_high, high) = block(int(count)), block(int(count * 3) // 2)
-        joined = mortar.mortar(low, x_low, high, x_high)
-        state = hertz(joined.x, joined.nn, YOUNG, YOUNG)[2]
-        wanted = PEAK * np.sqrt(np.maximum(1 - (joined.x / A)**2, 0))
-        errors.append(np.sqrt(joined.tributary @ (state.sigma_n - wanted)**2 / (joined.tributary @ wanted**2)))
-    assert -np.polyfit(np.log(counts), np.log(errors), 1)[0] == pytest.approx(1.0, abs=0.1)
-    assert errors[-1] <= 1.3e-2
 
 
 @pytest.mark.parametrize("fine, stiff, low, high", [(32, 1, 0.01, 0.05), (64, 1, 0.02, 0.06), (32, 10, 0.1, 0.4),

@@ -10,19 +10,12 @@ from any_mesh_cases import cloud, of_grid
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pieces import CARBIDE, COATED, COATING, TITANIUM, bare, refined_middle
-from stiffness import stiffness_of
 
-from patchfem.contact.gaps import crown
-from patchfem.contact.unilateral import press
-from patchfem.core import Compliance, Interface
 from patchfem.elasticity import elasticity, substructure
 from patchfem.elasticity.coating_bond import bond_line
 from patchfem.elasticity.elasticity import Layers, hooke, lame
 from patchfem.elasticity.recovery import (
     Cells,
-    _by_points,
-    _of_cells,
-    _sides,
     cells_of,
     harmless_step,
     indicator,
@@ -109,26 +102,6 @@ def test_exact_a_bent_grid_recovers_its_linear_stress_and_the_error_is_known(see
                                 + tall**2 * ((lam + 2 * mu) * b[2]**2 + mu * a[2]**2))
     error = indicator(found, u, stress).error[0]
     assert np.abs(error / missed - 1).max() <= 1e-9
-
-
-@given(seed=st.integers(0, 2**32 - 1), plane=st.sampled_from(["strain", "stress"]))
-@settings(settings.get_profile("costly"))
-def test_exact_rectangles_taken_apart_into_modes_are_the_sum_over_the_points_of_integration(seed, plane):
-    """Any motion of both materials, on any grid."""
-    rng = np.random.default_rng(seed)
-    x, depth = np.cumsum(rng.uniform(0.1, 1, 7)) * 1e-3, np.append(0, np.cumsum(rng.uniform(0.02, 1, 5))) * 1e-3
-    piece = tensor(TensorGrid(x, depth, int(rng.integers(1, 5))), COATED if plane == "strain" else
-                   Layers(COATED.coating, COATED.substrate, plane))
-    found, u = recovery(cells_of(piece)), rng.normal(size=(2, len(piece.nodes), 2)) * 1e-6
-    stress = middle_stress(piece, u)
-    one = indicator(found, u, stress)
-    material = _of_cells(found.cells)
-    for k in range(2):
-        error, energy = _by_points(found, quadratures(found.cells), u[k], stress[k][:, [0, 1, 3]], *material)
-        assert np.abs(one.error[k] - error).max() <= 1e-12 * error.max() and one.energy[k] == pytest.approx(energy)
-    bent = found.cells.points + rng.uniform(-1e-6, 1e-6, found.cells.points.shape)
-    assert _sides(found.cells) is not None
-    assert _sides(Cells(bent, found.cells.blocks, found.cells.is_coating, found.cells.layers)) is None
 
 
 @given(seed=st.integers(0, 2**32 - 1))
@@ -298,43 +271,6 @@ def test_exact_bond_line_of_a_slanted_coating_under_even_stress(seed, slope):
 def test_exact_no_coating_no_bond_line():
     piece = tensor(graded_grid(2e-3, 1e-3, 2e-4), bare(TITANIUM))
     assert bond_line(cells_of(piece), np.zeros((1, len(cells_of(piece).points), 2))) is None
-
-
-def cut(points, parts):
-    """Every interval in `parts` alike pieces."""
-    return np.append((points[:-1, None] + np.diff(points)[:, None] * np.arange(parts) / parts).ravel(), points[-1])
-
-
-@pytest.mark.parametrize("per_half_width, coating", [(4, 0.0), (4, 1.5 * A), (8, 1.5 * A)])
-def test_exact_indicator_is_the_distance_to_a_finer_mesh_of_a_hertz_pair(per_half_width, coating):
-    layers = COATED if coating else bare(TITANIUM)
-    grid = refined_middle(1.5 * A, A / per_half_width, 12.7e-3, 6e-3, 1.2)
-    rows = graded_rows(A / per_half_width, coating, 1.1, 1) if coating else np.empty(0)
-    under = graded_rows(rows[-1] if coating else A / per_half_width, 6e-3 - coating, 1.2)
-    depth = np.concatenate([[0.0], np.cumsum(rows), coating + np.cumsum(under)])
-
-    def solved(x, y, coating_rows):
-        piece = elasticity.assemble(x, y, coating_rows, layers)
-        nn = elasticity.interface_compliance(piece)[0]
-        half = TITANIUM[0] / (1 - TITANIUM[1]**2)
-        face = Interface(x, TensorGrid(x, y, 0).tributary(), 1.0)
-        state = press(Compliance(face, 2 * nn, 2 * nn), crown(x, np.pi * half / 2 * A**2 / (4 * LOAD)), LOAD)
-        force = (state.sigma_n * face.weight)[None]
-        return piece, elasticity.displacement(piece, 0 * force, force)
-
-    piece, u = solved(grid.x, depth, rows.size)
-    parts = 2
-    fine, v = solved(cut(grid.x, parts), cut(depth, parts), parts * rows.size)
-    found = indicator(recovery(cells_of(piece)), u, middle_stress(piece, u))
-    # the coarse field on the fine mesh: bilinear cells are reproduced by the bilinear cells inside them
-    coarse = u[0].reshape(grid.x.size, -1, 2)
-    along = np.stack([np.stack([np.interp(fine.x, grid.x, column) for column in part.T], axis=1)
-                      for part in np.moveaxis(coarse, 2, 0)], axis=2)
-    both = np.stack([np.stack([np.interp(fine.depth, depth, row) for row in part.T], axis=0)
-                     for part in np.moveaxis(along, 2, 0).swapaxes(1, 2)], axis=2)
-    apart = (v[0].reshape(both.shape) - both)[:, :-1].ravel()
-    true = apart @ (stiffness_of(fine) @ apart) * parts**2 / (parts**2 - 1)  # the finer mesh has its own error, order 1
-    assert 0.8 <= np.sqrt(found.error.sum() / true) <= 1.3
 
 
 @pytest.mark.parametrize("split", [0.0, 0.5, 1.0, None])

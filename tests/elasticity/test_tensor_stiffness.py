@@ -9,7 +9,6 @@ from any_mesh_cases import of_grid
 from hypothesis import given
 from hypothesis import strategies as st
 from pieces import CARBIDE, COATED, COATING, TITANIUM
-from scipy.sparse import csr_matrix
 from skfem import Basis, ElementQuad1, ElementTriP1, ElementVector, MeshQuad, MeshTri
 from skfem.models.elasticity import linear_elasticity
 from stiffness import matrix_of, stencil_of, stiffness_of
@@ -18,16 +17,11 @@ from patchfem.elasticity.elasticity import (
     Layers,
     Piece,
     assemble,
-    displacement,
     grid_cells,
-    interface_compliance,
     lame,
-    von_mises,
 )
-from patchfem.elasticity.recovery import cells_of, indicator, middle_stress, recovery
 from patchfem.elasticity.substructure import Substructure
 from patchfem.elasticity.tensor_stiffness import applied
-from patchfem.mesh.anymesh import PieceMesh
 from patchfem.mesh.tensor import graded_grid
 
 LINES = st.lists(st.floats(0.01, 10.0), min_size=2, max_size=9)
@@ -73,40 +67,6 @@ def test_exact_products_of_lines_are_the_stiffness_of_scikit_fem(across, down, c
     assert np.array_equal(matrix_of(stencil_of(stiffness_of(mine), x.size)).toarray(), stiffness_of(mine).toarray())
 
 
-def test_exact_on_even_cells_both_agree_to_fourteen_digits():
-    x, depth = np.linspace(-1e-3, 1e-3, 33), np.linspace(0, 1e-3, 17)
-    mine, theirs = assemble(x, depth, 3, COATED), assemble_nodes(grid_nodes(x, depth), 3, COATED)
-    assert np.abs(mine.stencil - theirs.stencil).max() <= 1e-14 * np.abs(theirs.stencil).max()
-
-
-def bent():
-    """Nodes (15, 9, 2) of a piece whose right end is chamfered and whose rows are bent."""
-    nodes = grid_nodes(np.linspace(-1e-3, 1e-3, 15), np.linspace(0, 1e-3, 9)**1.2)
-    x, depth = nodes[..., 0].copy(), nodes[..., 1].copy()
-    nodes[..., 1] += (1e-3 - depth) * 0.3 * np.maximum(0, x / 1e-3 - 0.5)
-    nodes[..., 0] += 1e-5 * np.sin(3e3 * x + 2e3 * depth)
-    return nodes
-
-
-def test_exact_a_bent_grid_is_the_same_piece_as_a_mesh_of_any_cells():
-    nodes = bent()
-    piece = assemble_nodes(nodes, 3, COATED)
-    flat, number = nodes.reshape(-1, 2), np.arange(135).reshape(15, 9)
-    mesh = PieceMesh(flat, np.empty((0, 3), int), piece.cells, piece.is_coating, number[:, 0], number[:, -1])
-    other = Substructure(mesh, COATED)
-    for mine, theirs in zip(interface_compliance(piece), interface_compliance(other)):
-        assert np.abs(mine - theirs).max() <= 1e-11 * np.abs(theirs).max()
-    shear, normal = np.random.default_rng(0).normal(size=(2, 2, 15))
-    u, v = displacement(piece, shear, normal), displacement(other, shear, normal)
-    assert np.abs(u - v).max() <= 1e-11 * np.abs(v).max()
-    found, wanted = ((one, von_mises(one)) for one in (middle_stress(piece, u), middle_stress(other, u)))
-    stress, mises = found
-    assert np.abs(stress - wanted[0]).max() <= 1e-11 * np.abs(stress).max()
-    assert np.abs(mises - wanted[1]).max() <= 1e-11 * mises.max()
-    cells = cells_of(piece)
-    assert np.isfinite(indicator(recovery(cells), u, stress).error).all()
-
-
 @pytest.mark.parametrize("split", [0.0, 0.4, 1.0])
 def test_exact_a_mesh_of_any_cells_has_the_stiffness_of_scikit_fem_s_own_form(split):
     mesh = of_grid(graded_grid(4e-3, 2e-3, 3e-4, COATING), split, seed=3)
@@ -118,8 +78,3 @@ def test_exact_a_mesh_of_any_cells_has_the_stiffness_of_scikit_fem_s_own_form(sp
             whole = whole + linear(shape, element, mesh.points, cells, coated, COATED, degree)
     free = (2 * piece.order[:, None] + [0, 1]).ravel()
     assert np.abs((whole[free][:, free] - stiffness_of(piece)).toarray()).max() <= 1e-14 * np.abs(whole.data).max()
-
-
-def test_refuses_a_matrix_that_is_no_grid():
-    with pytest.raises(ValueError, match="not neighbours"):
-        stencil_of(csr_matrix(np.ones((12, 12))), 3)

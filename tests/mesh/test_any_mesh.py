@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from types import SimpleNamespace
 
 import meshio
 import numpy as np
@@ -99,22 +98,6 @@ def test_always_numbering_sense_of_rotation_and_place_along_x_do_not_matter(orde
     for piece in (pair.lower, pair.upper):
         assert np.abs(piece.x - GRID.x).max() <= 1e-14
         assert piece.areas().min() > 0 and piece.areas().sum() == pytest.approx(GRID.length * GRID.height, rel=1e-9)
-
-
-def test_exact_unlike_pieces_of_matching_interfaces_are_read(tmp_path):
-    m, tall = drawn("quads"), drawn("triangles", graded_grid(2e-3, 3e-3, 2.5e-4))
-    low, high = m.quad_tags > 2, tall.triangle_tags <= 2
-    keep, bring = np.isin(m.edge_tags, (12, 14)), np.isin(tall.edge_tags, (11, 13))
-    count = len(m.points)
-    both = SimpleNamespace(
-        points=np.concatenate([m.points, tall.points]), quads=m.quads[low], quad_tags=m.quad_tags[low],
-        triangles=tall.triangles[high] + count, triangle_tags=tall.triangle_tags[high],
-        edges=np.concatenate([m.edges[keep], tall.edges[bring] + count]),
-        edge_tags=np.concatenate([m.edge_tags[keep], tall.edge_tags[bring]]))
-    pair = stored(both, tmp_path)
-    assert (pair.lower.height, pair.upper.height) == pytest.approx((1e-3, 3e-3))
-    assert pair.lower.coating == pytest.approx(1e-4) and pair.upper.coating == 0
-    assert len(pair.lower.triangles) == len(pair.upper.quads) == 0
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -278,14 +261,6 @@ def test_refuses_decks_it_cannot_use(text, message, tmp_path):
     (tmp_path / "pair.inp").write_text(text, encoding="utf-8")
     with pytest.raises(PatchfemError, match=message):
         read_pieces(tmp_path / "pair.inp")
-
-
-def test_refuses_endings_and_files_it_does_not_know(tmp_path):
-    with pytest.raises(PatchfemError, match="no such mesh file"):
-        read_pieces(tmp_path / "none.med")
-    (tmp_path / "pair.stl").write_text("solid")
-    with pytest.raises(PatchfemError, match=r"from \.msh, \.vtu, \.inp or \.med"):
-        read_pieces(tmp_path / "pair.stl")
 
 
 @pytest.mark.parametrize("form", FORMATS)

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from patchfem.core import PatchfemError
-from patchfem.mesh.tensor import COATING_ROWS, GROWTH, coarser, graded_grid, graded_rows
+from patchfem.mesh.tensor import COATING_ROWS, GROWTH, graded_grid, graded_rows
 
 lengths = st.floats(1e-6, 1.0)
 growths = st.floats(1.02, 1.6)
@@ -65,20 +65,6 @@ def test_exact_tributary_lengths_add_up_to_the_length(piece):
     assert share.min() > 0
     # the nodal areas integrate a straight line exactly
     assert share @ (3 + 2 * grid.x) == pytest.approx(3 * piece[0], rel=1e-12)
-
-
-@given(pieces())
-def test_always_arrays_are_read_only(piece):
-    grid = graded_grid(*piece)
-    assert not grid.x.flags.writeable and not grid.depth.flags.writeable
-
-
-def test_exact_coarser_halves_the_columns_and_keeps_the_piece():
-    grid = graded_grid(12.7e-3, 6.35e-3, 12.7e-3 / 200, 152.4e-6)
-    half = coarser(grid)
-    assert half.x.size == 101
-    assert (half.length, half.height, half.coating) == (grid.length, grid.height, grid.coating)
-    assert np.abs(half.x - grid.x[::2]).max() <= 1e-16
 
 
 @pytest.mark.parametrize("start, total", [(0.0, 1.0), (1.0, 0.0), (-1.0, 1.0), (1.0, -1.0), (np.nan, 1.0)])

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import cli
-from partial_slip import Step, advance, operators_of, start
 from pieces import bare, refined_middle
 from scene_texts import COATED, COULOMB, MODE, NONLOCAL, POINT, SHEAR, STRUCTURE, mistakes, only
+from scipy.optimize import brentq
 
 import patchfem as pf
 from patchfem.closed_forms.contact import hertz_half_width, hertz_peak
@@ -23,6 +23,7 @@ from patchfem.model.model import build
 from patchfem.runs.patch.result import solve_all
 from patchfem.runs.wear import evolve
 from patchfem.scene.scene import loads
+from patchfem.slip.shear_modes import jenkins_set
 from patchfem.wear.jumps import Wearing, after
 from patchfem.wear.jumps import start as unworn
 
@@ -166,15 +167,19 @@ def test_exact_shakedown_of_a_crown_under_a_tangential_force():
     nn, _, _ = interface_compliance(assemble(grid.x, grid.depth, grid.coating_rows, bare((young, 0.32))))
     x, area, gap, load = grid.x, grid.tributary() * width, grid.x**2 / 2 / radius, line * width
     pair = Compliance(Interface(x, area, width), 2 * nn / width, 2 * nn / width)
-    operators = operators_of(pair)
 
     def press(worn, softening):
         return solve_forces(pair.normal + np.diag(softening), x, gap + worn, np.array([load]))[0]
 
     def path(worn):
-        state = advance(start(operators, gap + worn), operators, Step(load=load, shear=0.0), mu)
-        state = advance(state, operators, Step(load=load, shear=0.6 * mu * load), mu)
-        return 4 * np.abs(state.slip) * state.active
+        limit = mu * solve_forces(pair.normal, x, gap + worn, np.array([load]))[0]
+        group = jenkins_set(pair.tangential, limit)
+        slide = brentq(lambda q: group.stiffness @ np.minimum(q, group.yield_slide) - 0.6 * mu * load, 0.0,
+                       group.yield_slide[-1], xtol=1e-22)
+        shear = np.zeros(x.size)
+        shear[group.points] = group.share @ np.minimum(slide, group.yield_slide)
+        slips = (limit > 0) & (shear > limit * (1 - 1e-9))
+        return np.where(slips, 4 * np.abs(slide - pair.tangential @ shear), 0.0)
 
     asked = Wearing(press, path, area, 1e-13, 1e9)
     state, count = unworn(asked), 0
