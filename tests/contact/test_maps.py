@@ -10,7 +10,7 @@ from study_module import study
 from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.stiffness import tangential_stiffness
 from patchfem.contact.unilateral import SOLVED, press
-from patchfem.core import Outcome, PatchfemError
+from patchfem.core import Outcome
 
 maps = study("common/maps.py")
 press_map = maps.press_map
@@ -61,33 +61,3 @@ def test_exact_every_point_under_a_load_line_is_its_own_cold_solve(shape, spring
             for k, line in enumerate(LINES):
                 tilted = gap + tilt(pair.interface.x, angle)
                 agrees(pair, found, (n, a, k), press(pair, tilted, load, load * line, angle, spring=spring))
-
-
-def test_exact_zero_load_touches_and_the_others_are_solved():
-    pair = coated_pair(100)
-    found = press_map(pair, np.full(101, 3e-6), [0.0, LOAD], [0.0, 1e-4], shear=True, keep=True)
-    assert (found.outcome[0] == Outcome.NO_CONTACT).all() and (found.outcome[1] == Outcome.DONE).all()
-    assert not found.sigma_n[0].any() and not found.normal_stiffness[0].any() and not found.shear_stiffness[0].any()
-    assert found.approach[0, :, 0] == pytest.approx([3e-6, 3e-6 - 1e-4 * LENGTH / 2])
-
-
-def test_refuses_by_point_and_solves_the_rest():
-    """Load lines outside the patch and a negative load are marked with the reason, as NaN; nothing else changes."""
-    pair = coated_pair(100)
-    lines = LENGTH * np.array([0.1, 0.6, -0.5])
-    found = press_map(pair, np.zeros(101), [LOAD, -1.0, 2 * LOAD], [0.0], lines, keep=True)
-    bad = np.array([[False, True, True], [True, True, True], [False, True, True]])[:, None, :]
-    assert ((found.outcome == Outcome.NOT_CONVERGED) == bad).all() and (found.outcome[~bad] == Outcome.DONE).all()
-    for numbers in (found.fraction, found.peak, found.approach, found.normal_stiffness, found.residual):
-        assert (np.isnan(numbers) == bad).all()
-    assert np.isnan(found.sigma_n[bad]).all() and set(found.reasons) == set(zip(*np.nonzero(bad)))
-    assert "tips over" in found.reasons[0, 0, 1] and "must be >= 0" in found.reasons[1, 0, 0]
-    assert found.peak[2, 0, 0] == pytest.approx(2 * found.peak[0, 0, 0])
-
-
-@pytest.mark.parametrize("change, word", [({"loads": []}, "loads"), ({"loads": [np.nan]}, "loads"),
-                                          ({"angles": [np.inf]}, "angles"), ({"lines": [np.nan]}, "lines"),
-                                          ({"gap": np.zeros(3)}, "gap"), ({"gap": np.full(101, np.nan)}, "gap")])
-def test_refuses_inputs_that_are_no_map(change, word):
-    with pytest.raises(PatchfemError, match=f"map: .*{word}"):
-        press_map(coated_pair(100), **({"gap": np.zeros(101), "loads": [LOAD]} | change))

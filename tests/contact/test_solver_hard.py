@@ -339,12 +339,7 @@ def campaign(control, seeds):
 CONTROL_NAMES = ["load", "load and moment", "approach", "load and spring"]
 
 
+@pytest.mark.parametrize("count", [60, pytest.param(3000, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("control", range(4), ids=CONTROL_NAMES)
-def test_always_random_gaps_on_random_operators(control):
-    campaign(control, range(60))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("control", range(4), ids=CONTROL_NAMES)
-def test_always_3000_random_gaps_on_random_operators(control):
-    campaign(control, range(3000))
+def test_always_random_gaps_on_random_operators(control, count):
+    campaign(control, range(count))

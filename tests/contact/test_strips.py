@@ -94,27 +94,32 @@ def dense_cases(number):
         yield c, x, weight, y, gap, roll, load, moment, 0.0 if k % 3 < 2 else 10**rng.uniform(1, 5)
 
 
-@pytest.mark.parametrize("skin", [None, LinearSkin(1e12), LinearSkin(1e15)])
-def test_exact_answer_is_that_of_one_block_diagonal_operator(skin):
-    for c, x, weight, y, gap, roll, load, moment, spring in dense_cases(12):
-        state = press_strips(c, x, weight, y, gap, roll, load, moment, spring=spring, skin=skin)
+@pytest.mark.parametrize("own", [False, True], ids=["alike", "diagonals of their own"])
+@pytest.mark.parametrize("skin", [None, LinearSkin(1e12), LinearSkin(1e15), ExponentialSkin(2e-7), SKINS["hertz"]],
+                         ids=["bare", "soft", "stiff", "exponential", "hertz"])
+def test_exact_answer_is_that_of_one_block_diagonal_operator(skin, own):
+    """All strips as one patch; two of the strips with a diagonal of their own share a factorisation."""
+    is_linear = skin is None or isinstance(skin, LinearSkin)
+    for number, (c, x, weight, y, gap, roll, load, moment, spring) in enumerate(dense_cases(9)):
+        if not is_linear:
+            spring = 0.0
+        added = np.random.default_rng(number).uniform(0, 2, gap.shape) * c.max() * own
+        added[-1] = added[0]
+        state = press_strips(Slices(c, added) if own else c, x, weight, y, gap, roll, load, moment, spring=spring,
+                             skin=skin)
+        places, opened = np.tile(x, y.size), (gap + roll * y[:, None]).ravel()
+        if not is_linear:
+            whole = solve(skin, np.kron(np.eye(y.size), c) + np.diag(added.ravel()), places, np.tile(weight, y.size),
+                          opened, load, moment)
+            assert np.abs(state.force.ravel() - whole.force).max() <= 1e-10 * load
+            assert np.abs(state.gap.ravel() - whole.separation).max() <= 1e-9 * np.ptp(whole.separation)
+            continue
         target = np.array([load] if moment is None else [load, moment])
-        force, motion, _ = solve_forces(np.kron(np.eye(y.size), softer(skin, c, weight)), np.tile(x, y.size),
-                                        (gap + roll * y[:, None]).ravel(), target, spring=spring)
+        force, motion, _ = solve_forces(np.kron(np.eye(y.size), softer(skin, c, weight)) + np.diag(added.ravel()),
+                                        places, opened, target, spring=spring)
         assert np.abs(state.force.ravel() - force).max() <= 1e-10 * load
         assert state.delta == pytest.approx(motion[0], rel=1e-10)
         assert state.theta == pytest.approx(-motion[1] if moment is not None else 0.0, rel=1e-8, abs=1e-16)
-
-
-@pytest.mark.parametrize("skin", [ExponentialSkin(2e-7), SKINS["hertz"]], ids=["exponential", "hertz"])
-def test_exact_smooth_skins_answer_is_that_of_one_block_diagonal_operator(skin):
-    for c, x, weight, y, gap, roll, load, moment, spring in dense_cases(9):
-        if spring == 0:
-            state = press_strips(c, x, weight, y, gap, roll, load, moment, skin=skin)
-            other = solve(skin, np.kron(np.eye(y.size), c), np.tile(x, y.size), np.tile(weight, y.size),
-                          (gap + roll * y[:, None]).ravel(), load, moment)
-            assert np.abs(state.force.ravel() - other.force).max() <= 1e-10 * load
-            assert np.abs(state.gap.ravel() - other.separation).max() <= 1e-9 * np.ptp(other.separation)
 
 
 # ------------------------------------------------------------------------------------------------ wedges in closed form
@@ -433,26 +438,3 @@ def test_refuses_a_free_roll_that_nothing_determines():
     ridge = np.where(np.arange(4) == 1, 0.0, 1.0)[:, None] + 0 * x
     with pytest.raises(NotConverged, match="roll"):
         press_strips(c, x, weight, y, ridge, load=LOAD, lateral=y[1] * LOAD)
-
-
-@pytest.mark.parametrize("skin", [None, LinearSkin(1e13)], ids=["bare", "linear"])
-def test_exact_strips_with_diagonals_of_their_own_are_one_block_diagonal_operator(skin):
-    for number, (c, x, weight, y, gap, roll, load, moment, spring) in enumerate(dense_cases(6)):
-        own = np.random.default_rng(number).uniform(0, 2, gap.shape) * c.max()
-        own[-1] = own[0]  # two strips share a factorisation where they are alike
-        state = press_strips(Slices(c, own), x, weight, y, gap, roll, load, moment, spring=spring, skin=skin)
-        target = np.array([load] if moment is None else [load, moment])
-        whole = np.kron(np.eye(y.size), softer(skin, c, weight)) + np.diag(own.ravel())
-        force, motion, _ = solve_forces(whole, np.tile(x, y.size), (gap + roll * y[:, None]).ravel(), target,
-                                        spring=spring)
-        assert np.abs(state.force.ravel() - force).max() <= 1e-10 * load
-        assert state.delta == pytest.approx(motion[0], rel=1e-10)
-
-
-def test_exact_smooth_skins_carry_diagonals_of_the_strips():
-    for number, (c, x, weight, y, gap, roll, load, _, _) in enumerate(dense_cases(3)):
-        own = np.random.default_rng(number).uniform(0, 2, gap.shape) * c.max()
-        state = press_strips(Slices(c, own), x, weight, y, gap, roll, load, skin=SKINS["hertz"])
-        other = solve(SKINS["hertz"], np.kron(np.eye(y.size), c) + np.diag(own.ravel()), np.tile(x, y.size),
-                      np.tile(weight, y.size), (gap + roll * y[:, None]).ravel(), load)
-        assert np.abs(state.force.ravel() - other.force).max() <= 1e-10 * load

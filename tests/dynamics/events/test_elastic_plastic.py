@@ -8,7 +8,7 @@ from patchfem.core import BaseSine, ModalBasis, Outcome
 from patchfem.dynamics.events.elements import elements_of
 from patchfem.dynamics.events.histories import simulate
 from patchfem.response.measures import energy_balance
-from patchfem.structure.drives import Recorded, Sweep, levels
+from patchfem.structure.drives import Recorded, Sweep
 
 
 def basis(omega, zeta, slide, base, output, damping=None, faces=None):
@@ -92,16 +92,6 @@ def test_exact_grazing_yield():
         assert energy_balance(done.ledger) < 1e-12
 
 
-def test_exact_levels_in_one_run_are_runs_one_after_the_other():
-    drive, group = levels([0.5, 1.2], 1.1, 7), elements_of([4.0, 2.0], [0.05, 0.2])
-    whole = simulate(ONE, drive, [group], 14, window=3)
-    half = simulate(ONE, BaseSine(0.5, 1.1), [group], 7, window=3)
-    start, memory = half.end
-    rest = simulate(ONE, BaseSine(1.2, 1.1), [group], 7, window=3, start=start, memory=memory)
-    np.testing.assert_allclose(whole.response.modal[-1], rest.response.modal[-1], rtol=1e-11)
-    assert whole.swing == pytest.approx(rest.swing, rel=1e-11)
-
-
 def test_exact_travel_ends_the_run_where_it_is_passed():
     done = simulate(ONE, BaseSine(1.0, 1.0), [elements_of([1.0], [0.02])], 50, travel=1.5)
     assert done.outcome is Outcome.EXCEEDS_TRAVEL
@@ -173,16 +163,3 @@ def test_exact_elements_that_yield_at_one_instant_yield_in_any_order(mirrored):
     np.testing.assert_allclose([loop.work for loop in two.loops], one.loops[0].work / 2, rtol=1e-11)
     assert two.log.count == 2 * one.log.count
     assert energy_balance(two.ledger) < 1e-12
-
-
-def test_exact_the_order_of_interfaces_does_not_matter():
-    """Three equal sets of elements, two of them under one and the same slide: permuted, the motion is the same."""
-    rows, runs = np.array([[0.8, -0.6], [0.8, -0.6], [0.5, 0.7]]), []
-    for order in ([0, 1, 2], [2, 1, 0], [1, 2, 0]):
-        modes = ModalBasis(("a", "b"), np.array([1.0, 2.7]), np.array([0.02, 0.03]), rows[order][0],
-                           np.array([1.0, 0.4]), np.array([1.0, 0.3]), 1.0, faces=rows[order])
-        done = simulate(modes, BaseSine(1.5, 1.1), [elements_of([0.5, 1.0], [0.1, 0.4])] * 3, 40, 5)
-        runs.append((done.amplitudes, np.array([loop.work for loop in done.loops])[np.argsort(order)]))
-    for amplitudes, works in runs[1:]:
-        np.testing.assert_allclose(amplitudes, runs[0][0], rtol=1e-11)
-        np.testing.assert_allclose(works, runs[0][1], rtol=1e-11)

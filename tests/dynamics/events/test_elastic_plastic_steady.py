@@ -8,10 +8,10 @@ from scipy.linalg import expm
 from scipy.optimize import fsolve
 from test_elastic_plastic import ONE, basis, random_rig
 
-from patchfem.core import BaseSine, NotConverged, PatchfemError, Start
+from patchfem.core import BaseSine, NotConverged, PatchfemError
 from patchfem.dynamics.events.elements import elements_of
 from patchfem.dynamics.events.histories import simulate
-from patchfem.dynamics.events.period import PeriodMap, Point
+from patchfem.dynamics.events.period import PeriodMap
 from patchfem.dynamics.events.steady import settled, steady
 from patchfem.structure.drives import levels
 
@@ -116,25 +116,6 @@ def test_order_the_derivative_is_that_of_finite_differences(rig, half):
     assert misses[0] < 1e-6 * np.abs(slope).max()
 
 
-def test_exact_multipliers_are_those_of_a_marched_cycle():
-    """The eigenvalues of one cycle of the run itself, by differences of its end over its start."""
-    drive, groups = BaseSine(1.0, 1.4), TWO
-    found, one = steady(PAIR, drive, groups), PeriodMap(PAIR, groups)
-
-    def end(numbers):
-        point = found.point.moved(numbers)
-        done = simulate(PAIR, drive, groups, 1, window=1, start=Start(*point.motion.reshape(2, 2)),
-                        memory=one.placed(point))
-        return Point(np.concatenate([done.end[0].z, done.end[0].v]), done.end[1]).numbers
-
-    at = found.point.numbers
-    slope = np.array([(end(at + move) - end(at - move)) / 2e-6 for move in 1e-6 * np.eye(at.size)]).T
-    wanted = np.linalg.eigvals(slope)
-    wanted = wanted[np.argsort(-np.abs(wanted))]
-    np.testing.assert_allclose(np.sort_complex(wanted[:2]), np.sort_complex(found.multipliers[:2]), atol=1e-6)
-    assert np.abs(wanted[2:]).max() == pytest.approx(np.abs(found.multipliers[2:]).max(), abs=1e-5)
-
-
 @pytest.mark.parametrize("seed", [100, 105, 109])
 def test_exact_work_in_is_what_a_cycle_dissipates(seed):
     modes, drive, k, y = random_rig(seed, 200)
@@ -160,14 +141,6 @@ def test_exact_limits_are_the_linear_response(seed, held):
     found = steady(modes, drive, [elements_of(k, y * 1e6 if held else y * 0)])
     assert found.regime == "stuck" and found.multipliers.size == 2 * modes.omega.size
     assert found.amplitude == pytest.approx(linear_amplitude(modes, drive, k.sum() if held else 0.0), rel=1e-12)
-
-
-def test_always_a_point_nearby_leads_to_the_same_motion():
-    group, near = [elements_of([4.0, 2.0], [0.05, 0.2])], None
-    for ratio in np.linspace(0.8, 1.6, 9):
-        found = steady(ONE, BaseSine(1.0, ratio), group, near)
-        assert found.amplitude == pytest.approx(steady(ONE, BaseSine(1.0, ratio), group).amplitude, rel=1e-11)
-        near = found.point
 
 
 def test_refuses_what_does_not_repeat():

@@ -53,15 +53,6 @@ def test_exact_series_of_a_sweep(sweep):
                 assert abs(np.polyval(series[::-1], u) - wanted) < grown
 
 
-def test_exact_series_of_a_record_is_what_it_gives_at_any_time():
-    drive = record(5)
-    for number, (t0, t1) in enumerate(zip(drive.time, drive.time[1:])):
-        t, u = t0 + 0.3 * (t1 - t0), np.array([0.0, 0.5, 1.0])
-        series = drive_series.series(drive, number, t, t1 - t, 5)
-        np.testing.assert_allclose(np.polyval(series[::-1], u[:2]), drive.values(t + u[:2] * (t1 - t)), atol=1e-14)
-    assert not drive_series.series(drive, len(drive.time) - 1, 31.0, 1.0, 5).any()
-
-
 # the motion
 
 @pytest.mark.parametrize("omegas, slides, ratio, faces", [
@@ -111,16 +102,6 @@ def test_exact_sweeps_against_dop853(number, ratio, faces):
 def test_exact_records_against_dop853():
     modes = random_basis(np.random.default_rng(8), 2, 1)
     agrees(modes, record(2, 20, 20.0), np.array([0.25]), 0.6, 24.0, 99)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("seed", range(12))
-def test_exact_random_rigs_under_sweeps_and_records_against_dop853(seed):
-    rng = np.random.default_rng(100 + seed)
-    faces = int(rng.integers(1, 3))
-    modes = random_basis(rng, int(rng.integers(faces, 4)), faces)
-    drive = SWEEPS[seed % 4] if seed % 2 else record(seed)
-    agrees(modes, drive, rng.uniform(0.1, 0.6, faces), rng.uniform(0.3, 1.0), 35.0, 99)
 
 
 def test_exact_stiff_face_slides_once_a_record_passes_its_limit():

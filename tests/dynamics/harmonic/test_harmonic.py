@@ -82,12 +82,6 @@ def test_exact_slopes_are_the_derivative_of_the_forces(law):
         assert fold.rate[0] == pytest.approx((force(v, 1.3 + eps) - force(v, 1.3 - eps)) / (2 * eps), abs=1e-8)
 
 
-def test_exact_samples_of_more_harmonics_than_they_resolve():
-    x = harmonics(7, 40)
-    angle = 2 * np.pi * np.arange(16) / 16
-    assert synthesis(x, 16) == pytest.approx((x * np.exp(1j * np.outer(angle, np.arange(41)))).sum(axis=1).real)
-
-
 # ---- the balance
 
 def dense(modes, omega, level, spring):
@@ -143,19 +137,6 @@ def test_exact_the_jacobian_of_the_balance():
         assert here.jacobian == pytest.approx(found, abs=1e-7)
         assert here.by_omega == pytest.approx((residual(x, 1.1 + eps) - residual(x, 1.1 - eps)) / (2 * eps), abs=1e-7)
         assert here.by_level == pytest.approx((residual(x, level=0.8) - residual(x, level=0.6)) / 0.2, abs=1e-9)
-
-
-@pytest.mark.parametrize("omega, level", [(0.8, 1.0), (1.5, 3.0), (2.5, 2.0)])
-def test_exact_one_harmonic_of_elements(omega, level):
-    """Describing function of a Jenkins element: stick angle acos(1 - 2 w/A)."""
-    modes, k, w = sdof(0.01), 2.0, 0.15
-    group = Group(modes, Jenkins([k], [w]), 16384)
-    found = point(modes, BaseSine(level, omega), group, harmonics=1)
-    a = abs(found.coefficients[0, 1])
-    assert a > 1.1 * w
-    angle = np.arccos(1 - 2 * w / a)
-    stiff = k / np.pi * (angle - np.sin(angle) * np.cos(angle)) + 4j * k * w * (a - w) / (np.pi * a * a)
-    assert abs(1 - omega**2 + 0.02j * omega + stiff) * a == pytest.approx(level, rel=1e-6)
 
 
 # ---- against marching

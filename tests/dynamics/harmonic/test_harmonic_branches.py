@@ -13,7 +13,7 @@ from patchfem.dynamics.harmonic.branch import backbone, branches, levels, respon
 from patchfem.dynamics.harmonic.continuation import follow
 from patchfem.dynamics.harmonic.forces import Group
 from patchfem.dynamics.harmonic.harmonic import Balance
-from patchfem.dynamics.harmonic.laws import Jenkins, OfSpeed, Spring, synthesis
+from patchfem.dynamics.harmonic.laws import Jenkins, Spring, synthesis
 from patchfem.dynamics.harmonic.point import point
 from patchfem.dynamics.harmonic.stability import monodromy_of, with_stability
 from patchfem.dynamics.periodic import multipliers
@@ -135,17 +135,6 @@ def test_exact_multipliers_of_the_linear_modes():
     assert max(np.abs(found - w).min() for w in want) < 1e-12
 
 
-def test_exact_the_determinant_is_liouvilles():
-    """det = exp(-int tr) for smooth laws: also with a rate, where the trace varies."""
-    modes, drive = sdof(0.05), BaseSine(1.0, 1.2)
-    for law in (Spring(0.1, 0.7), of_speed(0.3, 0.2)):
-        p = point(modes, drive, law, tolerance=1e-6)
-        r = periodic_response(p, modes, drive, 4096)
-        rate = 0.3 / 0.2 / np.cosh(r.slide_rate[:-1] / 0.2)**2 if isinstance(law, OfSpeed) else np.zeros(4096)
-        trace = (0.1 + rate.mean()) * drive.period
-        assert np.linalg.det(monodromy_of(p, modes)) == pytest.approx(np.exp(-trace), rel=1e-5)
-
-
 @pytest.mark.share(0)
 @pytest.mark.parametrize("omega", [0.8, 1.2])
 def test_exact_a_perturbed_march_of_elements(omega):
@@ -166,16 +155,6 @@ def test_exact_a_perturbed_march_of_elements(omega):
     block = (found[:10, :10] * unit[:, None] / unit)[:, [0, 1, 4, 5, 6]]
     assert np.abs(block - np.array(columns).T).max() < 1.5e-3 * np.abs(block).max()
     assert np.sum(np.abs(multipliers(found)) < 1e-4) >= found.shape[0] - 10
-
-
-def test_order_of_the_map_in_its_cells():
-    """Turning points and corners inside cells cost the square of the width, not the width."""
-    modes, drive = sdof(0.05), BaseSine(1.0, 0.9)
-    p = point(modes, drive, Jenkins([3.0, 1.0], [0.2, 0.5]), tolerance=1e-6)
-    best = monodromy_of(p, modes, 16384)
-    cells = np.array([128, 256, 512, 1024, 2048])
-    errors = [np.abs(monodromy_of(p, modes, c)[:2, :2] - best[:2, :2]).max() for c in cells]
-    assert errors[0] < 1e-2 and -np.polyfit(np.log(cells), np.log(errors), 1)[0] > 1.6
 
 
 def test_exact_bonds_forget_as_a_march_does():

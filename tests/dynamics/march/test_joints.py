@@ -209,18 +209,3 @@ def test_order_two_of_interfaces_with_kinetic_friction_below_static(seed, faces,
         assert got.response.extra["ledger"][3, -1] == 0.0
         errors.append(np.abs(got.amplitudes - truth.amplitudes).max() / np.abs(truth.amplitudes).max())
     assert errors[0] < 1e-3 and errors[1] < errors[0] / 4 and errors[2] < errors[1] / 4
-
-
-def test_exact_strips_that_yaw_are_those_of_the_event_engine():
-    """Eight Coulomb strips of unlike loads on two modes: their friction depends on each other, the motion does not."""
-    offsets = (np.arange(8) - 3.5) * 1.6e-3
-    omega, unit = 2 * np.pi * np.array([143.0, 129.0]), np.array([1.0, 0.0])
-    faces = unit - np.outer(offsets, [0.0, 30.0])
-    modes = ModalBasis(("axial", "yaw"), omega, np.full(2, 0.003), faces[0], unit, unit, 0.884, None, faces)
-    limit = 34.7 * np.linspace(0.2, 1.8, 8) / 8
-    elements = tuple(coulomb(k, f, f) for k, f in enumerate(limit))
-    got = march(modes, DRIVE, JointsModel(None, elements, faces, 43.0, ALL), 30, 800, window=5)
-    truth = simulate(modes, DRIVE, limit, limit, 30, 5)
-    assert got.outcome is None
-    assert got.amplitudes[-5:] == pytest.approx(truth.amplitudes[-5:], rel=2e-3)
-    assert got.ledger["friction"] == pytest.approx(truth.ledger["friction"], rel=2e-3)

@@ -55,18 +55,6 @@ def test_exact_virgin_force(order, reading, initial, want):
             assert force == pytest.approx(virgin_force(UNEVEN, 1.0, order, initial), abs=1e-8)
 
 
-def test_order_of_the_fast_start_is_two():
-    law = bonds(ratio=0.5, rest_growth=1e-30, slip_growth=1.0, rest_speed=1e-3)
-
-    def end(step):
-        return walk(Recursion(law), np.linspace(0, 2, round(2 / step) + 1), ONE, dt=step).traction[-1, 0]
-
-    exact = end(1e-3)
-    miss = [abs(end(h) - exact) for h in (0.2, 0.1, 0.05)]
-    assert np.log2(miss[0] / miss[1]) == pytest.approx(2, abs=0.1)
-    assert np.log2(miss[1] / miss[2]) == pytest.approx(2, abs=0.1) and miss[2] < 2e-4
-
-
 # ---- loops
 
 @pytest.mark.share(0, 3)

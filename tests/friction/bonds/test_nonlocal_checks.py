@@ -33,24 +33,6 @@ OMEGA = 2 * np.pi * 143
 
 # ---- C1, C2: steady sliding
 
-@pytest.mark.share(1)
-@pytest.mark.parametrize("speed, printed, want", [
-    (5e-4, 0.58, [0.535601, 0.579876, 0.580121, 0.580002]),
-    (5e-3, 0.433333, [0.316747, 0.423841, 0.440926, 0.434952]),
-    (5e-2, 0.420144, [0.300343, 0.408997, 0.428834, 0.422202]),
-])
-def test_exact_c1_steady_friction_with_every_bond_grown_from_zero(speed, printed, want):
-    """mu_s = 0.6, a_s = 10, l_k = 0.2 um, eps_0 = 2 um, eps_k = 1.4 um: 2.18 times G(ell/eps; p), p = -0.5, 0, 1, 2."""
-    numbers = {"length": 2e-6, "ratio": 0.7, "rest_growth": 10.0, "slip_growth": 0.2e-6}
-    eps = friction_forms.steady_bond_length(speed, **numbers)
-    assert 0.6 * eps / 2e-6 == pytest.approx(printed, abs=1e-6)
-    ell = 1 / (10.0 / speed**2 + 1 / 0.2e-6)
-    for p, mu in zip((-0.5, 0.0, 1.0, 2.0), want):
-        truth = 0.6 * eps / 2e-6 * friction_forms.growth_factor(ell / eps, p)
-        assert truth == pytest.approx(mu, abs=1e-6)
-        law = Bonds(0.6, 2e-6, p, "report", 0.7, 10.0, 0.2e-6, 1e-9, 0.0)
-        assert settled_at(law, speed, ell) == pytest.approx(truth, abs=1e-12)
-
 
 def settled_at(law, speed, ell):
     """Force of a growing law after 180 um at a constant speed."""
@@ -87,28 +69,6 @@ def test_exact_c8_dwell_of_the_stretch_in_closed_form(hold):
     for x in (0.25, 0.5, 1.0, 2.0):
         force = law.traction(law.step(held.state, x, one, one, 0.0).state)[0]
         assert force == pytest.approx(eps + (0.5 - eps) * np.exp(-x / eps), abs=1e-12)
-
-
-@pytest.mark.parametrize("order", [0.0, 1.0])
-def test_exact_c8_printed_law_heals_under_load(order):
-    """l_k = 1e-3, eps_k = 0.5: every bond heals its own length at rest; 0.5, 0.81606, 0.93233 but for young bonds."""
-    def truth(folds):
-        def bond(s):
-            own = 1 - (1 + 0.5 * mpmath.expm1(-s / 1e-3)) * mpmath.exp(-folds)
-            return (s / own)**order * mpmath.exp(-s / own)
-        return float(mpmath.quad(bond, [0, 1e-4, 1e-3, 4e-3, 2e-2, 0.2, 1, 4, 20, 90]))
-
-    law = Bonds(1.0, 1.0, order, "report", 0.5, 10.0, 1e-3, 1.0, 0.0)
-    back = np.concatenate([np.linspace(0, 4e-3, 60), np.geomspace(4e-3, 2, 120)[1:], np.linspace(2, 40, 300)[1:]])[::-1]
-    engine, one = Quadrature(law, tail=0.0), np.ones(1)
-    state, force = engine.start(one), []
-    for dq in np.diff(back[0] - back):
-        state = engine.carried(state, dq, one, one, dq * 1e-9)
-    for _ in range(3):
-        force.append(float(engine.traction(state)[0]))
-        state = engine.carried(state, 0.0, one, one, 0.1)
-    assert force == pytest.approx([truth(n) for n in range(3)], abs=1e-6)
-    assert force == pytest.approx([0.5, 0.81606, 0.93233], abs=1e-3 if order == 0 else 1e-4)
 
 
 # ---- C9, C10: pressure on the lower piece
@@ -180,7 +140,6 @@ def test_exact_c10_pressure_wave_is_smoothed_and_delayed(order, eps, size, lag):
     truth = (1 + 1j * k * eps)**-(order + 1)
     assert got == pytest.approx(truth, abs=1e-6)
     assert (abs(truth), np.degrees(np.angle(truth)) % -360) == pytest.approx((size, lag), abs=1e-5)
-
 
 
 def mode(omega=OMEGA, zeta=0.0):
@@ -264,7 +223,6 @@ def test_exact_c1_steady_printed_law_of_a_bench_scene(speed, order, want):
                 f'slip_growth = "0.2 um"\norder = {order}',
                 f'kind = "constant"\nspeed = "{speed}"\ndistance = "40 um"', 800)
     assert got["friction_ratio_end"] == pytest.approx(want, abs=1e-4)
-
 
 
 # ---- far ends
