@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 import xarray as xr
-from command_line import MODULES, absent, cli, loaded
+from command_line import MODULES, cli, loaded
 from scene_texts import BENCH, COULOMB, LINEAR, POINT, SHORT, SMALL_PATCH, STRUCTURE
 
 import patchfem as pf
@@ -61,11 +61,6 @@ def test_exact_importing_imports_nothing_of_weight():
     modules = loaded(f"import patchfem as pf; dir(pf), pf.__version__\n{MODULES}")
     assert not {"numpy", "pydantic", "scipy", "xarray", "matplotlib"} & modules
     assert {name for name in modules if name.startswith("patchfem")} == {"patchfem", "patchfem.later"}
-
-
-def test_exact_what_the_scene_does_not_name_is_not_imported():
-    modules = loaded(f"import patchfem as pf; pf.run({SMALL_PATCH!r})\n{MODULES}")
-    absent(modules, "friction", "structure", "dynamics", "response", "export")
 
 
 def test_exact_the_names_are_all_there():

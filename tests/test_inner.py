@@ -1,23 +1,16 @@
 """Functions that compiled code calls: compiled with their callers, the same answers, callable from Python still."""
 
-import gc
-import math
-import operator
 import os
 import re
 import subprocess
 import sys
-from itertools import product
 from pathlib import Path
 
 import numpy as np
 import pytest
-from numba.core import types
-from numba.core.errors import NumbaError
-from numba.core.registry import CPUDispatcher, cpu_target
-from numba.core.types.functions import BaseFunction
+from numba.core.registry import CPUDispatcher
 
-from patchfem.compiled import inner, tidied_later
+from patchfem.compiled import inner
 from patchfem.compiled.inner import Inner, njit
 
 KERNELS = """\
@@ -122,52 +115,3 @@ def test_exact_calls_from_python_are_kept(tmp_path):
     for kept in (False, True):
         done = subprocess.run([sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True)
         assert done.stdout.split() == ["6.0", "False" if kept else "True", "3", "some_kernels.lengthened"]
-
-
-def test_exact_constants_in_calls_make_no_more_functions():
-    @njit()
-    def power(x, count, whole):
-        return x ** count if whole else 0.5 * x ** count
-
-    @njit()
-    def several(x):
-        return power(x, 2, True) + power(x, 3, False) + power(x, int(x), x > 0)
-
-    assert several(3.0) == 9 + 13.5 + 27
-    assert len(power.overloads) == 1
-
-
-@pytest.mark.parametrize("function", [operator.add, operator.truediv, operator.pow, operator.lt, operator.getitem,
-                                      np.sqrt, math.sin, min, abs, len])
-def test_exact_a_call_means_what_numba_says_when_asked_again(function):
-    """Numbers of both kinds, truth values, constants, rows and tables: signature and key, asked first and once more."""
-    context = cpu_target.typing_context
-    context.refresh()
-    kind, kinds = context.resolve_value_type(function), (types.float64, types.int64, types.boolean, types.literal(2),
-                                                         types.float64[::1], types.float64[:, ::1])
-    meant, found = BaseFunction.get_call_type, 0
-    for given in product(kinds, repeat=1 if function in (np.sqrt, math.sin, abs, len) else 2):
-        try:
-            truth = meant.__wrapped__(kind, context, given, {})
-        except NumbaError:
-            with pytest.raises(NumbaError):
-                meant(kind, context, given, {})
-            continue
-        key = kind.get_impl_key(truth)
-        for _ in range(2):
-            assert meant(kind, context, given, {}) == truth
-            assert kind.get_impl_key(truth) == key
-        found += 1
-    assert found >= 2
-
-
-@pytest.mark.parametrize("searched", [True, False])
-def test_exact_garbage_is_searched_for_as_before_once_code_is_compiled(searched):
-    try:
-        (gc.enable if searched else gc.disable)()
-        with pytest.raises(ValueError), tidied_later():
-            assert not gc.isenabled()
-            raise ValueError
-        assert gc.isenabled() == searched
-    finally:
-        gc.enable()

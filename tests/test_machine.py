@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from patchfem.compiled import Entry, Kernels, inner, load, machine
+from patchfem.compiled import Kernels, inner, load, machine
 
 
 class Inner(NamedTuple):
@@ -75,42 +75,6 @@ def kept(path, function, *arguments):
 def words_of(*arguments) -> bytes:
     words = machine.Words()
     return b"".join(words.of(one)[1] for one in arguments)
-
-
-@pytest.mark.parametrize("values", [
-    np.zeros((3, 4)), np.zeros((3, 4)).T, np.zeros((6, 4))[::2], np.zeros((2, 2, 2))[:, :, 1], np.zeros(0),
-    np.zeros((0, 3)), np.zeros(()), np.arange(5)[1:], np.broadcast_to(1.0, (3,)), np.frombuffer(b"12345678"),
-    np.zeros(9, "u1")[1:].view(float)])
-def test_exact_the_words_of_an_array_are_those_of_its_interface(values):
-    """Read-only, empty, strided, transposed and unaligned ones; once more from what is remembered of their kind."""
-    told, flags = values.__array_interface__, values.flags
-    words = (0, 0, values.size, values.itemsize, told["data"][0], *values.shape, *values.strides)
-    order = "C" if flags.c_contiguous else "F" if flags.f_contiguous else "A"
-    kind = f"{told['typestr']}{values.ndim}{order}{'r' * told['data'][1]}{'u' * (not flags.aligned)}"
-    for _ in range(2):
-        assert machine.Words().of(values) == (kind, np.array(words, "q").tobytes())
-
-
-def test_always_tuples_of_numbers_push_no_arrays_out():
-    """A run calls with the same arrays and another time at every call: the arrays are remembered all along."""
-    words, held = machine.Words(), (np.zeros(3), 1.0)
-    words.of(held)
-    for k in range(2 * machine.PARTS):
-        assert words.of((float(k), 0.5)) == ("tuple(d,d)", np.array([k, 0.5]).tobytes())
-    assert [one[0] for one in words.known.values()] == [held]
-
-
-def test_exact_last_arguments_held_for_many_calls(monkeypatch):
-    """Their words are made once and what their arrays hold is read anew; what has no words is called as ever."""
-    powers, eliminate = (load(f"dynamics.{name}") for name in ("events.series_kernels", "dense_kernels"))
-    right = np.zeros(2)
-    held = eliminate.eliminate.held(right)
-    for target in ([1.0, 2.0], [3.0, -1.0]):
-        left = np.array([[2.0, 1.0], [1.0, 3.0]])
-        right[:] = left @ target
-        assert eliminate.eliminate.held_call(held, left) and right == pytest.approx(target, rel=1e-15)
-    monkeypatch.setattr("patchfem.compiled.UNKEPT", set())  # it is asked for what cannot be kept
-    assert powers.powers.held_call(powers.powers.held(np.float32(1.5))) == powers.powers(1.5)
 
 
 @pytest.fixture(scope="module")
@@ -232,14 +196,6 @@ def test_exact_constants_are_read_without_the_module(tmp_path):
     with pytest.raises(AttributeError):
         module.OTHER  # noqa: B018
     assert brought
-
-
-def test_exact_a_function_is_one_of_its_module():
-    kernels = load("dynamics.events.read_kernels")
-    assert kernels is load("dynamics.events.read_kernels")
-    assert isinstance(kernels.read, Entry) and kernels.read.py_func is kernels.module().read.py_func
-    with pytest.raises(AttributeError, match="no_such"):
-        kernels.no_such  # noqa: B018
 
 
 MOTIONS = """

@@ -1,7 +1,5 @@
 """The verbs of the command line from Python, and scenes that are dicts."""
 
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -174,15 +172,6 @@ def test_a_folder_of_other_files_is_refused_before_the_work(tmp_path, monkeypatc
     assert answer.code == 2 and "notes.txt" in answer.err and (tmp_path / "other" / "notes.txt").is_file()
 
 
-def test_a_folder_that_is_a_verb_can_be_replaced(monkeypatch):
-    import patchfem.mesh.files  # noqa: F401
-    monkeypatch.setattr(pf, "mesh", lambda: "mine")
-    assert pf.mesh() == "mine"
-    monkeypatch.undo()
-    with pytest.raises(pf.PatchfemError, match="only a scene with"):
-        pf.mesh(TEXT, "none.vtu")
-
-
 @pytest.mark.parametrize("given", [{"cutoff": 0.25e-3}, {"cutoff": "0.25 mm"}, {"cutoff": np.float64(2.5e-4)}])
 def test_exact_a_length_is_a_number_or_a_text(tmp_path, given):
     path = tmp_path / "trace.csv"
@@ -251,18 +240,3 @@ def test_exact_a_backbone_and_stresses_are_drawn_with_their_values():
     assert shown.collections[0].get_array().max() > 0 and "m" in shown.get_xlabel()
     with pytest.raises(pf.PatchfemError, match="no \\[contact\\]"):
         pf.run(BLOCK).plot.stress()
-
-
-def test_exact_profile_gives_the_roughness_of_a_sine(tmp_path):
-    x = np.linspace(0, 4e-3, 4001)
-    path = tmp_path / "trace.csv"
-    path.write_text("x [um],z [um]\n" + "".join(f"{a * 1e6!r},{b!r}\n" for a, b in zip(
-        x.tolist(), np.sin(2 * np.pi * x / 2e-4).tolist())), "utf-8")
-    found = pf.profile(path)
-    [one] = found["profiles"]
-    assert one["measures"]["Pq"]["value"] == pytest.approx(1e-6 / np.sqrt(2), rel=1e-3)
-
-
-def test_importing_the_package_loads_no_stage():
-    text = "import sys, patchfem; print(any(name.startswith('patchfem.runs') for name in sys.modules))"
-    assert subprocess.run([sys.executable, "-c", text], capture_output=True, text=True).stdout == "False\n"

@@ -137,14 +137,6 @@ def test_exact_neither_meshes_nor_compiled_code_are_imported(trace):
     assert not modules & {*ALWAYS, "skfem", "matplotlib", "patchfem.dynamics"}
 
 
-@pytest.mark.slow
-def test_exact_the_pages_are_the_same_bytes(tmp_path):
-    from patchfem.export.surfaces.roughness import page
-
-    trace = sine(np.arange(4000) * UM, UM, 80 * UM, 0.2)
-    assert page([report_of(trace, 250 * UM)]) == page([report_of(trace, 250 * UM)])
-
-
 @pytest.mark.skipif("PATCHFEM_DATA" not in os.environ, reason="PATCHFEM_DATA names no folder of scans")
 def test_exact_the_dektak_file_as_it_is():
     """The file as the instrument exports it: the results that it printed between its cursors, by --window."""

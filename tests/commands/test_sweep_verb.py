@@ -97,27 +97,6 @@ def test_exact_a_refused_case_is_a_row_with_its_message(swept):
     assert "case 5 and 1 more: normal.load: must be >= 0" in answer.err
 
 
-@pytest.mark.slow
-def test_exact_the_dataset_has_a_dimension_per_key(swept):
-    out, _ = swept
-    with xr.open_dataset(out / "sweep.nc") as found:
-        assert dict(found.sizes) == {"normal_load": 3, "drive_acceleration": 2}
-        np.testing.assert_allclose(found.normal_load, [10, 26 * 4.4482216152605, -1])
-        np.testing.assert_allclose(found.drive_acceleration, [9.80665, 5 * 9.80665], rtol=1e-15)
-        assert (found.normal_load.units, found.drive_acceleration.units) == ("N", "m s-2")
-        assert found.normal_load.dims == ("normal_load",) and "normal_load_error" not in found  # the key, no measure
-        assert found.message.values.ravel().tolist() == [row["message"] for row in rows(out)]
-        assert found.folder.values.ravel().tolist() == [row["case"] for row in rows(out)]
-        names = {"loop_area", "relative_displacement_amplitude"}
-        for number, row in enumerate(rows(out)):
-            at = {"normal_load": number // 2, "drive_acceleration": number % 2}
-            assert found.outcome.isel(at) == row["outcome"]
-            for name in names:
-                value, error = found[name].isel(at), found[f"{name}_error"].isel(at)
-                assert np.isnan(value) if row[name] == "" else value == float(row[name])
-                assert np.isnan(error) == (row[name] == "") and found[name].units == found[f"{name}_error"].units
-
-
 def test_exact_nothing_unfinished_is_left(swept):
     out, _ = swept
     assert sorted(one.name for one in out.iterdir()) == ["cases", "chunks", "report.html", "sweep.csv",
@@ -224,14 +203,6 @@ def test_exact_older_tables_are_none_while_cases_are_answered(scene, tmp_path, m
     assert len(list((out / "cases").iterdir())) == 3  # what was found before is kept, as long as it is gone on with
     assert cli("sweep", scene, "--over", "friction.static=0.2,0.3", "-o", out).code == 0
     assert len(list((out / "cases").iterdir())) == 2
-
-
-@pytest.mark.parametrize("unit, written", [("m/s^2", "m s-2"), ("N m/rad", "N m rad-1"), ("1/m^2", "m-2"), ("1", "1"),
-                                           ("m^2/N", "m2 N-1"), ("Pa", "Pa"), ("N s/m", "N s m-1")])
-def test_exact_units_are_written_as_in_results(unit, written):
-    from patchfem.export.sweeps.tables import cf_unit
-
-    assert cf_unit(unit) == written
 
 
 def test_exact_one_object_on_stdout(scene, tmp_path):
@@ -366,21 +337,6 @@ def test_exact_pages_are_drawn_where_they_are_asked_for(scene, tmp_path):
     assert answer.code == 2 and "--no-page" in answer.err
     assert cli("sweep", scene, *over, "-o", out, "--collect").code == 0 and (out / page).is_file()
     assert cli("sweep", scene, *over, "-o", out, "--collect", "--no-page").code == 0 and not (out / page).exists()
-
-
-@pytest.mark.slow
-def test_exact_pages_of_cases_that_are_there_are_drawn(scene, tmp_path):
-    """--resume with --keep pages: a case whose folder has no page is answered again, one that has it is not."""
-    out, over = tmp_path / "swept", ("--over", "friction.static=0.1,0.2")
-    assert cli("sweep", scene, *over, "-o", out, "--keep", "results").code == 0
-    assert cli("sweep", scene, *over, "-o", out, "--resume", "--keep", "pages").code == 0
-    pages = sorted((out / "cases").glob("*/report.html"))
-    heads = {re.search("<h1>(.*?)</h1>", page.read_text("utf-8"))[1] for page in pages}  # not that of the scene
-    assert heads == {"friction.static = 0.1", "friction.static = 0.2"}
-    before = [page.stat().st_mtime_ns for page in pages]
-    assert len(pages) == 2
-    assert cli("sweep", scene, *over, "-o", out, "--resume", "--keep", "pages").code == 0
-    assert [page.stat().st_mtime_ns for page in pages] == before
 
 
 def test_refuses_a_mode_by_its_name_and_by_its_number(scene, tmp_path):

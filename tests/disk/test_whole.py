@@ -16,7 +16,7 @@ from limits import limited
 from scene_texts import BENCH, COATED
 
 from patchfem.core import Missing
-from patchfem.disk.whole import PLACED, Overflow, beside, room, sturdy, unfinished, whole, write_inside, write_text
+from patchfem.disk.whole import PLACED, beside, room, sturdy, unfinished, whole, write_inside, write_text
 
 SIZES = [1 << 10, 1 << 14, 1 << 16]
 
@@ -90,24 +90,6 @@ def test_exact_hdf5_closes_in_good_order_however_little_room_there_is(tmp_path, 
         file.flush()
         file["b"] = file["a"][::2] + 1
     assert caught.value.errno == 27 and not file and (tmp_path / "a.h5").stat().st_size <= size
-
-
-def test_exact_hdf5_with_room_reads_back(tmp_path):
-    with sturdy(tmp_path / "a.h5") as kept, h5py.File(kept, "w") as file:
-        file["a"] = np.arange(10_000.0)
-        file["b"] = file["a"][::2] + 1
-    with h5py.File(tmp_path / "a.h5", "r") as file:
-        assert (file["a"][...] == np.arange(10_000.0)).all() and (file["b"][...] == 1 + np.arange(0, 1e4, 2)).all()
-
-
-def test_exact_what_was_dropped_reads_as_zeros(tmp_path):
-    with open(tmp_path / "a", "w+b", buffering=0) as raw:
-        file = Overflow(raw)
-        with limited(10):
-            assert file.write(np.ones(20, np.int8)) == 20 and file.error.errno == 27 and file.write(b"x") == 1
-        file.seek(0)
-        buffer = bytearray(b"?" * 20)
-        assert file.readinto(buffer) == 20 and buffer == b"\x01" * 10 + b"\0" * 10
 
 
 @pytest.mark.parametrize("raised", [ValueError, KeyboardInterrupt, OSError])

@@ -26,7 +26,7 @@ from patchfem.core import Missing, PatchfemError
 from patchfem.export.fields.blocks import CODES, NAMES
 from patchfem.export.fields.series import Series
 from patchfem.export.fields.vtkhdf import NAME
-from patchfem.export.fields.vtu import BLOCK, _packed, export
+from patchfem.export.fields.vtu import export
 from patchfem.export.results import FILES
 
 ON_THE_INTERFACE = {"normal_stress", "gap", "status", "normal_bond_lower", "normal_bond_upper"}
@@ -190,21 +190,6 @@ def test_exact_pvd_is_read_by_pyvista_as_named_blocks(tmp_path):
     assert cli("export", tmp_path / "out", "-o", out).code == 0
     assert sorted(path.name for path in (tmp_path / "out" / "fields_frames").iterdir()) == sorted(
         f"frame_000{number}{end}" for number in (0, 1) for end in (".vtm", *(f"_{name}.vtu" for name in NAMES)))
-
-
-@pytest.mark.slow
-def test_exact_arrays_of_several_blocks_and_none_are_unpacked_by_vtk(tmp_path):
-    """Sizes at the edges of a block: the last one empty, full, one byte long."""
-    for count in (0, 1, BLOCK // 8 - 1, BLOCK // 8, BLOCK // 8 + 1, 3 * BLOCK // 8):
-        values = np.random.default_rng(count).normal(size=count)
-        path = tmp_path / "field.vtu"
-        path.write_text(f'''<?xml version="1.0"?>
-<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" header_type="UInt64"
- compressor="vtkLZMADataCompressor"><UnstructuredGrid><FieldData>
-<DataArray type="Float64" Name="a" NumberOfTuples="{count}" format="binary">{_packed(values)}</DataArray></FieldData>
-<Piece NumberOfPoints="0" NumberOfCells="0"/></UnstructuredGrid></VTKFile>''', "ascii")
-        array = through_vtk(path).GetFieldData().GetArray("a")
-        assert np.array_equal(vtk_to_numpy(array), values)
 
 
 def test_exact_csv_holds_the_interface_to_the_last_bit(tmp_path):

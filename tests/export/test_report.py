@@ -11,11 +11,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from page_data import charts_of, data_of, own_part, unheard
 
-from patchfem import scales
 from patchfem.__main__ import main
 from patchfem.core import G_N, Outcome
 from patchfem.export import report
@@ -24,13 +21,8 @@ from patchfem.export.page_data import Measured, Motion, PressedPatch, RunData, S
 from patchfem.export.pages import words
 from patchfem.export.pages.document import prose
 from patchfem.response.rows import TABLE as MOTION
-from patchfem.scene.keys.quantities import KINDS
 
 PERIOD, MIL = 1 / 143, 25.4e-6
-KIND = {"m": "length", "s": "time", "rad": "angle", "Pa": "pressure", "N": "force", "N m": "moment",
-        "N m-1": "stiffness"}
-
-
 def measure(value, unit, error=None):
     return {"value": value, "unit": unit, "error": error, "floor": 0.0}
 
@@ -178,13 +170,6 @@ def test_exact_the_pictures_hold_the_numbers_of_the_run(pages):
         ["unstable in the test", "measured", "computed"]
 
 
-def test_always_a_long_line_keeps_its_turning_points():
-    time = np.linspace(0, 40, 100_001)
-    drawn = charts.line(time, np.sin(time), "accent")
-    assert drawn["x"].size < 2 * charts.LINE and drawn["y"].max() == np.sin(time).max()
-    assert drawn["x"][0] == time[0] and drawn["x"][-1] == time[-1]
-
-
 @pytest.mark.parametrize("name", PAGES)
 def test_always_the_verdict_first_and_every_measure_listed(pages, name):
     data, text = pages[name]
@@ -276,26 +261,6 @@ def test_exact_units_follow_the_size(name, value, unit, error, text):
     assert words.others(name, measure(value, unit, error)) == text
 
 
-def test_exact_units_are_those_of_the_unit_table():
-    for table in (scales.LADDERS, words.WORKSHOP):
-        for unit, ladder in table.items():
-            known = KINDS.get(KIND.get(unit), {})
-            for name, scale in ladder:
-                if name in known:
-                    assert scale * known[name] == pytest.approx(1, rel=1e-12), name
-            assert [s for _, s in ladder] == sorted((s for _, s in ladder), reverse=True)
-
-
-@given(st.sampled_from(sorted(scales.LADDERS)), st.floats(1e-12, 1e12))
-def test_always_a_unit_is_the_smallest_below_a_thousand(unit, size):
-    ladder = scales.LADDERS[unit]
-    scale = scales.step_of(ladder, size)[1]
-    smaller = [s for _, s in ladder if s > scale]
-    above = [s for _, s in ladder if s < scale]
-    assert size * scale < 1000 or not above or size * above[0] < 1e-3  # from um^3 to mm^3 it is a long way
-    assert all(size * s >= 1000 for s in smaller)
-
-
 def test_exact_the_band_joins_the_reversals_of_each_cycle():
     number = np.arange(20)
     time, high = (number / 2 + 0.25) * PERIOD, 1 + number // 2
@@ -305,23 +270,6 @@ def test_exact_the_band_joins_the_reversals_of_each_cycle():
     assert np.isnan(low[3:5]).all() and np.isnan(top[3:5]).all()
     kept = np.array([0, 1, 2, 5, 6, 7, 8, 9])
     assert np.array_equal(top[kept], kept + 1) and np.array_equal(low[kept], -kept - 1.0)
-
-
-def test_exact_the_line_begins_where_the_samples_show_the_motion():
-    sparse, dense = np.arange(0, 10, 0.5), np.arange(10, 14.05, 0.01)
-    assert charts.whole_from(np.concatenate([sparse, dense]), 1.0, 12.0) == 10.0
-    assert charts.whole_from(np.concatenate([sparse, dense]), 1.0, 9.0) == 9.0  # the window is kept whole
-    assert charts.whole_from(dense, 1.0, 12.0) == dense[0]
-    assert charts.whole_from(np.linspace(0, 0.3, 5), 1.0, 0.0) == 0.0
-
-
-def test_exact_the_framed_part_holds_the_contact():
-    x, depth = np.linspace(-6, 6, 241), np.linspace(0, 6, 50)
-    for left, right in ((-6, -3), (-1, 1), (5, 6)):
-        a, b, height = charts.closer(x, depth, np.where((x >= left) & (x <= right), 1.0, 0.0), 1.2)
-        assert -6 <= a <= left + 1e-9 and right - 1e-9 <= b <= 6 and b - a == pytest.approx(2.4 * height)
-    a, b, _ = charts.closer(x, depth, 1 + x**2, 1.2)  # a flat punch: the corner with its peak
-    assert a == -6 and b - a == pytest.approx(0.4 * 12)
 
 
 def test_exact_a_run_gives_the_page_what_it_reads(tmp_path):

@@ -3,10 +3,8 @@
 import io
 import json
 import os
-from collections import Counter
 from contextlib import redirect_stdout
 
-import h5py
 import numpy as np
 import pytest
 import xarray as xr
@@ -60,19 +58,6 @@ def test_exact_the_file_is_the_one_that_xarray_writes(tmp_path):
                 assert str(ours[name].encoding.get(key)) == str(theirs[name].encoding.get(key)), (name, key)
         assert all(ours[name].encoding["complevel"] == 1 for name in ("force", "modal", "status"))
     assert not list(tmp_path.glob("*.partial"))
-
-
-def test_exact_an_object_of_the_file_is_opened_once(tmp_path, monkeypatch):
-    """A dimension twice, as a coordinate takes its place; h5netcdf alone asks up to 90 times for one."""
-    opened, known = Counter(), h5py.Group._get
-
-    def counted(self, name, *more):
-        opened[name] += isinstance(name, str)
-        return known(self, name, *more)
-
-    monkeypatch.setattr(h5py.Group, "_get", counted)
-    netcdf.write(some_contents(), tmp_path / "ours.nc")
-    assert len(opened) > 12 and max(opened.values()) <= 2
 
 
 def test_exact_without_a_page(scene, tmp_path):

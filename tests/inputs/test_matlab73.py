@@ -145,9 +145,3 @@ def damaged(count: int, seeds: list) -> int:
 
 def test_always_a_damaged_file_is_read_or_refused_by_name():
     assert 10 < damaged(150, [written({"run": RUN, "g": 9.81}), by_scipy({"run": RUN}, False)]) < 150
-
-
-@pytest.mark.slow
-def test_always_three_thousand_damaged_files_are_read_or_refused_by_name():
-    seeds = [written({"run": RUN, "g": 9.81}), by_scipy({"run": RUN}), by_scipy({"run": RUN}, False)]
-    assert 300 < damaged(3000, seeds) < 3000

@@ -21,7 +21,6 @@ from scene_texts import (
 )
 
 from patchfem.core import Missing, PatchfemError
-from patchfem.model import load, patch, rig, slide
 from patchfem.model.model import build
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
@@ -93,22 +92,6 @@ def test_always_the_speed_of_a_released_rig_can_be_written():
     assert loads(model.source.resolved).friction.rest_speed == model.bonds.rest_speed
 
 
-@pytest.mark.parametrize("text, sets", RUNS.values(), ids=RUNS)
-def test_exact_a_run_makes_nothing_of_the_model_again(text, sets, monkeypatch):
-    """Every maker is called at most once, and none once the model stands."""
-    calls = []
-    for place, names in ((patch, ("patch_asked",)), (slide, ("slide_asked",)), (load, ("point_asked",)),
-                         (rig, ("rig_asked", "modes_of", "drive_of", "start_of", "interface_laws_of"))):
-        for name in names:
-            made = getattr(place, name)
-            monkeypatch.setattr(place, name, lambda *words, name=name, made=made: calls.append(name) or made(*words))
-    model = build(loads(text, sets=sets))
-    first = list(calls)
-    assert first and len(set(first)) == len(first)
-    run(model, estimate=False)
-    assert calls == first
-
-
 # ---- runs of it
 
 @pytest.mark.parametrize("text, sets", RUNS.values(), ids=RUNS)
@@ -153,16 +136,6 @@ def test_exact_an_exchanged_part_is_the_scene_with_that_set(text, sets, change):
     before = build(loads(text, sets=sets))
     ours, want = run(exchanged(before, value)), run(loads(text, sets=[*sets, one]))
     assert seen(ours) == seen(want) != seen(run(before))
-
-
-@pytest.mark.parametrize("method", ["exact", "march", "harmonic"])
-def test_exact_another_load_of_a_point_is_the_scene_with_that_set(method):
-    sets = [f"accuracy.method={method}", *(["accuracy.steps_per_cycle=100"] if method != "exact" else [])]
-    text = POINT + COULOMB + SHORT
-    before = build(loads(text, sets=sets))
-    ours, want = run(with_load(before, 60.0)), run(loads(text, sets=[*sets, "normal.load=60 N"]))
-    assert seen(ours) == seen(want)
-    assert ours.measures["friction_force_peak"].value <= 0.3 * 60 * (1 + 1e-12)
 
 
 def test_exact_another_law_is_the_scene_with_that_set():

@@ -21,21 +21,6 @@ def test_exact_a_sampled_line_keeps_its_extremes_and_its_ends(size):
         assert y[own].max() == y[first:first + width].max() and x[own].min() == x[first:first + width].min()
 
 
-def test_exact_a_short_line_is_kept_whole():
-    assert np.array_equal(charts.sampled(np.arange(9.0), np.zeros(9), 9), np.arange(9))
-
-
-@pytest.mark.parametrize("most", [50, 700])
-def test_exact_a_coarser_grid_keeps_the_integral(most):
-    x, depth = np.sort(np.random.default_rng(2).uniform(-1, 1, 121)), np.linspace(0, 1, 41)**2
-    cells = np.random.default_rng(3).normal(size=(120, 40))
-    along, down, means = charts.coarser(x, depth, cells, most)
-    assert means.size <= most * 1.1 and means.shape == (along.size - 1, down.size - 1)
-    assert np.diff(along) @ means @ np.diff(down) == pytest.approx(np.diff(x) @ cells @ np.diff(depth), rel=1e-11)
-    assert (along[0], along[-1], down[0], down[-1]) == (x[0], x[-1], 0.0, 1.0)
-    assert charts.coarser(x, depth, cells, 4800)[2] is cells
-
-
 def test_always_charts_of_any_size_leave_room_for_the_rest_of_the_page():
     """40 lines of 30 000 points: 6 MB as they are drawn, 18 MB as they are."""
     x = np.linspace(0, 1, 30_000)

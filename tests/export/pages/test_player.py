@@ -11,11 +11,11 @@ from command_line import cli
 from page_data import data_of
 
 from patchfem.export import report
-from patchfem.export.drawing.panels import corners, panels, sizes
+from patchfem.export.drawing.panels import panels, sizes
 from patchfem.export.fields.series import Series, moving
 from patchfem.export.page_data import PressedPatch, RunData, SceneText, Verdict
 from patchfem.export.pages import player
-from patchfem.export.pages.thinned import spread, thinned
+from patchfem.export.pages.thinned import thinned
 
 SIDES = ("lower", "upper")
 
@@ -39,20 +39,6 @@ def graded() -> tuple:
     x, depth = np.sin(np.linspace(-np.pi / 2, np.pi / 2, 91)), np.linspace(0, 1, 25)**2
     points, cells = grid(x, depth)
     return points, cells, np.tile(np.arange(24) < 4, 90)
-
-
-@pytest.mark.parametrize("most", [200, 700, 2000])
-def test_exact_a_thinned_grid_keeps_area_outline_and_coating(graded, most):
-    points, cells, coated = graded
-    mesh = thinned(points, cells, coated, most)
-    kept = points[mesh.nodes]
-    assert len(mesh.cells) <= most * 1.15
-    size = sizes(kept, mesh.cells)
-    covered = np.add.reduceat(mesh.areas, mesh.starts)[mesh.groups]
-    np.testing.assert_allclose(size, covered, rtol=1e-12)  # every cell covers exactly those whose mean it has
-    assert size.sum() == pytest.approx(2.0, rel=1e-12)
-    coat = coated[mesh.order[mesh.starts]][mesh.groups]
-    assert size[coat].sum() == pytest.approx(2 * (4 / 24)**2, rel=1e-12)
 
 
 def test_exact_means_keep_the_integral_and_a_linear_field_its_middle_value(graded):
@@ -79,25 +65,6 @@ def test_always_any_mesh_is_thinned_to_whole_cells_of_the_same_outline():
     kept = points[mesh.nodes]
     assert (kept.min(axis=0) == points.min(axis=0)).all() and (kept.max(axis=0) == points.max(axis=0)).all()
     np.testing.assert_allclose(mesh.means(np.full((len(triangles), 1), 7.0)), 7.0, rtol=1e-14)
-
-
-def test_exact_lines_are_spread_evenly_and_half_of_them_where_they_are_wanted():
-    lines = np.linspace(-1, 1, 1001)
-    even = spread(lines, 40)
-    assert np.array_equal(even, np.arange(41) * 25)
-    half = lines[spread(lines, 40, (-0.05, 0.05))]
-    assert np.sum(np.abs(half) <= 0.0501) in (20, 21, 22) and (half[0], half[-1]) == (-1, 1)
-    few = lines[spread(lines, 300, (-0.01, 0.01))]  # 10 lines are all there are
-    assert np.sum(np.abs(few) <= 0.0101) == 11 and few.size <= 301
-    assert np.array_equal(spread(lines, 1000, (-0.05, 0.05)), np.arange(1001))
-
-
-def test_exact_a_small_mesh_stays_as_it_is():
-    points, cells = grid(np.arange(4.0), np.arange(3.0))
-    mesh = thinned(points, cells, np.zeros(6, bool), 6)
-    assert np.array_equal(points[mesh.nodes][mesh.cells], points[cells])
-    np.testing.assert_array_equal(mesh.means(np.arange(6.0)[:, None])[:, 0], np.arange(6.0))
-    assert np.array_equal(corners(np.array([4, 5, 6, 0, 1, 2, 3]), np.array([0, 3, 7])), [[4, 5, 6, 6], [0, 1, 2, 3]])
 
 
 def test_exact_packed_numbers_are_within_half_a_step():

@@ -2,7 +2,6 @@
 
 import csv
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,10 +9,8 @@ from command_line import cli
 from limits import limited
 from scene_texts import COULOMB, POINT, SHORT
 
-from patchfem.campaigns.sweeps import sweep
 from patchfem.export.sweeps import chunks
 from patchfem.export.sweeps.chunks import Chunks
-from patchfem.runs.many import answers as kept
 from patchfem.runs.many import many
 from patchfem.runs.many.answers import Answers
 
@@ -149,56 +146,12 @@ def test_exact_a_folder_of_summaries_alone_is_gone_on_with(scene, tmp_path, monk
     assert {name: (out / name).read_bytes() for name in TABLES} == before
 
 
-def test_exact_columns_on_disk_make_the_same_tables(swept, scene, tmp_path, monkeypatch):
-    monkeypatch.setattr(kept, "MANY", 10)
-    monkeypatch.setattr(chunks, "MOST", 16)
-    monkeypatch.setattr(sweep, "MOST", 16)
-    out = tmp_path / "out"
-    assert cli("sweep", scene, *OVER, "-o", out, "--keep", "none").code == 3
-    for name in TABLES:
-        assert (out / name).read_bytes() == (swept / name).read_bytes()
-    assert 7 <= len(list((out / "chunks").iterdir())) <= 14
-    total = Answers.blank(11, tmp_path)
-    total.measure("loop_area", "J")
-    assert isinstance(total.values["loop_area"], kept.OnDisk)
-    total.values["loop_area"][[3, 5]] = 1.5, 2.5
-    assert total.values["loop_area"][3:6].tolist()[::2] == [1.5, 2.5] and np.isnan(total.values["loop_area"]).sum() == 9
-    assert np.asarray(total.values["loop_area"].reshape((11, 1))).shape == (11, 1) == np.shape(
-        total.values["loop_area"].reshape((11, 1)))
-    assert not [one for one in Path(tmp_path).iterdir() if one.name != "out"]
-
-
 def test_always_who_does_not_see_the_folder_hands_its_answers_on(swept, scene, tmp_path, monkeypatch):
     """As a worker of a cluster without a common disk; there may even be a folder of the same name."""
     monkeypatch.setattr("patchfem.export.sweeps.folder.Writer.__call__", lambda *given: False)
     assert cli("sweep", scene, *OVER, "-o", tmp_path / "out", "--keep", "none").code == 3
     for name in TABLES:
         assert (tmp_path / "out" / name).read_bytes() == (swept / name).read_bytes()
-
-
-def test_exact_the_tables_of_a_whole_sweep_are_written_again_only_where_they_are_others(scene, tmp_path):
-    """A whole sweep that is resumed answers the same and writes nothing; one that lacks a table, has its page left
-    out, names its values otherwise or was written with a case less writes all."""
-    out, over = tmp_path / "out", ("--over", "drive.acceleration=1 g,2 g,3 g")
-
-    def stamps():
-        return {one.name: one.stat().st_mtime_ns for one in out.iterdir() if one.is_file()}
-
-    def resumed(*words, over=over):
-        before = stamps()
-        said = cli("sweep", scene, *over, "-o", out, "--keep", "none", "--resume", *words)
-        assert said.code == 0
-        return said.out, {name for name, when in stamps().items() if before.get(name) != when}
-
-    first = cli("sweep", scene, *over, "-o", out, "--keep", "none").out
-    assert resumed() == (first, set())
-    (out / "sweep.nc").unlink()
-    assert resumed()[1] == {"sweep.csv", "sweep.nc", "sweep.json", "report.html"} and resumed()[1] == set()
-    assert resumed("--no-page")[1] == {"sweep.csv", "sweep.nc", "sweep.json"} and not (out / "report.html").exists()
-    named = ("--over", "drive.acceleration=1 g,2 g,29.41995 m/s^2")
-    assert "sweep.csv" in resumed(over=named)[1] and "29.41995" in (out / "sweep.csv").read_text()
-    assert "sweep.csv" in resumed(over=("--over", "drive.acceleration=1 g,2 g"))[1]
-    assert len((out / "sweep.csv").read_text().splitlines()) == 3
 
 
 @pytest.mark.parametrize("older", [False, True])

@@ -60,16 +60,6 @@ def test_always_whatever_has_changed_is_looked_at(swept, change):
     assert again.code == 0 and receipt.read(out, receipt.sign(scene, words(over)))
 
 
-def test_always_the_content_of_a_file_that_a_word_names_counts(swept):
-    scene, *_ = swept
-    other = scene.parent / "push.csv"
-    other.write_text("1", encoding="utf-8")
-    before = receipt.sign(scene, words('drive.file="push.csv"'))
-    other.write_text("2", encoding="utf-8")
-    assert before != receipt.sign(scene, words('drive.file="push.csv"'))
-    assert receipt.sign(scene.parent / "none.toml", words()) == "" and receipt.read(scene.parent, "") == {}
-
-
 def test_exact_a_sweep_with_a_failed_case_has_no_receipt(swept, tmp_path):
     scene, *_ = swept
     assert cli("sweep", scene, "--over", "friction.static=0.2,-1", "--keep", "none", "-o", tmp_path / "out").code == 3

@@ -42,8 +42,6 @@ CAMPAIGNS = {
     "vtu": Campaign(1000, "meshes.vtu", "meshes of VTK"),
     "inp": Campaign(1000, "meshes.inp", "decks of Abaqus and CalculiX"),
     "energy": Campaign(1000, "physics.energy", "books of energy of laws and engines"),
-    "hard": Campaign(60, "hard.physics", "hard physics with known answers"),
-    "wear": Campaign(200, "hard.wear", "worn volumes"),
     "hostile": Campaign(240, "hostile.files", "files made to harm, twelve kinds"),
     "kills": Campaign(250, "ends.kills", "signals at random times"),
     "disks": Campaign(50, "ends.disks", "full disks and limits of size"),

@@ -1,0 +1,141 @@
+"""The full text of the sentences that a user meets most, in one list that a person reviews: `tests/sentences.toml`.
+
+Other tests ask what a sentence must contain. Here its words are compared, with `#` in place of each number. After a
+change of words, `python tests/test_sentences.py` writes the list anew; read the difference before you commit it.
+"""
+
+import re
+import sys
+import tempfile
+import tomllib
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+LIST = HERE / "sentences.toml"
+sys.path[:0] = [str(HERE / "support")] if __name__ == "__main__" else []
+
+from command_line import cli  # noqa: E402
+from scene_texts import BENCH, COULOMB, POINT, RIG, SHORT, SMALL_PATCH  # noqa: E402
+
+import patchfem as pf  # noqa: E402
+
+NUMBER = re.compile(r"(?<![\w.])-?\d+(\.\d+)?(e[+-]?\d+)?")
+BLOCK = POINT + COULOMB + SHORT
+FILES = {"patch.toml": SMALL_PATCH, "bench.toml": BENCH, "block.toml": BLOCK, "rig.toml": RIG}
+STATIC = ("--over", "friction.static=0.1,0.2")
+TILTS = ("--over", "contact.tilt.angle=0.001 mrad,0.003 mrad,0.01 mrad,0.03 mrad,0.1 mrad")
+DRAWN = ("--over", "friction.static=0.2..0.4", "--over", "normal.load=90 N..110 N", "--sobol", "64")
+
+SCREENS = {  # runs and sweeps whose first lines are the answer
+    "patch": ("run", "patch.toml"),
+    "bench": ("run", "bench.toml"),
+    "block_steady": ("run", "block.toml"),
+    "block_stuck": ("run", "block.toml", "--set", "drive.acceleration=1 g"),
+    "block_transient": ("run", "block.toml", "--set", "drive.cycles=6"),
+    "block_grows": (
+        "run",
+        "block.toml",
+        "--set",
+        "drive.acceleration=9 g",
+        "--set",
+        "structure.mode.0.damping=0",
+    ),
+    "sweep": ("sweep", "bench.toml", *STATIC),
+    "sweep_with_refused_case": ("sweep", "bench.toml", "--over", "normal.load=-1 N,10 N"),
+    "sweep_of_tilts": ("sweep", "patch.toml", *TILTS, "--set", "accuracy.tolerance=0.05"),
+    "sweep_of_drawn_cases": ("sweep", "bench.toml", *DRAWN),
+}
+REFUSALS = {
+    "unknown_key": ("check", "rig.toml", "--set", "drive.wavform=sine"),
+    "unknown_table": ("check", "rig.toml", "--set", "strucure.moving_mass=1 kg"),
+    "unknown_unit": ("check", "rig.toml", "--set", "contact.load=26 lb"),
+    "no_unit": ("check", "rig.toml", "--set", "contact.load=26"),
+    "wrong_kind_of_unit": ("check", "rig.toml", "--set", "contact.load=6 mil"),
+    "out_of_range": ("check", "rig.toml", "--set", "friction.static=-0.1"),
+    "unknown_law": ("check", "rig.toml", "--set", "friction.law=nonlocl"),
+    "unknown_material": ("check", "rig.toml", "--set", "contact.substrate=Ti-8Al"),
+    "keys_that_exclude_each_other": ("check", "rig.toml", "--set", "drive.displacement=1 mm"),
+    "removed_method": ("check", "block.toml", "--set", "accuracy.method=newmark"),
+    "missing_scene": ("run", "none.toml"),
+    "missing_results": ("report", "none"),
+    "sweep_without_key": ("sweep", "bench.toml"),
+    "sweep_of_unknown_measure": ("sweep", "bench.toml", *STATIC, "--of", "loop_are"),
+    "folder_of_other_files": ("run", "bench.toml", "-o", "."),
+    "unknown_export": ("export", "none", "-o", "a.xyz"),
+    "unknown_verb": ("rnu", "bench.toml"),
+}
+WARNINGS = {
+    "tolerance_missed": (SMALL_PATCH, {}),
+    "coarse_steps": (
+        RIG,
+        {"accuracy.steps_per_cycle": 40, "contact.element_size": 1e-3, "drive.cycles": 6},
+    ),
+}
+
+
+def sentences(folder: Path) -> dict:
+    """Make every sentence of the list: {group: {name: text}}."""
+    for name, text in FILES.items():
+        (folder / name).write_text(text, "utf-8")
+    out = {"outcome": {outcome.value: outcome.sentence for outcome in pf.Outcome}}
+    out["answer"], out["refusal"], out["warning"] = {}, {}, {}
+    for name, words in SCREENS.items():
+        answer = cli(*words, "-o", folder / name, "--no-page")
+        out["answer"][name] = (
+            answer.out.partition("\n\n")[0] if words[0] == "sweep" else first_lines(answer.out)
+        )
+    for name, words in REFUSALS.items():
+        out["refusal"][name] = cli(*words).err
+    for name, (text, sets) in WARNINGS.items():
+        result = pf.run(text, **sets)
+        out["warning"][name] = "\n".join(
+            [*result.warnings, *(f"note: {note}" for note in result.notes)]
+        )
+    for texts in out.values():
+        for name, text in texts.items():
+            texts[name] = without_numbers(text, folder)
+    return out
+
+
+def first_lines(text: str) -> str:
+    """Return the answer of a run: what stands above its table, without the title."""
+    lines = text.splitlines()
+    begin = next(k for k, line in enumerate(lines) if re.match(r"[a-z_]+: ", line))
+    end = next(k for k, line in enumerate(lines) if k > begin and re.fullmatch(r"\w+", line))
+    return "\n".join(lines[begin:end])
+
+
+def without_numbers(text: str, folder: Path) -> str:
+    return NUMBER.sub("#", text.replace(str(folder), "FOLDER")).strip()
+
+
+def write_list(found: dict) -> None:
+    """Write the list: one table for each group, one text for each sentence."""
+    blocks = [
+        "# Sentences of the program, numbers as #; tests/test_sentences.py compares them and writes them.\n"
+    ]
+    for group, texts in found.items():
+        blocks.append(f"\n[{group}]\n")
+        blocks += [f"{name} = '''\n{text}'''\n" for name, text in texts.items()]
+    LIST.write_text("".join(blocks), "utf-8")
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("sentences")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(folder)
+        return sentences(folder)
+
+
+@pytest.mark.parametrize("group", ["outcome", "answer", "refusal", "warning"])
+def test_exact_sentences_are_those_of_the_reviewed_list(made, group):
+    assert made[group] == tomllib.loads(LIST.read_text("utf-8"))[group]
+
+
+if __name__ == "__main__":
+    with tempfile.TemporaryDirectory() as place, pytest.MonkeyPatch.context() as context:
+        context.chdir(place)
+        write_list(sentences(Path(place)))
