@@ -91,25 +91,6 @@ def test_exact_blocks_hold_what_the_pieces_gave(tmp_path):
         assert np.array_equal(line.point_data[name], values.astype(line.point_data[name].dtype))
 
 
-def test_exact_a_series_is_read_back_as_written(tmp_path):
-    given = write_small(tmp_path / "out", 4)
-    with Series(tmp_path / "out") as series:
-        assert np.array_equal(series.times, given.times) and series.units == UNITS and len(series) == 4
-        for number in range(4):
-            frame = series.frame(number)
-            points, nodes, *data = joined(given, number)
-            assert np.array_equal(frame.points, points) and frame.time == given.times[number]
-            assert np.array_equal(frame.connectivity, nodes)
-            for mine, theirs in zip((frame.point_data, frame.cell_data), data):
-                assert mine.keys() == theirs.keys()
-                for name, values in theirs.items():
-                    assert np.array_equal(mine[name], values, equal_nan=values.dtype.kind == "f"), name
-            for part, (first, body) in enumerate(zip((0, 12), given.pair)):
-                assert all(np.array_equal(a, first + b) for a, b in zip(frame.cells(part), body["blocks"], strict=True))
-        assert series.frame(-1).number == 3
-        assert np.all(np.diff(frame.points[frame.interface(), 0]) > 0) and frame.interface().min() >= 24
-
-
 def test_exact_vtk_reads_three_named_blocks_at_every_time(tmp_path, capfd):
     given = write_small(tmp_path / "out", 4)
     reader = vtkHDFReader()

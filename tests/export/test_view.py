@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import re
 from dataclasses import replace
 
-import matplotlib.image
 import numpy as np
 import pytest
 from command_line import cli
@@ -111,22 +109,6 @@ def test_always_the_factor_is_round_and_just_below(factor):
     lead = found / 10.0**np.floor(np.log10(found * (1 + 1e-9)))
     assert min(abs(lead - step) for step in (1, 2, 5)) <= 1e-9
     assert rounded(factor) == max(1.0, rounded(factor))
-
-
-def colours(path):
-    """(shape, share of the picture that is neither white, grey nor black)."""
-    picture = matplotlib.image.imread(path)[..., :3]
-    return picture.shape, (np.ptp(picture, axis=2) > 0.1).mean()
-
-
-def test_exact_a_picture_needs_no_opengl(bench, tmp_path, monkeypatch):
-    monkeypatch.setattr(view, "PROBE", ABORTS)
-    answer = cli("view", bench, "-o", tmp_path / "a.png", "--frame", 0)
-    assert answer.code == 0 and not answer.err, answer.err
-    shape, share = colours(tmp_path / "a.png")
-    assert shape == (1000, 1800, 3) and share > 0.2
-    assert ", frame 0 (of 0 to " in answer.out and [path.name for path in tmp_path.iterdir()] == ["a.png"]
-    assert re.search(r", frame \d+ \(the last\), \S+ s$", cli("view", bench, "-o", tmp_path / "b.svg").out)
 
 
 @pytest.mark.slow

@@ -101,8 +101,3 @@ def test_refuses_a_summary_of_another_shape(tmp_path, text, why):
     (tmp_path / "summary.json").write_text(text)
     with pytest.raises(PatchfemError, match=f"cannot be read: summary.json is not a summary of a run: .*{why}"):
         read(tmp_path)
-
-
-def test_always_a_browser_draws_it(tmp_path, browser):
-    seen = browser(page([read(made(tmp_path / "a", 10.0, 2e-6, 0.0)), read(made(tmp_path / "b", 20.0, 1e-6, 0.0))]))
-    assert len(re.findall(r'<div id="?chart\d"?[^>]*>\s*<div', seen)) == 2, "friction loop and displacement"

@@ -37,19 +37,10 @@ CAMPAIGNS = {
     "loops": Campaign(1000, "tables.loops", "friction loops"),
     "universal": Campaign(1000, "tables.universal", "universal files"),
     "arrays": Campaign(1000, "tables.arrays", "matrices in .npz and .mat"),
-    "msh": Campaign(1000, "meshes.msh", "meshes of Gmsh as text"),
-    "msh-binary": Campaign(1000, "meshes.binary_msh", "meshes of Gmsh in binary"),
-    "vtu": Campaign(1000, "meshes.vtu", "meshes of VTK"),
-    "inp": Campaign(1000, "meshes.inp", "decks of Abaqus and CalculiX"),
     "energy": Campaign(1000, "physics.energy", "books of energy of laws and engines"),
     "hostile": Campaign(240, "hostile.files", "files made to harm, twelve kinds"),
-    "kills": Campaign(250, "ends.kills", "signals at random times"),
-    "disks": Campaign(50, "ends.disks", "full disks and limits of size"),
-    "memory": Campaign(50, "ends.memory", "limits of memory"),
-    "together": Campaign(50, "ends.together", "two runs at one instant, cold caches"),
-    "determinism": Campaign(20, "repeats.determinism", "runs again, more threads"),
-    "tongues": Campaign(60, "repeats.tongues", "locales, encodings, names"),
-    "streams": Campaign(60, "repeats.streams", "streams full or closed"),
+    "memory": Campaign(50, "processes.memory", "limits of memory"),
+    "determinism": Campaign(20, "processes.determinism", "runs again, more threads"),
 }
 WARM = (  # scenes that load what most trials need, so that a forked trial finds it
     '[normal]\nload = "26 lbf"\n[friction]\nlaw = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"\n[structure]\n'

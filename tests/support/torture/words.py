@@ -1,12 +1,13 @@
 """Command lines by grammar: every verb with options and values that fit, and with some that do not."""
 
 from . import grammar
-from .ends import PATCH
 from .scenes import NUMBERS, TEXTS
 from .tables import RIG, RUBS, csv
 from .toml import known, text_of
 from .trial import Trial
 
+PATCH = {"contact": {"length": "10 mm", "width": "10 mm", "height": "5 mm", "load": "50 N", "substrate": "steel",
+                     "element_size": "0.2 mm", "tilt": {"angle": "1 urad"}}}
 BENCH = RUBS | {"slide": {"kind": "sine", "amplitude": "10 um", "frequency": "5 Hz"}}
 SCENES = {"patch.toml": PATCH, "bench.toml": BENCH, "rig.toml": RIG | {"drive": {
     "kind": "base", "frequency": "90 Hz", "acceleration": "5 m/s^2", "cycles": 3}}}
