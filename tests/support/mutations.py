@@ -347,7 +347,7 @@ def watched_lines(root: Path, faults: list[Fault]) -> dict:
     """Return {file: {line: [numbers of faults]}}: a test that runs a line may notice these faults.
 
     A fault inside a function has the lines of its statement. A fault outside, which is run at import, has the lines of
-    the functions that mention the names assigned there, or else of all functions of its file. A fault of a compiled
+    the functions that mention the names assigned there and of all functions of its file. A fault of a compiled
     kernel has those of the functions in its folder and of the files that name its module.
     """
     watched = defaultdict(lambda: defaultdict(list))
@@ -399,11 +399,12 @@ def lines_of_fault(root: Path, fault: Fault, text: str) -> dict:
         for node in ast.walk(statement)
         if isinstance(node, ast.Name) and isinstance(node.ctx, ast.Store)
     }
-    mentions = {}
+    reaching = {}
     for file in package_files(root) if names and statement in tree.body else ():
         if any(name in (root / file).read_text("utf-8") for name in names):
-            mentions[file] = lines_that_mention(root / file, names)
-    return mentions if any(mentions.values()) else {fault.file: function_lines(root / fault.file)}
+            reaching[file] = lines_that_mention(root / file, names)
+    reaching[fault.file] = function_lines(root / fault.file)
+    return reaching
 
 
 @cache
@@ -654,6 +655,8 @@ class Copy:
         text = planted_text(self.tree, fault)
         if text is None:
             return "gone"
+        if not stages:
+            return "unreached"
         old = (self.tree / fault.file).read_text("utf-8")
         cache_folder = self.work / "cache"
         try:
@@ -691,8 +694,9 @@ def link(source: str, target: str) -> None:
 def stages_of(number: int, fault: Fault, rows: list[dict], max_seconds: float) -> list[list[str]]:
     """Return the tests for a fault in two stages, the quick tests of its own folder first.
 
-    The second stage ends with the other tests of the same files, because the first test of a file may have set up, and
-    so reached, what they all ask about.
+    There are none where no test reaches the fault. The second stage ends with the other tests of
+    the same files, because the first test of a file may have set up, and so reached, what they all
+    ask about.
     """
     own_folder = f"tests/{Path(fault.file).parts[1]}/"
     reaching = [row for row in rows if number in row["reached"]]
@@ -702,8 +706,6 @@ def stages_of(number: int, fault: Fault, rows: list[dict], max_seconds: float) -
         for row in rows
         if row["test"].partition("::")[0] in files and number not in row["reached"]
     ]
-    if not reaching:
-        beside = [row for row in rows if row["test"].startswith(own_folder)]
 
     def rank(row: dict) -> tuple:
         return not row["test"].startswith(own_folder), row["seconds"]
@@ -860,10 +862,8 @@ def show(results: Path) -> None:
             f"{folder:14} {counts['caught'] + counts['hangs']} of {judged} caught, {counts['gone']} gone"
         )
     for fault, outcome in outcomes.items():
-        if outcome == "survives":
-            print(
-                f"\n{fault.file}:{fault.line} ({fault.kind})\n- {fault.before.strip()}\n+ {fault.after.strip()}"
-            )
+        if outcome in ("survives", "unreached"):
+            print_change(fault, outcome)
 
 
 def compare(before: Path, after: Path) -> None:
@@ -873,10 +873,14 @@ def compare(before: Path, after: Path) -> None:
     for (old, new), number in sorted(Counter(pairs.values()).items()):
         print(f"{old} -> {new}: {number}")
     for fault, (old, new) in pairs.items():
-        if old in ("caught", "hangs") and new == "survives":
-            print(
-                f"\nescapes now: {fault.file}:{fault.line}\n- {fault.before.strip()}\n+ {fault.after.strip()}"
-            )
+        if old in ("caught", "hangs") and new in ("survives", "unreached"):
+            print_change(fault, "escapes now")
+
+
+def print_change(fault: Fault, remark: str) -> None:
+    """Print where a fault is, and its lines before and after."""
+    print(f"\n{fault.file}:{fault.line} ({fault.kind}), {remark}")
+    print(f"- {fault.before.strip()}\n+ {fault.after.strip()}")
 
 
 def main() -> None:
