@@ -1,7 +1,8 @@
 """Random static patches, as texts of scenes and as what `static_reference` solves, and their bars held against it.
 
 `python tests/support/static_scenes.py FIRST COUNT FILE [TOLERANCE ...]` writes a line for each scene and tolerance to
-FILE; `--read FILE` prints how many bars hold, by measure and by kind.
+FILE; `--again FILE OTHER` runs the scenes of FILE with the importable version of patchfem, takes the reference from
+FILE and writes OTHER; `--read FILE` prints how many bars hold, by measure and by kind.
 """
 
 from __future__ import annotations
@@ -99,6 +100,15 @@ def line(seed: int, tolerances=TOLERANCES, fine: float = 5e-4) -> dict:
             "runs": {repr(one): found(scene, one) for one in tolerances}}
 
 
+def run_again(path: str, other: str) -> None:
+    """Run the scenes of the file `path` with the importable version of patchfem and write the file `other`."""
+    with open(path, encoding="utf-8") as rows, open(other, "w", encoding="utf-8") as file:
+        for row in map(json.loads, rows):
+            scene = drawn(row["seed"])
+            row["runs"] = {tolerance: found(scene, float(tolerance)) for tolerance in row["runs"]}
+            print(json.dumps(row), file=file, flush=True)
+
+
 KNOWN = 3.0  # times narrower than a bar must the truth be known that is to judge it
 
 
@@ -159,6 +169,8 @@ def read(path: str) -> None:
 if __name__ == "__main__":
     if sys.argv[1] == "--read":
         read(sys.argv[2])
+    elif sys.argv[1] == "--again":
+        run_again(*sys.argv[2:])
     else:
         with open(sys.argv[3], "a", encoding="utf-8") as file:
             for seed in range(int(sys.argv[1]), int(sys.argv[1]) + int(sys.argv[2])):
