@@ -1,0 +1,301 @@
+"""Random benches with wear, and an independent integration of Archard's law with which their errors are compared.
+
+`python tests/support/wear_scenes.py run FIRST COUNT FILE` computes the scenes of COUNT seeds and writes a line for each;
+`again FILE OTHER` runs the scenes of FILE with the importable version of patchfem, takes the reference from FILE and
+writes OTHER; `read FILE` prints how many stated errors hold.
+
+Truth: dh/ds = coefficient * pressure for the depth h and the slip path s, on the compliance of the cells of order 4 of
+`static_reference`. Nothing of the package is used. Each step is an implicit Euler step: the contact is solved with
+C + diag(coefficient * ds / area). Steps halved twice give Richardson's extrapolation, and a coarser mesh gives the
+uncertainty. The volume has the closed form coefficient * load * path (`wear_forms.worn_volume`).
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+import static_reference as reference
+import static_scenes
+from wear_forms import worn_volume
+
+MEASURES = (
+    "worn_volume",
+    "worn_depth_max",
+    "contact_fraction",
+    "contact_half_width",
+    "pressure_peak",
+    "approach",
+    "normal_stiffness",
+    "tangential_stiffness",
+    "rotational_stiffness",
+)
+CELLS = (
+    48,
+    120,
+)  # cells along the part that is in contact before or after wear; the second mesh gives the truth
+STEPS = (30, 60, 120)  # implicit Euler steps, each a halving of the one before
+FIRST_STEP = 1e-4  # first of the coarsest steps as a fraction of the path: pressure at a corner wears off at once
+
+
+class WearScene(NamedTuple):
+    """A patch that slides to and fro on the whole, in SI units."""
+
+    patch: reference.Scene
+    coefficient: float  # [m^2/N]
+    amplitude: float  # [m]
+    cycles: float
+
+    @property
+    def path(self) -> float:
+        """Slip path [m]."""
+        return 4 * self.amplitude * self.cycles
+
+
+class Model(NamedTuple):
+    """Discrete patch: compliances (m, m) [m/N] per unit width, places, weights and gap (m,) [m]."""
+
+    normal: np.ndarray
+    tangential: np.ndarray
+    place: np.ndarray
+    weight: np.ndarray
+    gap: np.ndarray
+
+
+def draw(seed: int) -> WearScene:
+    """Draw the patch of `static_scenes` for a seed, and a wear of 0.03 to 10 times its elastic approach."""
+    patch = static_scenes.drawn(seed)
+    random = np.random.default_rng([seed, 52])
+    pressure = patch.load / patch.width / patch.length
+    elastic = pressure * (patch.lower.height + patch.upper.height) / patch.lower.layers[1][0]
+    depth = elastic * 10 ** random.uniform(-1.5, 1)
+    coated = [body.thickness for body in (patch.lower, patch.upper) if body.thickness]
+    depth = min([depth] + [0.02 * thickness for thickness in coated])
+    coefficient = float(f"{10 ** random.uniform(-16, -13):.4g}")
+    amplitude = float(f"{10 ** random.uniform(-6, -4):.4g}")
+    cycles = float(f"{max(depth / (coefficient * pressure * 4 * amplitude), 1.0):.4g}")
+    return WearScene(patch, coefficient, amplitude, cycles)
+
+
+def text_of(scene: WearScene) -> str:
+    """Write the scene as the program reads it."""
+    return static_scenes.text_of(scene.patch) + (
+        '[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\nkind = "sine"\nfrequency = "10 Hz"\ncycles = 2\n'
+        f'amplitude = "{scene.amplitude!r} m"\n[wear]\ncoefficient = "{scene.coefficient!r} m^2/N"\n'
+        f"cycles = {scene.cycles!r}\n"
+    )
+
+
+def discretize(patch: reference.Scene, span: tuple, cells: int) -> Model:
+    """Condense both pieces to an interface with even cells over `span` and larger ones outside it."""
+    half = patch.length / 2
+    size = (span[1] - span[0]) / cells
+    corner = min(patch.lower.height, patch.length) / 60
+    points, sizes = [-half, half], [min(corner, size)] * 2
+    if patch.lower.length != patch.upper.length:
+        sizes = [size / 8] * 2
+    for place in np.linspace(*span, cells + 1):
+        points, sizes = [*points, float(place)], [*sizes, size]
+    if patch.step:
+        points, sizes = [*points, patch.step[1]], [*sizes, size / 4]
+    x = reference.spread(points, sizes, -half, half, 0.5, patch.length / 10)
+    place, weight = reference.cells_of.face_nodes(x, reference.ORDER)
+    bodies = [patch.lower] + [patch.upper] * (patch.upper != patch.lower)
+    parts = [reference.face(body, patch.plane, x, 0.5, corner) for body in bodies]
+    low, high = parts[0], parts[-1]
+    normal = low[0] + high[0]
+    if patch.skin:
+        normal = normal + np.diag(1 / (patch.skin * weight))
+    gap = place**2 / 2 * patch.curvature + patch.tilt * place
+    if patch.step:
+        height, at = patch.step
+        gap = gap + height * (place > at + 1e-15 if height > 0 else place > at - 1e-15)
+    return Model(
+        normal, low[1] + high[1] if patch.upper == patch.lower else np.empty(0), place, weight, gap
+    )
+
+
+def press(model: Model, gap, softening, load: float, active) -> tuple:
+    """Solve the contact by an active set that starts from `active`; return forces, approach and the new set."""
+    compliance = model.normal + np.diag(softening)
+    for _ in range(400):
+        index = np.flatnonzero(active)
+        columns = np.stack([np.ones(index.size), gap[index]], axis=1)
+        rows = np.linalg.solve(compliance[np.ix_(index, index)], columns)
+        approach = (load + rows[:, 1].sum()) / rows[:, 0].sum()
+        force = np.zeros(gap.size)
+        force[index] = approach * rows[:, 0] - rows[:, 1]
+        remaining = compliance @ force + gap - approach
+        leaves = active & (force < 0)
+        enters = ~active & (remaining < -1e-13 * np.abs(compliance @ force).max())
+        if not leaves.any() and not enters.any():
+            return force, approach, active
+        active = active & ~leaves if leaves.any() else active | enters
+    raise RuntimeError("no contact found")
+
+
+def wear(model: Model, scene: WearScene, steps: int) -> dict:
+    """Integrate the depth over the path in `steps` steps that grow geometrically; return the measures after wear."""
+    load = scene.patch.load / scene.patch.width
+    edges = (
+        np.expm1(np.linspace(0, 1, steps + 1) * np.log1p(1 / FIRST_STEP)) * FIRST_STEP * scene.path
+    )
+    active = model.gap <= np.quantile(model.gap, 0.3)
+    depth = np.zeros(model.gap.size)
+    for begin, end in pairwise(edges):
+        rate = scene.coefficient * (end - begin) / model.weight
+        force, approach, active = press(model, model.gap + depth, rate, load, active)
+        depth = depth + rate * force
+    pressure = force / model.weight
+    index = np.flatnonzero(active)
+    patch, place = scene.patch, model.place
+    ends = [
+        reference.edge_of(place, pressure, int(index[0]), -1, patch),
+        reference.edge_of(place, pressure, int(index[-1]), 1, patch),
+    ]
+    inverse = np.linalg.inv(model.normal[np.ix_(index, index)])
+    values = {
+        "worn_depth_max": float(depth.max()),
+        "contact_half_width": (ends[1] - ends[0]) / 2,
+        "pressure_peak": reference.peak(place, pressure),
+        "approach": approach,
+        "normal_stiffness": inverse.sum() * patch.width,
+        "rotational_stiffness": place[index] @ inverse @ place[index] * patch.width,
+    }
+    if index.size == index[-1] - index[0] + 1:  # in contact all along: no gap inside
+        values["contact_fraction"] = (ends[1] - ends[0]) / patch.length
+    if model.tangential.size:
+        soft = model.tangential[np.ix_(index, index)]
+        values["tangential_stiffness"] = (
+            np.linalg.solve(soft, np.ones(index.size)).sum() * patch.width
+        )
+    return values
+
+
+def contact_span(model: Model, scene: WearScene) -> tuple:
+    """Find the smallest and largest place in contact before and after wear."""
+    load = scene.patch.load / scene.patch.width
+    active = model.gap <= np.quantile(model.gap, 0.3)
+    rate = scene.coefficient * scene.path / model.weight
+    new = press(model, model.gap, np.zeros(rate.size), load, active)[2]
+    worn = press(model, model.gap, rate, load, active)[2]
+    places = model.place[new | worn]
+    return float(places.min()), float(places.max())
+
+
+def answer(scene: WearScene) -> dict:
+    """Compute the measures after wear: name -> (value, uncertainty)."""
+    patch, half = scene.patch, scene.patch.length / 2
+    span = (-half, half)
+    for _ in range(3):
+        low, high = contact_span(discretize(patch, span, CELLS[0]), scene)
+        margin = 0.05 * (high - low) + 1e-6 * patch.length
+        span = (max(low - margin, -half), min(high + margin, half))
+    found = []
+    for cells in CELLS:
+        model = discretize(patch, span, cells)
+        coarse, middle, fine = (wear(model, scene, steps) for steps in STEPS)
+        shared = coarse.keys() & middle.keys() & fine.keys()
+        found.append(
+            {
+                name: (
+                    2 * fine[name] - middle[name],
+                    abs(2 * fine[name] - 3 * middle[name] + coarse[name]),
+                )
+                for name in shared
+            }
+        )
+    truth = {
+        name: (value, own + abs(value - found[0][name][0]))
+        for name, (value, own) in found[1].items()
+        if name in found[0]
+    }
+    truth["worn_volume"] = (worn_volume(scene.coefficient, patch.load, scene.path), 0.0)
+    return truth
+
+
+def run_package(scene: WearScene) -> dict:
+    """Run a scene with the importable version of patchfem: measures, warnings and CPU seconds."""
+    import patchfem as pf
+
+    begin = time.process_time()
+    try:
+        run = pf.run(text_of(scene))
+    except pf.PatchfemError as error:
+        return {
+            "seconds": time.process_time() - begin,
+            "warnings": [f"refused: {error}"],
+            "measures": {},
+        }
+    measures = {
+        name: (float(m.value), float(m.error))
+        for name, m in run.measures.items()
+        if name in MEASURES and m.value is not None and m.error is not None
+    }
+    return {
+        "seconds": time.process_time() - begin,
+        "warnings": list(run.warnings),
+        "measures": measures,
+    }
+
+
+def compute(first: int, count: int, path: str) -> None:
+    """Compute the references and run the scenes."""
+    with open(path, "a", encoding="utf-8") as file:
+        for seed in range(first, first + count):
+            scene = draw(seed)
+            begin = time.process_time()
+            truth = answer(scene)
+            row = {
+                "seed": seed,
+                "kind": static_scenes.KINDS[seed % len(static_scenes.KINDS)],
+                "truth": truth,
+                "reference_seconds": time.process_time() - begin,
+                "run": run_package(scene),
+            }
+            print(json.dumps(row), file=file, flush=True)
+
+
+def run_again(path: str, other: str) -> None:
+    """Run the scenes of the file `path` with the importable version of patchfem and write the file `other`."""
+    with open(path, encoding="utf-8") as rows, open(other, "w", encoding="utf-8") as file:
+        for row in map(json.loads, rows):
+            print(json.dumps(row | {"run": run_package(draw(row["seed"]))}), file=file, flush=True)
+
+
+def read(path: str) -> None:
+    """Print how many stated errors hold, by measure, and those that do not."""
+    rows = []
+    for line in map(json.loads, open(path, encoding="utf-8")):
+        rows += [
+            (line["seed"], line["kind"], name, *line["run"]["measures"][name], *truth)
+            for name, truth in line["truth"].items()
+            if name in line["run"]["measures"]
+        ]
+    for name in (*MEASURES, "all"):
+        chosen = [row for row in rows if name in (row[2], "all")]
+        known = [
+            row
+            for row in chosen
+            if 3 * row[6] <= row[4] or abs(row[3] - row[5]) > row[4] + 3 * row[6]
+        ]
+        missed = [row for row in known if static_scenes.missed(*row[3:])]
+        print(
+            f"{name:22} {len(chosen):4} errors, {len(known):4} judged, {len(missed):3} do not hold"
+        )
+    for row in rows:
+        if static_scenes.missed(*row[3:]):
+            print("  does not hold: seed {} {} {} {:.9g} +- {:.3g}, {:.9g} +- {:.2g}".format(*row))
+
+
+if __name__ == "__main__":
+    if sys.argv[1] == "read":
+        read(sys.argv[2])
+    elif sys.argv[1] == "again":
+        run_again(*sys.argv[2:])
+    else:
+        compute(int(sys.argv[2]), int(sys.argv[3]), sys.argv[4])
