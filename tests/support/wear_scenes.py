@@ -1,6 +1,6 @@
 """Random benches with wear, and an independent integration of Archard's law with which their errors are compared.
 
-`python tests/support/wear_scenes.py run FIRST COUNT FILE` computes the scenes of COUNT seeds and writes a line for each;
+`python tests/support/wear_scenes.py run FIRST COUNT FILE` computes the scenes of COUNT seeds, a line for each;
 `again FILE OTHER` runs the scenes of FILE with the importable version of patchfem, takes the reference from FILE and
 writes OTHER; `read FILE` prints how many stated errors hold.
 
