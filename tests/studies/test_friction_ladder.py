@@ -8,7 +8,6 @@ from scipy.optimize import brentq
 from study_module import study
 
 from patchfem.friction.bonds.recursion import Recursion
-from patchfem.friction.laws.stretch import growth_numbers
 
 
 @pytest.fixture(scope="module")
@@ -144,22 +143,6 @@ def test_always_the_table_of_the_ladder(table, capsys):
 
 
 @pytest.mark.slow
-def test_always_costs_and_the_picture(ladder, tmp_path):
-    times = study("friction_ladder/costs.py").main()["compiled"]
-    base = times["constant length (Dahl)"]
-    assert 1.3 < times["stretch"] / base < 4 and times["elastic-plastic"] < base
-    assert times["report, growing"] > 100 * base and times["Iwan 100"] > times["Iwan 5"]
-    text = study("friction_ladder/picture.py").main(tmp_path / "x.svg", (0.3, 3.0), times).read_text()
-    for word in ("amplitude [bond lengths]", "cost of a step [ns]", "LuGre", "Iwan 20, reversals"):
-        assert word in text
-
-
-@pytest.mark.slow
-def test_exact_the_bare_loops_are_the_laws(ladder):
-    loops = study("friction_ladder/costs.py").loops
-    path = ladder.LENGTH * ladder.harmonic(3.0)
-    dt = 1 / (ladder.HERTZ * ladder.STEPS)
-    for law in (ladder.bonds(), ladder.bonds(**ladder.GROWTH), ladder.bonds(breakaway=0.3)):
-        force, numbers = np.zeros(path.size - 1), growth_numbers(law)
-        loops.loose(path, numbers, force) if law.breakaway else loops.bond(path, dt, numbers, force)
-        assert force[-ladder.STEPS:] == pytest.approx(ladder.followed(ladder.points(law), 3.0).force, abs=1e-13)
+def test_always_the_picture_names_its_curves(tmp_path):
+    text = study("friction_ladder/picture.py").main(tmp_path / "x.svg", (0.3, 3.0)).read_text()
+    assert all(word in text for word in ("amplitude [bond lengths]", "LuGre", "Iwan 20, reversals"))

@@ -196,12 +196,3 @@ def test_exact_the_patch_by_two_programs(engines, problem):
     assert one.error(engines.march(one, 3200)) < 1e-4
     slide, events = engines.counted(one, 1e-8, 1 / 8)
     assert events < 202 and one.error(slide) > 1e-2
-
-
-@pytest.mark.slow
-def test_exact_random_rigs_from_yield_to_yield(capsys):
-    """Two of the thirty: DOP853 at 1e-12 agrees, and the steps of the march come as near as they say."""
-    rows = study("integrators/thirty_rigs.py").main((6, 27))
-    assert [row["elements"] for row in rows] == [1, 5] and all(row["apart"] < 1e-8 for row in rows)
-    assert all(np.isfinite(row["march"]).all() for row in rows)
-    assert "median" in capsys.readouterr().out

@@ -42,17 +42,3 @@ def test_exact_errors_stay_below_their_bounds(tmp_path):
 @pytest.mark.slow
 def test_exact_errors_stay_below_their_bounds_at_every_amplitude():
     check(study("error_cost").main())
-
-
-@pytest.mark.slow
-def test_always_the_engines_are_far_faster_than_numpy():
-    """Over one cycle of 500 steps, where NumPy has a quarter of the bonds of the study to sum."""
-    rows = study("speed").main(1, 500)
-    assert all(row.ratio > 20 for row in rows)
-
-
-@pytest.mark.slow
-def test_always_merging_costs_about_the_target():
-    """A merged step, its mean and its energy, of p = 2 (stretch): within a few microseconds on a shared machine."""
-    rows = {row.name: row.step for row in study("speed").main()}
-    assert rows["merged .05, stretch p = 2"] < 5000

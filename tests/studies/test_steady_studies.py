@@ -51,28 +51,6 @@ def test_exact_forty_frequencies_of_five_contacts(march, tmp_path, capsys):
 
 # ---- multipliers
 
-@pytest.fixture(scope="module")
-def pushed():
-    return study("steady/multipliers.py")
-
-
-def test_exact_multipliers_of_a_linear_map():
-    """Four modes of known decay and turn, found from pushed motions of the map itself."""
-    a = np.diag([0.9, -0.5, 0.3, 0.2]) + np.diag([0.4, 0.1, 0.2], 1)
-
-    def states(push):
-        return np.array([(np.linalg.matrix_power(a, k) @ push.ravel()).reshape(2, 2) for k in range(1, 8)]) + 3.0
-
-    assert study("steady/pushes.py").fitted(states, 2, 1e-3, 1.0).real == pytest.approx([0.9, -0.5, 0.3, 0.2], abs=1e-9)
-
-
-def test_exact_pushed_runs_forget_as_the_multipliers_say(pushed, capsys):
-    rows = pushed.main(("Coulomb, 8 g",))
-    assert np.sort(rows[0].march.real) == pytest.approx([0.94940, 0.98133], abs=2e-5) and rows[0].miss < 1e-9
-    patch, = pushed.main(("patch of 41 elements, 5 g",), steps=400, settle=40)
-    assert patch.miss < 2e-3 and np.abs(patch.steady[0]) == pytest.approx(0.98065, abs=2e-4)
-    assert "pushed march" in capsys.readouterr().out
-
 
 @pytest.mark.slow
 def test_exact_every_case_of_the_multipliers(pushed):
@@ -141,8 +119,3 @@ def test_exact_one_harmonic_is_the_loop_of_the_bench(backbone, tmp_path):
     assert abs(sharp.many[0][1] / sharp.bench[0][1] - 1) < 0.02 < abs(sharp.many[0][2] / sharp.bench[0][2] - 1)
     text = study("steady/steady_pictures.py").backbone(rows, tmp_path / "x.svg").read_text()
     assert "damping ratio" in text and "bonds" in text
-
-
-@pytest.mark.slow
-def test_three_ways_to_a_backbone_keep_their_bars():
-    assert all(inside == total > 0 for inside, total in study("steady/three_ways.py").main(2, 41).values())

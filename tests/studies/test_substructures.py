@@ -1,29 +1,15 @@
 """Structures of a finite-element program: the other side of the study is right, and reduced ones stay near it."""
 
-import os
-import sys
 
 import numpy as np
 import pytest
 from scipy.sparse.linalg import splu
 from study_module import study
 
-from patchfem.core import Missing
-
 
 @pytest.fixture(scope="module")
 def large():
     return study("substructures/large.py")
-
-
-@pytest.fixture(scope="module")
-def readers():
-    return study("substructures/readers.py")
-
-
-@pytest.fixture(scope="module")
-def formats():
-    return study("substructures/formats.py")
 
 
 def test_exact_receptances_of_all_unknowns(large):
@@ -57,67 +43,6 @@ def test_always_the_bars_of_a_coarse_joint_hold_all_of_it(large, monkeypatch):
     monkeypatch.setattr(large, "TOP", 21)
     monkeypatch.setattr(large, "SAMPLES", 1024)
     assert held(large.compare("lap joint", 11, True, 1, ("free-interface",)))
-
-
-LOSSY = ("Abaqus, 16 digits", "DMIG, fields of 16", "OUTPUT4 binary, single precision", "DMIG, fields of 8")
-
-
-def test_exact_each_format_brings_a_beam_whole_or_says_what_it_lacks(formats):
-    """Formats in double precision give the same bits; 16 digits of Abaqus change no entry by more than round-off; where
-    frequencies move by more than 1e-5 the run says by how much they may, or finds no stiffness."""
-    for row in formats.main(10, 1):
-        if row.name not in LOSSY:
-            assert row.off == 0.0, row
-        elif "16 digits" in row.name:
-            assert row.off < 5e-16 and row.first < 1e-9, row
-        else:
-            assert 1e-12 < row.off < 1e-2 and (row.first < 1e-5 or "uncertain by" in row.says or np.isinf(row.first)), \
-                row
-            assert "e+" not in row.says, row  # a percentage is read without a power of ten
-
-
-def test_exact_pynastran_writes_what_is_read_here_and_reads_what_the_study_writes(formats, tmp_path):
-    try:
-        peer = formats.Peer("pyNastran", "substructures/pynastran_child.py", "PATCHFEM_NASTRAN_PYTHON",
-                            sys.executable, "")
-    except Missing as absent:
-        pytest.skip(str(absent))
-    whole = formats.beam(6, 1).stiffness
-    np.save(tmp_path / "k.npy", whole.toarray())
-    for name, text in (("binary.op4", False), ("text.op4", True)):
-        formats.output4(tmp_path / name, {"K": whole}, text)
-    with peer:
-        found = peer.ask(matrix=str(tmp_path / "k.npy"), folder=str(tmp_path), read=["binary.op4", "text.op4"])
-    assert found["off"] == {"binary.op4": 0.0, "text.op4": 0.0}
-    for name in found["written"]:
-        read = formats.matrices.read(tmp_path / name, "stiffness").values
-        digits = 1e-9 if name.endswith(".pch") else 0.0
-        assert abs(read - whole).max() <= digits * abs(whole).max(), name
-
-
-ELEMENTS = {"mass on Iwan's law": 1e-5}  # of the value, what 48 elements in place of the law make
-
-
-@pytest.mark.parametrize("name", ["three blades", "mass on Iwan's law", "beam under tanh"])
-def test_exact_other_programs_read_the_export_and_find_the_same_motion(readers, name):
-    if not {readers.NLVIB, "PATCHFEM_TMDSIMPY_PYTHON"} & set(os.environ):
-        pytest.skip(f"{readers.NLVIB} and PATCHFEM_TMDSIMPY_PYTHON name no peer")
-    try:
-        mine, *others = readers.compare(name)
-    except Missing as absent:
-        pytest.skip(str(absent))
-    for one in others:
-        assert abs(one.value - mine.value) <= mine.error + one.error + ELEMENTS.get(name, 1e-8) * mine.value, one
-
-
-def test_refuses_peers_that_are_not_there_by_name(readers, monkeypatch, tmp_path):
-    monkeypatch.setenv(readers.NLVIB, "/nowhere")
-    with pytest.raises(Missing, match=readers.NLVIB):
-        readers.by_nlvib(tmp_path, 5, 64)
-    monkeypatch.delenv("PATCHFEM_DATA", raising=False)
-    monkeypatch.chdir(tmp_path)
-    with pytest.raises(Missing, match="PATCHFEM_DATA"):
-        readers.beam(tmp_path)
 
 
 @pytest.mark.slow

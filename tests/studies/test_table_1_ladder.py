@@ -278,12 +278,3 @@ def test_table_1_the_grooves_run_away_first_where_the_rig_did_last(records):
     levels, fit = study("table_1/levels.py"), ("grooves, lift and yaw", "fundamental x gain")
     question, values = levels.RUNGS[fit[0]].question(fit[1]), records[*fit, "143", ""]["values"]
     assert [levels.runaway(question, values, f) for f in (135.0, 143.0, 150.0, 155.0)] == [8.75, 8.75, 8.5, 8.25]
-
-
-@pytest.mark.slow
-def test_table_1_an_assumed_tilt_hardly_moves_the_headline():
-    sensitivity = study("table_1/sensitivity.py")
-    rows = sensitivity.one_at_a_time(sensitivity.headline(), {"contact.tilt.angle": ("0.01 mrad", "0.3 mrad")})
-    assert [row["held_out"]["all"] for row in rows] == pytest.approx([0.185, 0.183, 0.181], abs=0.003)
-    shares = sensitivity.indices(sensitivity.headline(), 4)
-    assert (shares["spread"] < 0.01).all()
