@@ -1,8 +1,6 @@
 """Backbones of scenes: three ways beside each other and beside closed forms."""
 
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scene_texts import IWAN, JOINT_SHAKEN, shaken
@@ -12,9 +10,6 @@ import patchfem as pf
 from patchfem.campaigns.backbone.bench_loops import run_loop, settle_loop
 from patchfem.campaigns.backbone.curves import backbone
 from patchfem.campaigns.backbone.joint import build_joint
-from patchfem.campaigns.backbone.notes import note_differences
-from patchfem.campaigns.backbone.records import Curve
-from patchfem.runs.rig.engines import ENGINES
 
 PLASTIC = 'law = "elastic-plastic"\nbond_length = "1 mm"'
 OMEGA = 200 * np.pi
@@ -29,16 +24,6 @@ def segalman(u):
     r, scale = u / 2.7e-3, 30 / (0.5 + 1 / 3)
     force = scale * (1.5 * r - r**1.5 / 1.5)
     return force, 8 * scale * 2.7e-3 * (0.75 * r**2 - r**2.5 / 3.75) - 4 * u * force
-
-
-def test_exact_methods_that_differ_by_more_than_their_value_differ_by_a_factor():
-    """"by 9.6e+03 %" stood there for a damping ratio that was 97 times as large."""
-    a, f, z, none = np.array([1e-6, 1e-5]), np.array([100.0, 90.0]), np.array([1e-3, 2e-3]), np.zeros(2)
-    balance = Curve(a, f, none, z, none, none)
-    decay = balance._replace(frequency=f * [1, 1.5], damping=z * [97, 1])
-    frequency, damping = note_differences({"balance": balance, "decay": decay})
-    assert "frequency by decay and by balance differ most at the amplitude 10 um, by 50 %: a decay" in frequency
-    assert "differ most at the amplitude 1 um, where the value by decay is 97 times the value by" in damping
 
 
 def test_exact_the_static_curve_of_an_iwan_joint_is_segalmans():
@@ -192,21 +177,6 @@ def test_a_decay_behind_a_stiff_contact_lasts_some_swings_in_slip():
     assert found.amplitude.tolist() == [2e-2, 3e-2] and (found.frequency_error < 1e-3 * found.frequency).all()
     lost = 4 * 0.3 * 2e3 * 3e-2 / (2 * np.pi * 0.5 * OMEGA**2 * 3e-2**2)  # of Coulomb friction in gross slip
     assert found.damping[-1] == pytest.approx(0.002 + lost, rel=0.02)
-
-
-def test_a_long_decay_is_told_before_it_begins(monkeypatch):
-    """50 cycles that take a second tell 40 s of the further ones; nothing is told of a short one."""
-    told, run = [], ENGINES["piecewise"].run
-    backbone(model(PLASTIC, **{"structure.mode.axial.damping": 1e-3}), "", [1e-5, 1e-3], ("decay",), told.append)
-    assert told == ["decay"]
-    monkeypatch.setattr(type(ENGINES["piecewise"]), "run", property(lambda engine: lambda *given: (
-        replace(run(*given), seconds=given[0].rig.cycles / 50))))
-    told.clear()
-    backbone(model(PLASTIC, **{"structure.mode.axial.damping": 1e-3}), "", [1e-5, 1e-3], ("decay",), told.append)
-    assert told[0] == "decay" and len(told) > 1
-    for said in told[1:]:
-        cycles = int(said.split()[2])
-        assert cycles >= 500 and said == f"decay over {cycles} cycles: about {cycles / 25:.2g} s of computing time"
 
 
 def test_amplitudes_stay_within_the_stop():
@@ -436,12 +406,6 @@ def test_a_static_curve_ends_where_its_force_falls():
     found = backbone(pf.build(scene), "", np.array([5e-6, 1e-5, 1.5e-5, 5e-5]), ("quasi-static",))
     assert found.curves["quasi-static"].amplitude.size == 3 and "curve does not reach these" in found.notes[0]
     assert found.frequencies.free == pytest.approx(np.sqrt(OMEGA**2 + 9.2e6) / (2 * np.pi))
-
-
-def test_a_linear_mode_that_does_not_swing_has_no_curve():
-    scene = shaken(PLASTIC)[shaken(PLASTIC).index("[structure]"):].replace("0.002", "1.5")
-    found = backbone(pf.build(scene))
-    assert not found.curves and "ratio is 1 or more" in found.missing["decay"]
 
 
 def test_python_gives_a_dataset():

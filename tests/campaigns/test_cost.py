@@ -4,15 +4,13 @@ import csv
 import json
 import re
 from dataclasses import replace
-from types import SimpleNamespace
 
-import numpy as np
 import pytest
 from command_line import cli
 from scene_texts import BENCH, PIECE
 
 import patchfem as pf
-from patchfem.campaigns import cost, knobs
+from patchfem.campaigns import knobs
 from patchfem.campaigns.cost import TOLERANCE, Cost, cheapest, curve, quickest, sentence
 from patchfem.export.cost import lines_of
 from patchfem.model.model import build
@@ -141,27 +139,6 @@ def test_exact_a_bench_with_few_steps_meets_tight_tolerances_with_the_steps_that
         settings = [(row["knob"], row["setting"]) for row in csv.DictReader(file)]
     assert ("tolerance", f"0.0001, {cured[-1]} steps per cycle") in settings
     assert "<svg" in (tmp_path / "out" / "cost.svg").read_text("utf-8")
-
-
-def turning(monkeypatch, answers: dict, work=lambda: None) -> list:
-    """The curve of settings {label: error}, each of which does `work`."""
-    from patchfem.core import Measure
-
-    wanted = [knobs.Setting(f"tolerance {one}", 1.0, f"by tolerance {one}", SimpleNamespace(
-        accuracy=SimpleNamespace(tolerance=1.0))) for one in answers]
-    monkeypatch.setattr(cost, "knobs_of", lambda model: ["element_size"])
-    monkeypatch.setattr(cost, "settings", lambda model, knob: wanted)
-    monkeypatch.setattr(cost, "_tried", lambda setting, *_: work() or ({
-        "a": Measure(1.0, "1", answers[setting.label.removeprefix("tolerance ")], 0.0)}, (), None))
-    return cost.curve(SimpleNamespace(source=None), "element_size")
-
-
-def test_exact_settings_that_gave_the_same_run_bit_for_bit_are_one(monkeypatch):
-    runs = turning(monkeypatch, {"0.1": 1e-2, "0.01": 1e-2, "0.001": 1e-3, "1e-4": 1e-4, "1e-5": 1e-4})
-    assert [(one.label, one.timings) for one in runs] == [
-        ("tolerance 0.1, 0.01", 4), ("tolerance 0.001", 3), ("tolerance 1e-4, 1e-5", 4)]
-    apart = turning(monkeypatch, {"0.1": 1e-2, "0.01": np.nextafter(1e-2, 1), "0.001": 1e-3})
-    assert [one.timings for one in apart] == [3, 3, 3]
 
 
 @pytest.mark.parametrize("words, said", [

@@ -88,51 +88,6 @@ def test_too_few_amplitudes_say_how_many_are_needed(tmp_path):
         curves.fit_curve(pf.load(IWAN), path, [f"{key}={low}..{high}" for key, (low, high) in free.items()])
 
 
-CHAIN = """\
-[structure]
-output_mass = 2
-[structure.reduced]
-stiffness = "both.npz"
-mass = "both.npz"
-damping = "both.npz"
-boundary = [20, 12]
-modes = {modes}
-[[structure.interface]]
-between = [1, 0]
-law = "elastic-plastic"
-static = 0.4
-load = "50 N"
-bond_length = "100 um"
-[drive]
-kind = "base"
-frequency = "100 Hz"
-acceleration = "5 g"
-cycles = 10
-"""
-
-
-@pytest.mark.slow
-def test_the_intervals_contain_the_error_of_modes_left_out(tmp_path):
-    """A curve of all modes of a chain fitted by a reduction to one: an interval without that error misses the truth."""
-    k, m, n = 1e7, 0.02, 20
-    K = k * (2 * np.eye(n) - np.eye(n, k=1) - np.eye(n, k=-1))
-    K[-1, -1] = k
-    np.savez(tmp_path / "both.npz", K=K, M=m * np.eye(n), C=1e-6 * K)
-    for name, modes in (("whole", 18), ("few", 1)):
-        (tmp_path / f"{name}.toml").write_text(CHAIN.format(modes=modes))
-    path = written(tmp_path / "decay.csv", tmp_path / "whole.toml", amplitudes=np.geomspace(2e-5, 3e-4, 6))
-    key = "structure.interface[1].bond_length"
-    found = pf.fit(tmp_path / "few.toml", to=path, free={key: ("50 um", "200 um")}, out=tmp_path / "out")
-    low, high = found["values"][key]["interval"]
-    assert low < 100e-6 < high
-    note = next(one for one in found["notes"] if "the error of the modes left out" in one)
-    share = float(note.rsplit(f"{key} by ", 1)[1].removesuffix(" %")) / 100
-    value = found["values"][key]["value"]
-    assert not low + share * value * 1.01 < 100e-6 < high - share * value * 1.01
-    assert key in note and not any("modes left out" in one for one in pf.fit(
-        tmp_path / "whole.toml", to=path, free={key: ("50 um", "200 um")}, out=tmp_path / "all")["notes"])
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(8000, 8030))
 def test_the_chi_square_found_is_the_least_one_beside_the_truth(seed):

@@ -18,7 +18,6 @@ from patchfem.closed_forms.contact import hertz_half_width, hertz_peak
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import Compliance, Interface
 from patchfem.elasticity.elasticity import assemble, interface_compliance
-from patchfem.export import netcdf, report
 from patchfem.model.model import build
 from patchfem.runs.patch.result import solve_all
 from patchfem.runs.wear import evolve
@@ -193,16 +192,6 @@ def test_exact_shakedown_of_a_crown_under_a_tangential_force():
     assert state.path @ state.force < 1e-9 * at_first
     found = (state.force / area)[np.argmin(np.abs(x))] / peak
     assert found == pytest.approx(stick / half + 0.6 * line / (np.pi * stick * peak), abs=2e-3)
-
-
-def test_exact_the_file_and_the_page_mark_peaks_at_the_edge():
-    found = {"cycle": np.array([0.0, 5e4, 1e5]), "pressure_peak": np.array([9e7, 4e7, 3e7]),
-             "pressure_peak_at_edge": np.array([0.0, 4.87e6, 0.0])}
-    held = netcdf.with_wear(netcdf.Contents(), found, {"pressure_peak": "Pa"}).variables
-    assert held["wear_pressure_peak_at_edge"][1][1] == 4.87e6 and "wear_pressure_peak" in held
-    assert "After 50000 cycles the peak pressure is that of a node at the edge" in report._edge_peaks(found)
-    assert "stands up to 4.9 MPa above" in report._edge_peaks(found)
-    assert report._edge_peaks(found | {"pressure_peak_at_edge": np.zeros(3)}) == ""
 
 
 def test_exact_the_tolerance_of_a_warning_leads_to_a_finer_mesh_under_wear():

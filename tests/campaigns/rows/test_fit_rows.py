@@ -16,7 +16,6 @@ from patchfem.campaigns.rows.search import residual_of
 from patchfem.core import G_N, PatchfemError
 from patchfem.export.fits.rows import Starts, describe_answer
 from patchfem.model.model import build
-from patchfem.response.spectrum import reading
 from patchfem.runs.many.watched import Watcher
 from patchfem.runs.run import run
 from patchfem.scene.ranges import ranges
@@ -195,17 +194,6 @@ def test_exact_a_marched_motion_is_watched_as_it_runs():
     assert seen.displacement == measures["relative_displacement_amplitude"].value
 
 
-@pytest.mark.parametrize("sets", [[], ["structure.mode.axial.accelerometer=0.7"]])
-def test_exact_what_a_window_shows_is_seen_without_one(sets):
-    model = build(loads(RUBS, sets=["accuracy.method=harmonic", *sets]))
-    drive = model.rig.drive
-    whole, part = (Watcher(model, None, None, windowed)(drive) for windowed in (True, False))
-    assert part.window is None and part[1:3] == pytest.approx(whole[1:3], rel=1e-13)
-    assert abs(part.fundamental) == pytest.approx(reading(whole.window, drive, 0.0, "fundamental"), rel=1e-8)
-    assert part.acceleration == pytest.approx(np.abs(whole.window.acceleration).max(), rel=1e-3)  # of 400 samples
-    assert part.displacement == pytest.approx(np.ptp(whole.window.slide) / 2, rel=1e-4)  # the gauge moves as the slide
-
-
 def test_rows_flagged_u_are_lower_bounds(tmp_path):
     """A computed response above a bound counts nothing, below it as any other; a row left out counts nothing."""
     path = table(tmp_path, [(*row[:4], "U" if row[0] == 143 else "") for row in linear_rows()])
@@ -342,16 +330,3 @@ def test_exact_the_reading_and_the_gain_of_the_scene_are_those_of_the_instrument
     one, two = (fitted(scene, path, free(*LINEAR_FREE), starts=1, seed=seed) for seed in (0, 1))
     assert one.keys.fit.values == pytest.approx([141.0, 0.03], rel=1e-4)
     assert not np.array_equal(one.found.starts, two.found.starts)
-
-
-def test_exact_a_free_load_presses_the_patch_anew(tmp_path):
-    """The pressure of the patch carries the load of each model, 100 N and then 150 N."""
-    text = RUBS.replace("[normal]\nload", '[contact]\nlength = "10 mm"\nwidth = "10 mm"\nheight = "5 mm"\n'
-                        'element_size = "2.5 mm"\nsubstrate = "Ti-8Al-1Mo-1V"\nload', 1)
-    text = text.replace("elastic-plastic", "coulomb").replace('bond_length = "0.5 um"\n', "")
-    path = table(tmp_path, [(143.0, 8 * G_N, 9 * G_N, 2e-5, "")])
-    computed = Computed(Asked(scene_of(tmp_path, text), cells_of(path).conditions, free("contact.load=50 N..200 N"),
-                              path))
-    for load_of in (100.0, 150.0):
-        patch = computed._pressed(computed.asked.model([load_of]))
-        assert patch.pressure.load == pytest.approx(load_of, rel=1e-3)

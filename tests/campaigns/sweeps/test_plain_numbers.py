@@ -79,7 +79,7 @@ def cases_of(seed: int, count: int):
 @pytest.mark.parametrize("name", SCENES)
 def test_exact_models_made_from_the_first_are_those_built_from_text(name):
     asked, alike = Asked(Path("a.toml"), SCENES[name], ("normal.load=20 N",)), 0
-    for sets, values in cases_of(len(name), 60):
+    for sets, values in cases_of(len(name), 150):
         found, built = told(asked, sets, values), told(asked, sets, ())
         assert same(found, built), sets
         alike += asked._like(sets, values) is not None if not isinstance(built, str) else 0

@@ -9,7 +9,6 @@ from scene_texts import COATED, MODE, SECOND, SHEAR
 import patchfem as pf
 from patchfem.runs.many import gathered, many, one_by_one
 from patchfem.runs.many.meshes import meshed
-from patchfem.runs.rig.numerics import choose
 
 BONDS = '[friction]\nlaw = "nonlocal"\nreading = "stretch"\nstatic = 0.3\nkinetic = 0.3\nbond_length = "1 um"\n'
 DRIVE = '[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\ncycles = 20\n'
@@ -70,18 +69,6 @@ def test_a_table_of_measured_responses_keeps_no_batch_away_unless_it_cannot_be_r
     assert "table of measured responses cannot be read" in gathered.no_lanes(lost)
     found = many.answers([lost], study=32)
     assert "none.csv" in found.messages[0]
-
-
-def test_always_steps_that_are_not_pinned_are_doubled_in_lanes(monkeypatch):
-    """Where the displacement asks for more steps than a case begins with."""
-    free = SCENE.replace("steps_per_cycle = 200\n", "").replace("tolerance = 1e-2", "tolerance = 2e-3")
-    cases = meshed([pf.build(free, **{"drive.acceleration": 9.81 * level}) for level in (2.0, 3.5)])
-    monkeypatch.setattr(gathered, "choose", lambda model: replace(choose(model), steps=240))
-    found, real = gathered.solve(cases), one_by_one.solve(cases)
-    name, steps = "relative_displacement_amplitude", [found.numerics[k]["steps_per_cycle"] for k in range(2)]
-    assert max(steps) > 240 and {*steps} <= {240, 480, 960}
-    assert (found.errors[name] <= 2e-3 * found.values[name] + found.floors[name]).all()
-    assert beside(found, real)[2] == 0
 
 
 def test_always_what_lanes_do_not_take_runs_by_itself():

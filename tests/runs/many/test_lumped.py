@@ -6,10 +6,9 @@ from batch_beside import held_against
 from scene_texts import MODE
 
 from patchfem.api import base_of, build, load
-from patchfem.model.alike import Alike
 from patchfem.runs.many import one_by_one
 from patchfem.runs.many.answers import Answers
-from patchfem.runs.many.lumped import columns, lumped
+from patchfem.runs.many.lumped import lumped
 from patchfem.scene.sets import assignments
 
 DRIVE = '[drive]\nkind = "{kind}"\n{kind_size}\nfrequency = "140 Hz"\ncycles = 40\n'
@@ -60,20 +59,6 @@ def test_exact_batch_is_the_single_runs(law, count):
     held_against(cases, one_by_one.solve(cases), batch(cases))
 
 
-def test_exact_cases_shared_by_threads_are_the_same_to_the_last_bit(monkeypatch):
-    from patchfem.runs.many.lumped import threads
-
-    cases = [one for one in models("coulomb", 3, 100) if one.rig.cycles == 20]
-    alone = lumped.solve(cases)
-    monkeypatch.setattr(threads, "LEAST", 8)
-    monkeypatch.setattr(threads, "cores", lambda: 3)
-    shared = lumped.solve(cases)
-    for name, values in alone.values.items():
-        np.testing.assert_array_equal(shared.values[name], values)
-        np.testing.assert_array_equal(shared.errors[name], alone.errors[name])
-    assert list(shared.outcome) == list(alone.outcome) and shared.reasons == alone.reasons
-
-
 def test_always_few_cells_are_told_from_many():
     """Cells of a density that a tolerance asks for: the answers of all 769 lie within the bars, where small cycles
     slip too, for which the first cells are too few."""
@@ -85,15 +70,3 @@ def test_always_few_cells_are_told_from_many():
             if np.isfinite(value[0]) and name not in ("energy_balance", "work_check"):
                 assert abs(value[0] - best.values[name][0]) <= found.errors[name][0] + found.floors[name][0], name
                 assert found.errors[name][0] <= 1e-3 * abs(value[0]) + found.floors[name][0], name
-
-
-def test_always_bonds_without_a_drift_are_not_warned_of_it():
-    """Where no case of a batch has a drift, there is no column of it."""
-    law = 'law = "nonlocal"\nstatic = 0.3\nbond_length = "1 um"'
-    model = build(load(SCENE.format(law=law, kind="base", kind_size=SIZES["base"])))
-    found = Answers.blank(3)
-    alike = Alike(None, model, np.zeros((3, 0)), None, np.arange(3))
-    assert not columns._by_law(alike, found).any()
-    found.measure("drift_per_cycle", "m")
-    found.values["drift_per_cycle"][1] = 1e-6
-    assert columns._by_law(alike, found).tolist() == [False, True, False]
