@@ -78,6 +78,10 @@ TERMS = {
     "shear modes": "Shapes in which the pieces deform in shear; the shear deformation is a sum of these shapes. The "
                    "number of shear modes follows from the tolerance.",
     "skin": "The compliant rough layer of `[contact.asperities]`.",
+    "slide": "The displacement of the upper surface minus the displacement of the lower surface. `[slide]` prescribes "
+             "it in a bench.",
+    "slip": "The irreversible part of the slide. While an interface with elastic bonds sticks, its slide changes and "
+            "its slip does not.",
     "stick": "The state without slip, of a whole contact or of a part of a contact.",
     "stick-slip": "A motion in which an interface sticks and slips in turns. See "
                   "[questions](../questions.md#stick-slip).",
