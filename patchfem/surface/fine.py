@@ -1,4 +1,4 @@
-"""Part of a trace that is too fine for the elements: the fraction of its height in short waves."""
+"""Fraction of the height of a trace in waves that are too short for the elements."""
 
 from typing import NamedTuple
 
@@ -7,8 +7,8 @@ import numpy as np
 from ..core import PatchfemError, say
 from .profile import Profile, even, level
 
-ELEMENTS_PER_WAVE = 2  # elements below which the nodes cannot represent a wave
-MAX_LOST = 0.1  # fraction of the rms height in such waves that a patch may lose without a word
+ELEMENTS_PER_WAVE = 2  # elements; nodes cannot represent a shorter wave
+MAX_LOST = 0.1  # fraction of the rms height in such waves above which a warning is given
 
 
 class WaveSpectrum(NamedTuple):
@@ -53,9 +53,7 @@ def wave_spectrum(profile: Profile) -> WaveSpectrum:
     z = level(even(profile)).z
     count = z.size - 1
     power = (dct(z, type=1) / count)[1:] ** 2 / 2
-    power[-1] /= (
-        2  # the wave of two samples has its square as mean square, but its transform counts twice
-    )
+    power[-1] /= 2  # the transform counts the wave of two samples twice
     return WaveSpectrum(2 * profile.length / np.arange(1, count + 1), power)
 
 
@@ -65,9 +63,7 @@ def fine_fraction(profile: Profile, length: float) -> float:
 
 
 def describe_lost_waves(profile: Profile, element: float, max_lost: float = MAX_LOST) -> str | None:
-    """State that elements [m] are too long for a trace, with the element lengths that suffice.
-
-    None if they are not.
+    """Warn that elements [m] are too long for a trace and suggest lengths; None if they are not.
 
     Parameters
     ----------

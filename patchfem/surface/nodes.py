@@ -9,15 +9,10 @@ from .profile import Profile
 
 AS_LONG = "the trace is as long as the patch"
 CENTRED = "the trace is centred on the patch"
-ROUNDED = "is rounded to"
-NOTES = (
-    AS_LONG,
-    CENTRED,
-    ROUNDED,
-)  # words of sentences on how a trace was read, which doubt no result
-ROUND_OFF = 1e-3  # spacings of samples; shorter lengths are round-off of x in the file
-MAX_MISSING_ELEMENTS = 0.5000001  # elements at either end that a trace may lack, with round-off
-MAX_STEP_ELEMENTS = 1.5  # elements; samples farther apart get a note
+NOTES = (AS_LONG, CENTRED, "is rounded to")  # parts of sentences that cast no doubt on a result
+ROUND_OFF = 1e-3  # of the step; shorter lengths are round-off of x in the file
+MAX_MISSING_ELEMENTS = 0.5000001  # elements that a trace may lack at either end, with round-off
+MAX_STEP_ELEMENTS = 1.5  # elements; a larger distance of the samples gets a note
 
 
 def is_note(text: str) -> bool:

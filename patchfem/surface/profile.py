@@ -7,18 +7,14 @@ import numpy as np
 
 from ..core import PatchfemError, frozen_array, say
 
-WINDOW = 7  # samples of the running median; a group of up to three samples can be a spike
-SPECK_WINDOWS = (15, 31)  # samples of the medians that wider specks of dust stand above
-SPIKE_DEVIATIONS = (
-    8.0  # robust standard deviations from the running median; rough surfaces stay below 6
-)
-FOOT_DEVIATIONS = 3.0  # robust standard deviations down to which the foot of a speck is removed
-MAD_TO_DEVIATION = (
-    1.4826  # standard deviation of a normal distribution / its median absolute deviation
-)
-CHUNK = 131_072  # windows sorted at a time, which limits the memory
-MAX_SAMPLES = 2_097_152  # samples of a resampled trace
-EVEN_TOL = 1e-6  # relative scatter of the steps of an even trace
+WINDOW = 7  # samples of the running median; groups of up to three samples can be spikes
+SPECK_WINDOWS = (15, 31)  # samples of the running medians that find wider specks of dust
+SPIKE_DEVIATIONS = 8.0  # robust standard deviations; heights of rough surfaces stay within 6
+FOOT_DEVIATIONS = 3.0  # robust standard deviations, to which a speck is removed with its foot
+MAD_TO_DEVIATION = 1.4826  # standard deviation / median absolute deviation of normal values
+CHUNK = 131_072  # medians computed at a time, which limits the memory
+MAX_SAMPLES = 2_097_152  # samples of a resampled trace, which limits the memory
+EVEN_TOL = 1e-6  # relative range of the steps below which a trace counts as even
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -63,12 +59,10 @@ def level(profile: Profile) -> Profile:
 
 
 def even(profile: Profile) -> Profile:
-    """Put a trace on an even step without gaps, as filters and spectra need.
-
-    The notes state what that took.
+    """Resample a trace at an even step without gaps, as filters and spectra need.
 
     Missing heights are bridged by straight lines. An uneven trace is resampled at the 10th
-    percentile of its steps, so that nothing between its samples is lost.
+    percentile of its steps, so that nothing between its samples is lost. The notes state both.
     """
     known = ~profile.missing
     steps = np.diff(profile.x)
@@ -154,7 +148,7 @@ class RunningMedian(NamedTuple):
 
 
 def _running_median(z, window: int) -> RunningMedian:
-    """Compute running medians; windows at the ends serve all samples up to there."""
+    """Compute running medians; the first and the last window serve the samples at the ends."""
     windows = np.lib.stride_tricks.sliding_window_view(z, window)
     half = window // 2
     median = np.empty(len(windows))
@@ -170,9 +164,7 @@ def _running_median(z, window: int) -> RunningMedian:
 
 
 def spikes(profile: Profile) -> np.ndarray:
-    """Find the spikes of a trace, (n,) bool: heights far off the median of 7 samples.
-
-    They lie more than 8 robust standard deviations off.
+    """Find spikes, (n,) bool: heights over 8 standard deviations from the median of 7 samples.
 
     The standard deviation is 1.4826 times the largest of the median absolute deviation in the
     window, its median over all windows, and the smallest step between two heights (coarse digits).
@@ -192,9 +184,7 @@ def spikes(profile: Profile) -> np.ndarray:
 
 
 def despiked(profile: Profile) -> Profile:
-    """Mark spikes, dropouts and specks of dust with their feet as not measured.
-
-    A note states how many.
+    """Mark spikes, dropouts and specks of dust as not measured, and count them in a note.
 
     Spikes and dropouts are those of `spikes`. A speck stands as far above the median of 15 or 31
     samples, and both of its walls are as many deviations steeper than the steps of the trace. A

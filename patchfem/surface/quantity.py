@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 LEVEL = 0.95  # probability of the interval of a comparison
-SIDE = 1.959964  # standard deviations to either side that hold this probability
+SIDE = 1.959964  # standard deviations to either side that a normal interval of LEVEL extends
 
 
 class Quantity(NamedTuple):
@@ -64,10 +64,7 @@ def refused(unit: str, text: str, reason: str) -> Quantity:
 
 
 class Mean(NamedTuple):
-    """Mean of several measurements with its interval; standard deviation of a single one.
-
-    How many.
-    """
+    """Mean of `count` measurements; scatter: standard deviation of a single one."""
 
     mean: Quantity
     scatter: float
@@ -75,11 +72,11 @@ class Mean(NamedTuple):
 
 
 def mean_of(quantities: list, text: str) -> Mean | None:
-    """Average quantities that have a value, None for fewer than two.
+    """Average quantities that have a value; None for fewer than two.
 
-    The 95 % interval is Student's t of their scatter, s t / sqrt(n), or that of their own intervals
-    if this is wider, because a few may agree by chance. If no interval reaches below zero, that of
-    the mean does not.
+    The 95 % interval s t / sqrt(n) comes from their scatter by Student's t, or from their own
+    intervals if these give a wider one, because a few values may agree by chance. It does not
+    extend below zero if none of theirs does.
     """
     from scipy.special import stdtrit
 

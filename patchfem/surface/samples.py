@@ -1,4 +1,4 @@
-"""Numbers of a file as a trace: finite, plausible, in order, one height for each place."""
+"""Checks of samples from a file: finite, plausible, rising x, one height for each place."""
 
 from typing import NamedTuple
 
@@ -7,30 +7,28 @@ import numpy as np
 from ..core import PatchfemError, frozen_array, say
 from .profile import Profile
 
-MAX_LENGTH = 10.0  # [m] length of a trace, and size of any number; a larger one has a wrong unit
-MIN_LENGTH = 1e-9  # [m] length of a trace; a shorter one has a wrong unit
-ATOM = 1e-10  # [m] width of an atom; heights that span less were not measured
-OUTLIER_FRACTION = (
-    0.01  # fraction of the heights, highest and lowest, that may be faults of the measurement
-)
-MIN_ROUNDED = 10  # places; fewer do not show whether they are even but for rounding
-MAX_ROUNDING = 0.75  # printed digits off even places: half a digit, more for the fitted line
-DIGIT_TOL = 1e-4  # distance from a multiple of a printed digit, in digits, which is round-off
-METRES = "in the file, heights and length are in metres"  # note of who states the units
+MAX_LENGTH = 10.0  # [m] of a trace or any coordinate; larger ones have a wrong unit
+MIN_LENGTH = 1e-9  # [m] of a trace; a shorter one has a wrong unit
+ATOM_WIDTH = 1e-10  # [m] heights that span less have a wrong unit
+OUTLIER_FRACTION = 0.01  # of the heights at either end, which may be measurement faults
+MIN_ROUNDED = 10  # places; fewer do not show whether they are even apart from rounding
+MAX_ROUNDING = 0.75  # printed digits between a place and the fitted line, half of it by rounding
+DIGIT_TOL = 1e-4  # printed digits; a smaller distance from a multiple of a digit is round-off
+METRES = "in the file, heights and length are in metres"  # sentence on the origin of the units
 GIVEN = "heights and length were read in the given units"
 
 
 class Places(NamedTuple):
-    """Places (n,) in the unit of the file; notes."""
+    """Places (n,) in the unit of the file, with notes."""
 
     x: np.ndarray
     notes: tuple = ()
 
 
 def make_trace(path, x, z, lines, factors: tuple, stated: str = "") -> Profile:
-    """Make a trace of samples: x rises, with one height for each place.
+    """Make a trace of samples, with rising x and one height for each place.
 
-    The notes state what that took.
+    Its notes state every change of the samples.
 
     Parameters
     ----------
@@ -107,7 +105,7 @@ def _sample_place(path, lines, k: int) -> str:
 
 
 def undo_rounding(path, x, factor: float, name: str = "x") -> Places:
-    """Make places even that are so but for the rounding of their printed digits, with a note.
+    """Replace places that are even apart from the rounding of printed digits by even ones.
 
     A step of 0.15625 um printed to 0.1 um makes the slopes 14 % too large.
 
@@ -144,7 +142,7 @@ def undo_rounding(path, x, factor: float, name: str = "x") -> Places:
 
 
 def printed_digit(x) -> float:
-    """Return the largest power of ten of which rising places (n,) are multiples, 0 for none."""
+    """Return the largest power of ten that divides all rising places (n,), 0 if there is none."""
     largest = int(np.floor(np.log10((x[-1] - x[0]) / 5)))
     for digit in 10.0 ** np.arange(largest, largest - 8, -1):
         if np.abs(x / digit - np.rint(x / digit)).max() < DIGIT_TOL:
@@ -153,7 +151,7 @@ def printed_digit(x) -> float:
 
 
 def _min_step(x) -> float:
-    """Return the distance below which two places are one."""
+    """Return the distance below which two places are the same."""
     return 1e-6 * (x[-1] - x[0]) / x.size
 
 
@@ -179,7 +177,7 @@ def _require_rising(path, x, lines, factor: float) -> None:
 
 
 class Merged(NamedTuple):
-    """Strictly rising places (k,) with their heights (k,), in the units of the file; notes."""
+    """Strictly rising places (k,) and heights (k,) in the units of the file, with notes."""
 
     x: np.ndarray
     z: np.ndarray
@@ -229,7 +227,7 @@ def check_span(path, x, z, stated: str = "") -> tuple:
         raise PatchfemError(
             f"{path}: the profile is {say(length, 3)} long; is the unit of x right?"
         )
-    if 0 < span < ATOM:
+    if 0 < span < ATOM_WIDTH:
         return (
             f"{path}: heights span {say(span)}, which is less than the width of an atom; is the "
             "unit of the heights right?",

@@ -20,8 +20,8 @@ from .text import decode_text
 from .units import length_unit
 
 FIRST_WORDS = b"Scan Parameters"  # every export begins with these
-MIN_DIGIT = 1e-5  # smallest digit of x in the unit of the file; no export prints more
-MAX_STEP_ERROR = 0.6  # printed digits off even steps: half a digit, and round-off
+MIN_DIGIT = 1e-5  # smallest printed digit of x, in the unit of the file
+MAX_STEP_ERROR = 0.6  # printed digits between a rounded and a true place: half, and round-off
 _LENGTH = re.compile(
     r"^Length,\s*([+-]?[0-9]*\.?[0-9]+(?:[eE][+-]?[0-9]+)?)\s*([^\W\d_]*)\s*$", re.MULTILINE
 )
@@ -53,9 +53,7 @@ def read_dektak(raw: Raw) -> Profile:
         body = body.replace(",,\n", "\n")  # two empty columns end each row
     head = Head([], [], [], ",", number, 0)
     values, lines = read_columns(path, body, head, {"x": 0, "z": 1}, 2)
-    settings = text[: header.start()].partition("\nFunction,")[
-        0
-    ]  # the results of the instrument follow
+    settings, _, _ = text[: header.start()].partition("\nFunction,")  # results come after it
     length = _LENGTH.search(settings)
     factor = length and _dektak_unit(length[2])
     x, note = values["x"], ""
@@ -71,9 +69,9 @@ def _dektak_unit(word: str) -> float | None:
 
 
 def _true_places(x, length: float, factor: float) -> tuple[np.ndarray, str]:
-    """Replace rounded places by even steps of the length [m] in the header; add a note.
+    """Replace rounded places by even steps of the length [m] in the header, with a note.
 
-    The printed places stay if these steps do not fit them; factor: of x to metres.
+    The printed places stay if the steps do not fit them. factor: of x to metres.
     """
     if x.size < 3 or not np.isfinite(x).all() or not x[-1] > x[0]:
         return x, ""

@@ -14,7 +14,7 @@ from ...inputs.cells import NUMBER
 from .raw import shorten
 from .units import length_unit
 
-MAX_LINE = 1000  # characters; no line of two to four columns is longer
+MAX_LINE = 1000  # characters; a longer line is not one of two to four columns
 MAX_LINES = 500  # lines of a head; instruments write fewer than 200
 MAX_NAME = 80  # characters of the name of a column and its unit
 MAX_COLUMNS = 4  # x, y, z and a column of validity or of numbers
@@ -61,14 +61,12 @@ _FACTS = {
     )
     for name, words in _KEYS.items()
 }
-_THOUSANDS = re.compile(
-    "[1-9][0-9]{0,2},[0-9]{3}"
-)  # may also be a decimal comma, unless the words are German
+_THOUSANDS = re.compile("[1-9][0-9]{0,2},[0-9]{3}")  # ambiguous unless the words are German
 _GERMAN = re.compile("breite|höhe|länge|größe|schritt", re.IGNORECASE)
 
 
 class Line(NamedTuple):
-    """Line of a head: number, text without the comment sign, whether it was a comment."""
+    """Line of a head, without the comment sign if it is a comment."""
 
     number: int
     text: str
@@ -76,14 +74,14 @@ class Line(NamedTuple):
 
 
 class Cells(NamedTuple):
-    """Cells of a line without the empty ones at the end, and their delimiter, None for blanks."""
+    """Cells of a line without empty ones at the end; delimiter: None for blanks."""
 
     cells: list
     delimiter: str | None
 
 
 class Fact(NamedTuple):
-    """Value that a head states: its number, None without one, and the unit or word behind it."""
+    """Fact that a head states: a number or None, and the unit or word after it."""
 
     number: float | None = None
     word: str = ""
@@ -97,7 +95,7 @@ class Column(NamedTuple):
 
 
 class ColumnNames(NamedTuple):
-    """Line that names the columns (0 for none), the names, and units in a line of their own."""
+    """Names of the columns, units of a separate line, and the number of the line (0 for none)."""
 
     number: int
     names: list
@@ -211,9 +209,9 @@ def names_columns(cells: list) -> bool:
 
 
 def _names_with_units(line: str, *, is_comment: bool) -> list:
-    """Return the cells of a line that names x and z with their units, [] for any other line.
+    """Return the cells of a line that names x and z with units, [] for any other line.
 
-    The last column of a comment may go on with other words, which are left out.
+    Further words after the last column of a comment are left out.
     """
     cells = split_cells(line).cells
     if is_comment and len(cells) > 1:
@@ -245,11 +243,11 @@ def parse_column(cell: str) -> Column:
 
 
 def split_cells(text: str) -> Cells:
-    """Split a line at the delimiter that leaves numbers, else at the first that occurs."""
-    for delimiter in (
-        *DELIMITERS,
-        None,
-    ):  # a decimal comma is no delimiter if another one leaves numbers
+    """Split a line at the delimiter that leaves only numbers, else at the first that occurs.
+
+    So a decimal comma is not taken for a delimiter.
+    """
+    for delimiter in (*DELIMITERS, None):
         cells = strip_cells(text.split(delimiter))
         if len(cells) > 1 and all(is_number(cell, delimiter) for cell in cells):
             return Cells(cells, delimiter)
@@ -260,7 +258,7 @@ def split_cells(text: str) -> Cells:
 
 
 def strip_cells(cells: list) -> list:
-    """Return cells without blanks around them and without the empty ones at the end."""
+    """Strip blanks around cells and remove empty cells at the end."""
     cells = [cell.strip() for cell in cells]
     while cells and not cells[-1]:
         cells.pop()
@@ -268,10 +266,7 @@ def strip_cells(cells: list) -> list:
 
 
 def is_number(cell: str, delimiter: str | None) -> bool:
-    """Return whether a cell is a number or a missing one.
-
-    A comma is a decimal sign unless it is the delimiter.
-    """
+    """Return whether a cell is a number, possibly with a decimal comma, or a missing height."""
     if NUMBER.fullmatch(cell) or MISSING.fullmatch(cell):
         return True
     return delimiter != "," and DECIMAL_COMMA.fullmatch(cell) is not None

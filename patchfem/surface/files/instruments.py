@@ -1,6 +1,6 @@
-"""Files of other instruments, read with SurfaceTopography in a process of its own.
+"""Files of other instruments, read with SurfaceTopography in a separate process.
 
-The library takes seconds to import, once for each file.
+Importing the library takes two seconds for each file.
 """
 
 import io
@@ -20,15 +20,14 @@ from ..profile import Profile
 from ..samples import GIVEN, make_trace
 from .arrays import length_factors
 from .raster import areal
-from .raw import DAMAGED, MAX_POINTS, Raw, shorten, shorten_reason
+from .raw import MAX_POINTS, UNPACK_ERRORS, Raw, shorten, shorten_reason
 from .units import IGNORED
 
 PYTHON = sys.executable
-MAX_CPU_SECONDS = 60.0  # CPU time for a file, which does not depend on what else the machine does
-MAX_SECONDS = 600.0  # a process that has not ended after ten times its CPU time is not at work
-NO_LIBRARY = 3  # exit code of the script without SurfaceTopography
-CPU_LIMIT_SIGNAL = -24  # exit code after SIGXCPU
-ELSE = "export the surface as text or X3P"
+MAX_CPU_SECONDS = 60.0  # CPU time for a file; large scans take a few seconds
+MAX_SECONDS = 600.0  # elapsed time for a file; a process that takes longer is waiting for something
+NO_LIBRARY = 3  # exit code of the script if SurfaceTopography is not installed
+CPU_LIMIT_SIGNAL = -24  # exit code of a process that exceeded its CPU time (SIGXCPU)
 
 
 def read_instrument(raw: Raw, units: tuple | None) -> Profile | Areal:
@@ -66,23 +65,17 @@ def read_instrument(raw: Raw, units: tuple | None) -> Profile | Areal:
 
 
 def _run_script(path, file: Path) -> dict:
-    """Run the script for a file and return its arrays; `about` is a JSON text."""
+    """Run the script `topography` for a file and return its arrays by name."""
     script = Path(__file__).with_name("topography.py")
-    command = [
-        PYTHON,
-        "-P",
-        str(script),
-        str(file.absolute()),
-        str(MAX_POINTS),
-        str(MAX_CPU_SECONDS),
-    ]
-    environment = {
-        **os.environ,
-        "OPENBLAS_NUM_THREADS": "1",
-    }  # each thread would take address space
+    arguments = map(str, (script, file.absolute(), MAX_POINTS, MAX_CPU_SECONDS))
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1"}  # each thread takes address space
     try:
         done = subprocess.run(
-            command, capture_output=True, timeout=MAX_SECONDS, env=environment, check=False
+            [PYTHON, "-P", *arguments],
+            capture_output=True,
+            timeout=MAX_SECONDS,
+            env=environment,
+            check=False,
         )
     except subprocess.TimeoutExpired:
         raise _refusal(path, f"did not finish reading this file in {MAX_SECONDS:g} s") from None
@@ -100,7 +93,7 @@ def _run_script(path, file: Path) -> dict:
         )
     try:
         found = dict(np.load(io.BytesIO(done.stdout), allow_pickle=False))
-    except DAMAGED:
+    except UNPACK_ERRORS:
         raise _refusal(path, "failed to read this file") from None
     if "error" in found:
         raise _refusal(path, f"cannot read this file ({shorten_reason(found['error'])})")
@@ -110,4 +103,4 @@ def _run_script(path, file: Path) -> dict:
 
 
 def _refusal(path, what: str) -> PatchfemError:
-    return PatchfemError(f"{path}: SurfaceTopography {what}; {ELSE}")
+    return PatchfemError(f"{path}: SurfaceTopography {what}; export the surface as text or X3P")

@@ -16,20 +16,20 @@ from .rows import read_matrix
 from .units import GIVE, PIXEL, length_unit, pixel_size
 
 SIZE = "`# Width: 1.2 mm` and `# Height: 0.8 mm`"
-ABOVE = f"write the scan's {SIZE} and `# Value units: um` above its rows, or {PIXEL}"
+SIZE_REMEDY = f"write the scan's {SIZE} and `# Value units: um` above its rows, or {PIXEL}"
 UNKNOWN = Fact()
-MAX_UNEVEN = 1e-6  # relative scatter of the steps of coordinates; heights scatter more
+MAX_UNEVEN = 1e-6  # relative range of the steps of coordinates; those of heights vary more
 
 
 class Scale(NamedTuple):
-    """Step of an axis [m], or factor of the heights to metres; notes."""
+    """Step of an axis [m], or factor of the heights to metres, with notes."""
 
     value: float
     notes: tuple = ()
 
 
 class Unit(NamedTuple):
-    """Unit that counts, None without one; notes."""
+    """Unit that is used, None if none is known, with notes."""
 
     name: str | None
     notes: tuple = ()
@@ -164,7 +164,7 @@ def _find_step(path, axis: str, count: int, facts: dict, units: tuple | None) ->
         name = "width" if axis == "x" else "height"
         raise PatchfemError(
             f"{path}: the rows are a matrix of heights (a map, or more than three numbers in a "
-            f"row), but the {name} of the scan is not given; {ABOVE}"
+            f"row), but the {name} of the scan is not given; {SIZE_REMEDY}"
         )
     if not word and axis == "y":
         word = facts.get("unit_y", UNKNOWN).word
@@ -181,7 +181,7 @@ def _find_step(path, axis: str, count: int, facts: dict, units: tuple | None) ->
 
 
 def _choose_unit(path, what: str, stated: str | None, given: str | None) -> Unit:
-    """Choose the unit that was given, with a note if it differs from that of the file."""
+    """Prefer the unit that the user gave, with a note if it differs from that of the file."""
     if given is None or stated is None or length_unit(given) == length_unit(stated):
         return Unit(given or stated)
     note = f"{path}: the header gives {what} in {shorten(stated)}, but {given} is used, as given by --units"

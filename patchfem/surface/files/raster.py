@@ -10,21 +10,19 @@ from ..profile import Profile
 from ..samples import check_span, make_trace, require_finite, undo_rounding
 from .raw import MAX_POINTS
 
-MAX_CELLS_PER_POINT = 4  # cells of the raster for each point; more is a cloud of points
-ROUND_OFF = 1e-9  # distance of two places / length of the axis, below which they are one
+MAX_CELLS_PER_POINT = 4  # cells of the raster / points; scattered points have more
+ROUND_OFF = 1e-9  # relative to the length of an axis; nearer places are the same
 
 
 class Axis(NamedTuple):
-    """Distinct places along an axis in rising order, and the number of the place of each point."""
+    """Distinct rising places along an axis, and the index of the place of each point."""
 
     places: np.ndarray
     numbers: np.ndarray
 
 
 def raster(path, columns: list, lines, factors: tuple, stated: str = "") -> Profile | Areal:
-    """Arrange points along rows or columns as an areal scan.
-
-    Those of a single row or column as a trace.
+    """Arrange points as an areal scan, or as a trace if they form a single row or column.
 
     Parameters
     ----------
@@ -125,7 +123,7 @@ def areal(path, x, y, z, stated: str = "", notes: tuple = ()) -> Profile | Areal
 
 
 def _find_axis(values) -> Axis:
-    """Find the distinct places (k,) along an axis; places within round-off are one."""
+    """Find the distinct places along an axis; places within round-off are the same."""
     order = np.argsort(values, kind="stable")
     is_new = np.diff(values[order]) > ROUND_OFF * max(float(np.ptp(values)), 1e-300)
     numbers = np.empty(values.size, np.int64)

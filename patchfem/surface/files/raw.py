@@ -14,13 +14,10 @@ MIB = 2**20  # bytes
 MAX_BYTES = 512 * MIB  # bytes of a file, or of its unpacked content
 MAX_TEXT_BYTES = 64 * MIB  # bytes of text: four million samples
 MAX_POINTS = 50_000_000  # heights
-MAX_UNPACK_RATIO = 200  # unpacked / packed size; no surface packs better, a bomb does
-MIN_LIMIT = (
-    2**20
-)  # bytes that may unpack at any ratio, and that the list of members of a zip file may have
-HEAD_BYTES = 4096  # bytes that decide the format
-BLOCK_BYTES = 65_536  # bytes counted at a time: larger blocks are mapped anew each time
-MARKS = {
+MAX_UNPACK_RATIO = 200  # unpacked / packed size above 1 MiB; only a zip bomb packs better
+HEAD_BYTES = 4096  # bytes at the start of a file that decide its format
+BLOCK_BYTES = 65_536  # bytes read at a time, which limits the memory
+MARKS = {  # first bytes of a file and its kind
     b"\x1f\x8b": "gzip",
     b"PK\x03\x04": "zip",
     b"PK\x05\x06": "zip",
@@ -35,7 +32,7 @@ MARKS = {
     b"\xfe\xff": "text",
 }
 TEXT_SUFFIXES = (".txt", ".csv", ".tsv", ".dat", ".prn", ".asc", ".xyz", ".prf")
-DAMAGED = (  # what zipfile and gzip raise for a damaged file
+UNPACK_ERRORS = (  # exceptions of zipfile, gzip and NumPy for a damaged file
     zipfile.BadZipFile,
     zipfile.LargeZipFile,
     zlib.error,
@@ -53,8 +50,9 @@ DAMAGED = (  # what zipfile and gzip raise for a damaged file
 class Raw(NamedTuple):
     """File in memory.
 
-    path: its name for messages; kind: "text", "binary", "x3p" or one of MARKS; suffix: that of the
-    unpacked file, lower case; data: its bytes, b"" for a "binary" file that is not packed.
+    path: name for messages; kind: "text", "binary", "x3p" or one of MARKS; suffix: of the unpacked
+    file in lower case; data: bytes, b"" for a "binary" file that is not packed, which another
+    process reads.
     """
 
     path: Path
@@ -77,7 +75,7 @@ def fetch(path) -> Raw:
             kind = _find_kind(head)
             suffix = file_path.suffix.lower()
             if kind == "binary" and suffix in TEXT_SUFFIXES:
-                kind = "text"  # the reader of text states what is wrong
+                kind = "text"  # its reader names the line that is not text
             if kind == "binary":
                 return Raw(file_path, kind, suffix, b"")
             data = _read_limited(file, head, _max_bytes(kind) + 1)
@@ -93,13 +91,10 @@ def fetch(path) -> Raw:
 
 
 def _read_limited(file, head: bytes, size: int) -> bytes:
-    """Read a file up to `size` bytes, `head` included.
-
-    A single read would allocate all of them first.
-    """
+    """Read a file up to `size` bytes, of which `head` is read, without allocating all of them."""
     parts = [head]
     left = size - len(head)
-    while left > 0 and (part := file.read(min(left, MIN_LIMIT))):
+    while left > 0 and (part := file.read(min(left, BLOCK_BYTES))):
         parts.append(part)
         left -= len(part)
     return b"".join(parts)
@@ -124,7 +119,7 @@ def _check_size(path, kind: str, size: int) -> None:
 
 
 def _unpack(path: Path, name: Path, data: bytes) -> Raw:
-    """Return the content of a packed file as a file of its own."""
+    """Return the content of a packed file; `name` is its name without the packing suffix."""
     kind = _find_kind(data[:HEAD_BYTES])
     if kind == "gzip" or (kind == "zip" and path.suffix.lower() == ".zip"):
         raise PatchfemError(f"{path}: the file was compressed twice; unpack it once")
@@ -134,11 +129,8 @@ def _unpack(path: Path, name: Path, data: bytes) -> Raw:
 
 
 def _gunzip(path, data: bytes) -> bytes:
-    """Unpack a gzip file.
-
-    Its content is counted before any of it is kept, so that a bomb takes no memory.
-    """
-    limit = min(MAX_BYTES, max(MIN_LIMIT, MAX_UNPACK_RATIO * len(data)))
+    """Unpack a gzip file after counting its content, so that a zip bomb takes no memory."""
+    limit = min(MAX_BYTES, max(MIB, MAX_UNPACK_RATIO * len(data)))
     try:
         with gzip.open(io.BytesIO(data)) as file:
             head = file.read(HEAD_BYTES)
@@ -149,7 +141,7 @@ def _gunzip(path, data: bytes) -> bytes:
                 size += len(part)
             file.seek(0)
             content = file.read(size) if size <= limit else b""
-    except DAMAGED as error:
+    except UNPACK_ERRORS as error:
         raise PatchfemError(
             f"{path}: the gzip file is damaged ({shorten_reason(error)}); pack it again"
         ) from None
@@ -163,7 +155,7 @@ def _gunzip(path, data: bytes) -> bytes:
 
 
 def _unzip(raw: Raw, *, is_unpacked: bool = False) -> Raw:
-    """Return an X3P as it is, or the only member of another zip file."""
+    """Return an X3P file as it is, and the content of any other zip file with a single member."""
     archive = open_zip(raw)
     members = [member for member in archive.infolist() if not member.filename.endswith("/")]
     if any(Path(member.filename).name == "main.xml" for member in members):
@@ -182,14 +174,14 @@ def open_zip(raw: Raw) -> zipfile.ZipFile:
     if end < 0 or end + 22 > len(raw.data):
         raise PatchfemError(f"{raw.path}: the zip file is damaged (it has no end); pack it again")
     size = struct.unpack_from("<I", raw.data, end + 12)[0]
-    if size > MIN_LIMIT:
+    if size > MIB:
         raise PatchfemError(
             f"{raw.path}: the zip file lists too many members; unpack the zip file and give only "
             "the file of the profile"
         )
     try:
         return zipfile.ZipFile(io.BytesIO(raw.data))
-    except DAMAGED as error:
+    except UNPACK_ERRORS as error:
         reason = shorten_reason(error)
         raise PatchfemError(
             f"{raw.path}: the zip file is damaged ({reason}); pack it again"
@@ -223,7 +215,7 @@ def read_member(raw: Raw, archive: zipfile.ZipFile, name: str, max_bytes: int = 
     try:
         with archive.open(info) as file:
             content = file.read(info.file_size + 1)
-    except DAMAGED as error:
+    except UNPACK_ERRORS as error:
         raise PatchfemError(
             f"{inside} is damaged ({shorten_reason(error)}); export the surface anew"
         ) from None
@@ -233,7 +225,7 @@ def read_member(raw: Raw, archive: zipfile.ZipFile, name: str, max_bytes: int = 
 
 
 def _check_ratio(raw: Raw, info: zipfile.ZipInfo) -> None:
-    limit = max(MIN_LIMIT, MAX_UNPACK_RATIO * info.compress_size)
+    limit = max(MIB, MAX_UNPACK_RATIO * info.compress_size)
     if info.file_size > limit or info.compress_size > len(raw.data):
         raise PatchfemError(
             f"{raw.path}: {shorten(info.filename)} inside it unpacks to more than "
@@ -242,12 +234,12 @@ def _check_ratio(raw: Raw, info: zipfile.ZipInfo) -> None:
 
 
 def shorten(text: str, length: int = 40) -> str:
-    """Return a text of a file for a message: printable, 40 characters at most."""
+    """Make a text from a file printable and at most 40 characters long, for a message."""
     if not text.isprintable():
         text = text.encode("unicode_escape").decode()
     return text if len(text) <= length else f"{text[: length - 3]}..."
 
 
 def shorten_reason(error) -> str:
-    """Return the message of a library in one printable line of at most 120 characters."""
+    """Make the message of a library one printable line of at most 120 characters."""
     return shorten(" ".join(str(error).split()), 120)

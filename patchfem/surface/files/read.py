@@ -1,4 +1,4 @@
-"""File of a measured surface of any format as a trace or an areal scan."""
+"""Reader of a measured surface, a trace or an areal scan, from a file of any format."""
 
 from dataclasses import replace
 from importlib.util import find_spec
@@ -16,7 +16,7 @@ from .x3p import read_x3p
 
 READERS = {"npy": read_npy, "mat": read_mat, "binary": read_instrument, "text": read_text}
 READERS_WITH_UNITS = {"x3p": read_x3p, "dektak": read_dektak}  # formats that state their units
-WYKO = b"Wyko ASCII"  # first words of heights in wavelengths, which SurfaceTopography reads
+WYKO = b"Wyko ASCII"  # first words of a text in wavelengths, which only SurfaceTopography reads
 
 
 def read_surface(path, units: tuple | None = None) -> Profile | Areal:
@@ -43,11 +43,9 @@ def read_surface(path, units: tuple | None = None) -> Profile | Areal:
             kind = "binary"
     if kind in READERS_WITH_UNITS:
         surface = READERS_WITH_UNITS[kind](raw)
-        return (
-            surface
-            if units is None
-            else replace(surface, notes=(*surface.notes, f"{path}: {IGNORED}"))
-        )
+        if units is None:
+            return surface
+        return replace(surface, notes=(*surface.notes, f"{path}: {IGNORED}"))
     try:
         return READERS[kind](raw, units)
     except PatchfemError:

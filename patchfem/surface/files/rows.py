@@ -24,7 +24,7 @@ from .raw import shorten
 
 _LONG_LINE = re.compile(rf"\n[^\n]{{{MAX_LINE + 1}}}")
 _NOT_FINITE = re.compile(r"[+-]?(?:nan|inf)", re.IGNORECASE)
-_COUNTS = {1: "one", 2: "two", 3: "three", 4: "four"}
+_NUMBER_WORDS = ("no", "one", "two", "three", "four")
 
 
 class Columns(NamedTuple):
@@ -149,10 +149,7 @@ def _is_row(line: str) -> bool:
 
 
 def _find_delimiter(line: str, expected: str | None, count: int) -> str | None:
-    """Find the delimiter that splits a line into `count` numbers.
-
-    That of the head is tried first.
-    """
+    """Find the delimiter that splits a line into `count` numbers, first trying the expected one."""
     for sign in (expected, *DELIMITERS, None) if len(line) <= MAX_LINE else ():
         cells = line.split(sign)
         filled = strip_cells(cells)
@@ -162,10 +159,7 @@ def _find_delimiter(line: str, expected: str | None, count: int) -> str | None:
 
 
 def _load_table(body: str, delimiter: str | None, *, has_comma: bool) -> np.ndarray | None:
-    """Load rows of plain numbers at once.
-
-    None for any other text, which is then read line by line.
-    """
+    """Load rows of plain numbers at once; None for any other text, which is read line by line."""
     if has_comma and "." in body:
         return None
     if has_comma:
@@ -188,7 +182,7 @@ def _row_numbers(body: str) -> np.ndarray:
 
 def _split_row(place: str, line: str, delimiter: str | None, width: int) -> list:
     """Split a row into its cells; raises PatchfemError for another number of them."""
-    words = _COUNTS[width]
+    words = _NUMBER_WORDS[width]
     if len(line) > MAX_LINE:
         raise PatchfemError(
             f"{place}: the line is {len(line)} characters long; {words} numbers are needed"

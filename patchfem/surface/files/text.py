@@ -31,14 +31,14 @@ _CONTROL = re.compile(rb"[\x00-\x08\x0e-\x1f\x7f]")
 
 
 class Places(NamedTuple):
-    """Role of each wanted column and its place, in the order x, (y,) z, (valid); notes."""
+    """Index of each wanted column by role, in the order x, (y,) z, (valid), with notes."""
 
     columns: dict
     notes: tuple = ()
 
 
 class Factors(NamedTuple):
-    """Factors to metres of x, (y,) z; notes."""
+    """Factors of x, (y,) z to metres, with notes."""
 
     values: tuple
     notes: tuple
@@ -135,10 +135,7 @@ def _find_encoding(raw: Raw) -> str:
 
 
 def _find_places(line: str, names: list, *, has_units: bool) -> Places:
-    """Find the wanted columns.
-
-    If units were given, columns of unknown names count by their place.
-    """
+    """Find the wanted columns by name, or by order if the user gave units and names are unknown."""
     roles = {k: parse_column(name).role for k, name in enumerate(names)}
     valid = {role: k for k, role in roles.items() if role == "valid"}
     data = {k: role for k, role in roles.items() if role not in ("valid", "index")}
@@ -175,10 +172,7 @@ def _find_places(line: str, names: list, *, has_units: bool) -> Places:
 def _find_factors(
     line: str, columns: dict, named: ColumnNames, facts: dict, given: tuple | None
 ) -> Factors:
-    """Find the factors to metres of the columns.
-
-    Units that were given overrule those of the file with a note.
-    """
+    """Find the factors of the columns to metres; the user's units overrule the file with a note."""
     factors = []
     notes = ()
     for role, k in columns.items():

@@ -1,8 +1,8 @@
 """Script that reads a file with SurfaceTopography and writes its arrays to stdout as .npz.
 
-It runs as a process of its own, so that a damaged file can only harm that process: time, memory and
-crashes. Arguments: the file, the largest number of points, the CPU seconds allowed. Output: x and z
-of a trace, or x, y and z (m, n) of a scan, in metres, or in the numbers of the file if it states no
+It runs as a separate process, so that a damaged file cannot exhaust or crash the calling process.
+Arguments: the file, the largest number of points, the CPU seconds allowed. Output: x and z of a
+trace, or x, y and z (m, n) of a scan, in metres, or in the numbers of the file if it states no
 unit, and `about`, a JSON text with unit, format and version; or `error`. Exit code 3:
 SurfaceTopography is not installed.
 """
@@ -13,7 +13,7 @@ import math
 import os
 import sys
 
-MAX_MEMORY = 4 * 2**30  # bytes of address space; the largest scan allowed takes a quarter of it
+MAX_MEMORY = 1 << 32  # bytes of address space; the largest scan allowed takes a quarter of it
 
 
 def main(path: str, max_points: int, max_seconds: float) -> int:

@@ -35,19 +35,13 @@ IGNORED = "the file states its own units; the units that you gave are ignored"
 
 
 def length_unit(word: str) -> float | None:
-    """Return the factor to metres of a unit such as um, µm, [mm] or Mikrometer.
-
-    None for any other word.
-    """
+    """Return the factor to metres of a unit such as um, µm, [mm] or Mikrometer, else None."""
     word = word.strip().strip("[]()").strip().replace("µ", "u").replace("μ", "u")
     return UNITS.get(word) or SYNONYMS.get(word.lower())
 
 
 def pixel_size(word: str) -> float | None:
-    """Return the size of a pixel [m] that stands in place of a unit, such as 0.8 um.
-
-    None for anything else.
-    """
+    """Return the pixel size [m] of a text such as 0.8 um, None for any other text."""
     number, _, unit = word.strip().partition(" ")
     try:
         size = float(number) * (length_unit(unit) or math.nan)

@@ -24,16 +24,14 @@ from .raster import areal, raster
 from .raw import MAX_POINTS, MIB, Raw, open_zip, read_member, shorten, shorten_reason
 
 MAX_XML_BYTES = 16 * MIB  # bytes of main.xml; with its heights as a list it has 30 for each
-MAX_DEPTH = 50  # elements inside one another; the standard has six
-MAX_ELEMENTS = 500_000  # elements; more take over 100 MB
-MAX_CHECKSUM_BYTES = 4096  # bytes of the file with the checksum of main.xml, which has 45
+MAX_ELEMENTS = 500_000  # elements of main.xml; more take over 100 MB
 TYPES = {"I": "<i2", "L": "<i4", "F": "<f4", "D": "<f8"}
 _AXIS_NAMES = ("CX", "CY", "CZ")
 _MD5 = re.compile(r"[0-9a-fA-F]{32}")
 
 
 class Axis(NamedTuple):
-    """Axis: whether each point stores its value, data type, increment [m], offset [m]."""
+    """Axis of an X3P file; is_absolute: whether each point stores its value; lengths in [m]."""
 
     is_absolute: bool
     data_type: str
@@ -46,7 +44,7 @@ class Axis(NamedTuple):
 
 
 class Shape(NamedTuple):
-    """Rows, points of a row, and whether the points are a list without a matrix."""
+    """Size of a surface; is_list: whether the points form a list and not a matrix."""
 
     rows: int
     columns: int
@@ -59,7 +57,7 @@ class Shape(NamedTuple):
 
 
 class Package(NamedTuple):
-    """Opened X3P file: the folder of main.xml and its root."""
+    """Open X3P file with the folder and the root element of its main.xml."""
 
     raw: Raw
     archive: ZipFile
@@ -251,10 +249,7 @@ def _read_binary(package: Package, axes: list, shape: Shape) -> list:
 
 
 def _read_list(package: Package, axes: list, shape: Shape) -> list:
-    """Read the raw values (k,) of each absolute axis from the list in main.xml.
-
-    An empty datum is missing.
-    """
+    """Read the raw values (k,) of each absolute axis from main.xml, NaN for an empty datum."""
     datums = [
         (datum.text or "").strip() for datum in package.root.findall("Record3/DataList/Datum")
     ]
@@ -286,11 +281,7 @@ def _verify_main(package: Package, text: bytes) -> tuple:
     )
     if name not in package.archive.namelist() or ".." in name:
         return ()
-    words = (
-        read_member(package.raw, package.archive, name, MAX_CHECKSUM_BYTES)
-        .decode("latin-1")
-        .split()
-    )
+    words = read_member(package.raw, package.archive, name, MAX_XML_BYTES).decode("latin-1").split()
     if len(words) < 2 or posixpath.basename(words[1].lstrip("*")) != "main.xml":
         return ()
     if not _MD5.fullmatch(words[0]) or _md5(text) == words[0].lower():
@@ -306,17 +297,16 @@ def _md5(data: bytes) -> str:
 
 
 def _text(node: Element, path: str, default: str = "") -> str:
-    """Return the text at a path of names without blanks around it; the default if there is none."""
+    """Return the stripped text at a path of element names, or the default if it is empty."""
     return (node.findtext(path) or "").strip() or default
 
 
 class _SafeTree(TreeBuilder):
-    """Builder of a tree without namespaces, attributes and document types, of limited size."""
+    """Builder of an element tree of limited size without namespaces and attributes."""
 
     def __init__(self, path) -> None:
         super().__init__()
         self.path = path
-        self.depth = 0
         self.count = 0
 
     def doctype(self, *_) -> None:
@@ -328,23 +318,18 @@ class _SafeTree(TreeBuilder):
 
     def start(self, tag: str, _attributes: dict) -> Element:
         """Open an element."""
-        self.depth += 1
         self.count += 1
-        if self.depth > MAX_DEPTH or self.count > MAX_ELEMENTS:
-            raise PatchfemError(
-                f"{self.path}: main.xml is nested deeper than {MAX_DEPTH} or has more than "
-                f"{MAX_ELEMENTS} elements"
-            )
+        if self.count > MAX_ELEMENTS:
+            raise PatchfemError(f"{self.path}: main.xml has more than {MAX_ELEMENTS} elements")
         return super().start(tag.rpartition("}")[2], {})
 
     def end(self, tag: str) -> Element:
         """Close an element."""
-        self.depth -= 1
         return super().end(tag.rpartition("}")[2])
 
 
 def _parse_xml(path, data: bytes) -> Element:
-    """Parse main.xml, names without namespaces."""
+    """Parse main.xml into elements whose names have no namespace."""
     parser = XMLParser(target=_SafeTree(path))
     try:
         parser.feed(data)

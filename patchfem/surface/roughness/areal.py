@@ -12,8 +12,8 @@ import numpy as np
 from ...core import say
 from .parameters import Heights
 
-DECAY_LEVEL = 0.2  # value of the autocorrelation at its length (ISO 25178-3)
-MIN_LENGTH_STEPS = 2.0  # shorter lengths of autocorrelation, in steps, are those of the raster
+DECAY_LEVEL = 0.2  # autocorrelation at the autocorrelation length Sal (ISO 25178-3)
+MIN_LENGTH_STEPS = 2.0  # steps; the raster does not resolve a shorter autocorrelation length
 
 
 class Lobe(NamedTuple):

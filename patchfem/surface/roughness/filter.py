@@ -8,11 +8,9 @@ from ...core import PatchfemError, frozen_array, say
 from ..areal import Areal
 from ..profile import Profile, even, level
 
-ALPHA = np.sqrt(
-    np.log(2) / np.pi
-)  # width of the weights / cut-off; a wave of one cut-off passes with half its height
-REACH_FACTOR = 1.25  # half-length of the weights / cut-off; only 1.5e-10 of their sum lies beyond
-MIN_CUTOFF_STEPS = 4  # shorter cut-offs, in steps, are not resolved by the samples
+ALPHA = np.sqrt(np.log(2) / np.pi)  # width / cut-off; a wave of the cut-off keeps half its height
+REACH_FACTOR = 1.25  # half-length of the weights / cut-off; 1.5e-10 of their sum lies beyond
+MIN_CUTOFF_STEPS = 4  # steps; the samples do not resolve a shorter cut-off
 
 
 def filter_trace(profile: Profile, cutoff: float) -> tuple[Profile, Profile]:

@@ -13,17 +13,17 @@ from ..profile import Profile, level
 
 MAX_DEGREE = 9  # higher polynomials follow the waves of the surface
 CYLINDER = "cylinder"
-MAX_FITTED = 65_536  # heights that a cylinder is fitted to; more do not change it, and cost seconds
-MAX_JACKKNIFE = 8_192  # heights that each fit of the jackknife uses
-N_PARTS = 10  # parts of the surface that the jackknife leaves out in turn
+MAX_FITTED = 65_536  # heights of the fit of a cylinder; more take seconds and do not change it
+MAX_JACKKNIFE = 8_192  # heights of each fit of the jackknife
+N_PARTS = 10  # parts of the surface, each of which the jackknife leaves out once
 STUDENT_T = 1.833  # Student's t of 90 % with N_PARTS - 1 degrees of freedom
 
 
 class Cylinder(NamedTuple):
     """Circle or cylinder over reduced coordinates.
 
-    sine and curvature: of the slope across the axis; rise: slope of the axis; angle [rad]: of the
-    axis from x.
+    level: height in the middle; rise: slope of the axis; sine: of the slope across the axis in the
+    middle; angle [rad]: of the axis from x.
     """
 
     level: float
@@ -35,9 +35,7 @@ class Cylinder(NamedTuple):
     def height(self, x, y):
         """Evaluate the height of the cylinder at (x, y)."""
         across = -np.sin(self.angle) * x + np.cos(self.angle) * y
-        end = np.clip(
-            self.sine + self.curvature * across, -1, 1
-        )  # the sine of the slope grows evenly along a circle
+        end = np.clip(self.sine + self.curvature * across, -1, 1)  # sine of the slope of a circle
         arc = across * (self.sine + end) / (np.sqrt(1 - self.sine**2) + np.sqrt(1 - end**2))
         along = np.cos(self.angle) * x + np.sin(self.angle) * y
         return self.level + self.rise * along + np.sqrt(1 + self.rise**2) * arc
@@ -85,10 +83,7 @@ def form_degree(form: int | str) -> int:
 
 
 def _subtract_cylinder(surface: Profile | Areal) -> tuple[Profile | Areal, str]:
-    """Subtract a circle or cylinder.
-
-    Its name states the radius and the 90 % error of the radius (jackknife).
-    """
+    """Subtract a circle or cylinder; its name states the radius with a 90 % error (jackknife)."""
     is_scan = isinstance(surface, Areal)
     y = surface.y if is_scan else np.zeros(1)
     size = max(float(np.ptp(surface.x)), float(np.ptp(y))) / 2

@@ -28,25 +28,17 @@ from .parameters import Heights, kurtosis, skewness
 from .rows import Parameter
 from .spectrum import BAND, Spectrum, chi_square_factor, spectrum_of
 
-LOW = 0.05  # probability below the interval
-HIGH = 0.95  # probability below its upper bound
-N_TRACES = 200  # simulated traces; a quantile of 5 % scatters by 1.5 %
-MAX_SAMPLES = 2048  # of a simulated trace: keeps the 200 traces below 10 MB
-SPENT_FREEDOM = (
-    2.5  # degrees of freedom for estimating the spectrum; without it the intervals hold 87 of 100
-)
-MAX_DEVIATIONS = (
-    1.96  # standard deviations; larger skewness or kurtosis is not that of Gaussian heights
-)
-PEAK_FACTOR = 1.3  # the dominant wave scatters more than in traces simulated with its peak
-MIN_WAVES = 4  # self-affine traces have 2.7 to 3.5 of their strongest waves, and ...
-MIN_FREEDOM = 12.0  # ... 6 to 11 degrees of freedom; other traces have above 16
-LATERAL = ("wave", "band")  # kinds whose intervals hold whatever the distribution of heights
-SIZES = (
-    "power",
-    "ratio",
-    "extreme",
-)  # kinds whose values grow with the length of a self-affine trace
+LOW = 0.05  # probability of the lower bound
+HIGH = 0.95  # probability of the upper bound
+N_TRACES = 200  # simulated traces; the probability of a bound is then known to 1.5 %
+MAX_SAMPLES = 2048  # samples of a simulated trace, which keeps all of them below 10 MB
+SPENT_FREEDOM = 2.5  # degrees of freedom that estimating the spectrum takes, from coverage tests
+MAX_DEVIATIONS = 1.96  # standard deviations of skewness and kurtosis of Gaussian heights
+PEAK_FACTOR = 1.3  # scatter of the dominant wavelength / that of simulated traces
+MIN_WAVES = 4  # dominant waves in a trace; self-affine traces have 2.7 to 3.5
+MIN_FREEDOM = 12.0  # degrees of freedom of a trace; self-affine traces have 6 to 11, others 16
+LATERAL = ("wave", "band")  # kinds whose intervals need no Gaussian heights
+SIZES = ("power", "ratio", "extreme")  # kinds that grow with the length of a self-affine trace
 
 
 class Intervals:
@@ -135,9 +127,7 @@ class Intervals:
             density = density * np.sin(np.pi * spectrum.frequency * self.heights.step) ** 2
         if not density.any():
             return 1.0
-        squares = float(density @ density) / (
-            1 + 1 / spectrum.tapers
-        )  # an averaged density scatters by 1 / tapers
+        squares = float(density @ density) / (1 + 1 / spectrum.tapers)  # less its own scatter
         total = 2 * spectrum.length * float(density.sum()) ** 2 * spectrum.step / squares
         widening = self._slope_widening if kind == "slope" else self._height_widening
         return max((total - SPENT_FREEDOM) / widening**2, 1.0)

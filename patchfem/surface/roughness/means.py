@@ -6,7 +6,7 @@ from typing import NamedTuple
 from ..quantity import Quantity, mean_of
 from .report import RoughnessReport
 
-MAX_SIZE_RATIO = 1.001  # ratio of two lengths or spacings above which they differ
+MAX_SIZE_RATIO = 1.001  # longest / shortest; files with a larger ratio get a caution
 KINDS = {"profile": "traces", "areal": "scans"}
 
 
@@ -25,8 +25,8 @@ class Means(NamedTuple):
 def average_reports(reports: list[RoughnessReport]) -> list[Means]:
     """Average the parameters that all traces have, and those that all scans have.
 
-    Each kind needs two reports or more.     The 95 % intervals are Student's t of the scatter; the
-    interval of a single file describes the same scatter.
+    Each kind needs two reports or more. The 95 % intervals come from the scatter by Student's t; the
+    interval of a single file describes the same scatter and is not added.
     """
     out = []
     for kind in KINDS:

@@ -19,21 +19,15 @@ from ..profile import Profile, despiked, even, level
 from .filter import filter_trace
 from .parameters import MIN_SAMPLES, ROUND_OFF
 
-SUMMIT_FACTOR = (
-    0.8968  # alpha (1 - variance of summit heights / variance of heights), Bush et al. 1976
-)
-MIN_ALPHA = 1.5  # alpha of waves of one length in all directions
-PERSSON = (0.4, 0.5)  # u_0 / rms height: Persson 2007, and Pastewka et al. 2013 by simulation
-SHARPEST_FRACTION = 0.005  # fraction of the heights; Gaussian ones have 5 % of the curvature
-MAX_SHARPEST_POWER = 0.5  # fraction of the mean square curvature; sharper heights may be dust
-MAX_SPIKE_FRACTION = 0.1  # fraction of the samples; more "spikes" than that are the surface itself
-MAX_SKEWNESS = (
-    0.5  # larger skewness changes the stiffness by more than the theory's own uncertainty
-)
-MAX_EXCESS = 1.0  # the same for the kurtosis minus 3
-MAX_DEVIATIONS = (
-    3  # standard deviations of Gaussian traces that skewness and kurtosis must exceed too
-)
+SUMMIT_FACTOR = 0.8968  # coefficient of 1/alpha in the variance of summit heights (Bush 1976)
+MIN_ALPHA = 1.5  # alpha of an isotropic surface whose waves all have the same length
+PERSSON = (0.4, 0.5)  # u_0 / rms height by Persson 2007, and by simulation (Pastewka 2013)
+SHARPEST_FRACTION = 0.005  # of the heights; on Gaussian surfaces they have 5 % of the curvature
+MAX_SHARPEST_POWER = 0.5  # of the mean square curvature; a larger fraction may be due to dust
+MAX_SPIKE_FRACTION = 0.1  # of the samples; more apparent spikes belong to the surface
+MAX_SKEWNESS = 0.5  # a larger one changes the stiffness by more than the theory is uncertain
+MAX_EXCESS = 1.0  # of the kurtosis over 3, for the same reason
+MAX_DEVIATIONS = 3  # standard deviations that skewness and kurtosis of Gaussian traces reach
 
 
 class Moments(NamedTuple):

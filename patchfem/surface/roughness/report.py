@@ -20,16 +20,8 @@ from .rows import Parameter
 from .scan_intervals import scan_intervals
 from .spectrum import BAND, Spectrum, amplitude_of, refuse_band
 
-STANDARD_CUTOFFS = (
-    25e-6,
-    80e-6,
-    250e-6,
-    800e-6,
-    2.5e-3,
-    8e-3,
-    25e-3,
-)  # [m] those of ISO 21920-3 and one at each end
-SECTIONS_PER_TRACE = 6  # cut-offs in a trace: five that are evaluated and one that the filter trims
+STANDARD_CUTOFFS = (25e-6, 80e-6, 250e-6, 800e-6, 2.5e-3, 8e-3, 25e-3)  # [m] ISO 21920-3
+SECTIONS_PER_TRACE = 6  # cut-offs: five are evaluated, and the filter trims one in total
 NO_INTERVAL = "a single trace gives no interval for this parameter"
 NOT_GAUSSIAN = (
     "an interval from a single trace assumes Gaussian heights, but these heights are not Gaussian; "
@@ -51,13 +43,11 @@ class Sampling(NamedTuple):
 
 
 class Treatment(NamedTuple):
-    """What was subtracted from a surface before its parameters were computed.
-
-    Lengths in [m], None for no filter.
+    """Form, filters and window of a surface; lengths in [m], None for no filter.
 
     form: name of the least-squares form; short: nesting index of the S-filter; cutoff: between
-    waviness and roughness, of a scan the nesting index of its L-filter; window: first and last
-    position, of a scan in x, then in y.
+    waviness and roughness, for a scan the nesting index of the L-filter; window: first and last
+    position, for a scan in x and then in y.
     """
 
     form: str
@@ -141,9 +131,8 @@ def _report_trace(
 ) -> RoughnessReport:
     trace = _require_samples(even(_require_samples(part)))
     primary, form_name = subtract_form(trace, form)
-    if (
-        short is not None
-    ):  # the filter keeps a polynomial one of its degree, so that the form may go before and after
+    if short is not None:
+        # the filter leaves a remainder of the form at the ends, which is subtracted once more
         primary = subtract_form(filter_trace(primary, short)[0], form)[0]
     if np.ptp(primary.z) <= ROUND_OFF * np.abs(trace.z).max():
         primary = replace(primary, z=frozen_array(np.zeros(primary.z.size)))

@@ -7,9 +7,9 @@ import numpy as np
 from .intervals import HIGH, LOW, MAX_DEVIATIONS
 from .spectrum import chi_square_factor
 
-SPENT_FRACTION = 0.85  # degrees of freedom that the estimated spectrum leaves (240 scans)
-NORMAL_95 = 1.6449  # standard deviations below which 95 % of a normal distribution lie
-MIN_PAIRS = 0.1  # fraction of the pairs of heights; larger lags have too few for a correlation
+SPENT_FRACTION = 0.85  # of the degrees of freedom left by estimating the spectrum, of 240 scans
+NORMAL_95 = 1.6449  # standard deviations at the 95 % quantile of a normal distribution
+MIN_PAIRS = 0.1  # of the pairs at lag zero; lags with fewer pairs give no correlation
 
 
 class ScanIntervals(NamedTuple):
@@ -67,7 +67,5 @@ def _scatter(z: np.ndarray) -> Scatter:
     cubes, fourths, absolute_cubes = (
         float((part * lags).sum()) / (m * n) for part in (rho**3, rho**4, np.abs(rho**3))
     )
-    variance = float(
-        (power**2).sum() / power.sum() ** 2
-    )  # the square of a raw power is twice that of the density
+    variance = float((power**2).sum() / power.sum() ** 2)
     return Scatter(variance, abs(cubes), fourths, absolute_cubes)

@@ -7,11 +7,11 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array, say
 
-MIN_TAPERS = 3  # averaged spectra of the first estimate; fewer miss the dominant wave
-MAX_TAPERS = 16  # more blur the dominant wave of a long trace without making the intervals narrower
-MAX_UNTRIMMED = 65_536  # samples; longer traces lose a few at the end, for a fast transform
+MIN_TAPERS = 3  # averaged spectra; fewer are too noisy to show the dominant wave
+MAX_TAPERS = 16  # averaged spectra; more blur the dominant wave and do not narrow the intervals
+MAX_UNTRIMMED = 65_536  # samples; longer traces are trimmed to a length with a fast transform
 BLUR_FRACTION = 0.15  # half-width of the smoothing / frequency of the dominant wave
-BAND = (60e-6, 110e-6)  # wavelengths [m] of the waves of 80 um in the 1985 report
+BAND = (60e-6, 110e-6)  # [m] wavelengths of `band_amplitude`, about the 80 um of the 1985 report
 
 
 @dataclass(frozen=True, eq=False)
