@@ -42,7 +42,7 @@ import threading
 import time
 from collections import Counter, defaultdict
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from functools import cache
 from itertools import count
 from pathlib import Path
@@ -51,18 +51,17 @@ from typing import NamedTuple
 
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = "patchfem"
-FIRST_SECONDS = (
-    15.0  # duration without fault of the tests that are run first: most faults are caught by them
-)
-HANG_FACTOR = 4.0  # tests that take this many times their duration without fault hang; below it, the machine is busy
-HANG_SECONDS = 60.0  # added to that time for imports, and for kernels that are compiled anew
-MAX_BYTES = (
-    8 << 30
-)  # address space of a process under test, so that a fault cannot exhaust the machine
+# Most faults are caught by tests that take this long together without a fault [s]; they are run first.
+FIRST_SECONDS = 15.0
+# Tests hang if they take this many times their duration without a fault; a busy machine takes less.
+HANG_FACTOR = 4.0
+# This time is added for imports and for kernels that are compiled anew [s].
+HANG_SECONDS = 60.0
+# Address space of a process under test, so that a fault cannot exhaust the machine [bytes].
+MAX_BYTES = 8 << 30
 NOT_COPIED = (".git", ".venv", "__pycache__", ".pytest_cache", ".hypothesis", ".ruff_cache")
-CLOCK = count(
-    int(time.time())
-)  # times of modification: Python recognises a changed source by its time in seconds
+# Times of modification: Python recognises a changed source by its time in whole seconds.
+CLOCK = count(int(time.time()))
 
 SWAPPED_OPERATORS = {
     ast.Add: ast.Sub, ast.Sub: ast.Add, ast.Mult: ast.Div, ast.Div: ast.Mult, ast.FloorDiv: ast.Mult,
@@ -266,12 +265,12 @@ def faults_of_file(file: str, text: str) -> list[Fault]:
 def is_valid(fault: Fault, text: str) -> bool:
     """Return whether the source with this fault is still a program, and another one."""
     try:
-        return ast.dump(ast.parse(planted(fault, text))) != ast.dump(ast.parse(text))
+        return ast.dump(ast.parse(with_fault(fault, text))) != ast.dump(ast.parse(text))
     except SyntaxError:
         return False
 
 
-def planted(fault: Fault, text: str) -> str | None:
+def with_fault(fault: Fault, text: str) -> str | None:
     """Return a source with the fault, at its line or where the same lines stand now; None if they are gone."""
     lines, before = text.split("\n"), fault.before.split("\n")
     places = [place for place in range(len(lines)) if lines[place : place + len(before)] == before]
@@ -352,7 +351,7 @@ def watched_lines(root: Path, faults: list[Fault]) -> dict:
     """
     watched = defaultdict(lambda: defaultdict(list))
     for number, fault in enumerate(faults):
-        text = planted_text(root, fault)
+        text = text_with_fault(root, fault)
         if text is None:
             continue
         for file, lines in lines_of_fault(root, fault, text).items():
@@ -361,10 +360,10 @@ def watched_lines(root: Path, faults: list[Fault]) -> dict:
     return watched
 
 
-def planted_text(root: Path, fault: Fault) -> str | None:
+def text_with_fault(root: Path, fault: Fault) -> str | None:
     """Return the source of a checkout with the fault, None if its lines are gone."""
     path = root / fault.file
-    return planted(fault, path.read_text("utf-8")) if path.is_file() else None
+    return with_fault(fault, path.read_text("utf-8")) if path.is_file() else None
 
 
 def lines_of_fault(root: Path, fault: Fault, text: str) -> dict:
@@ -375,7 +374,7 @@ def lines_of_fault(root: Path, fault: Fault, text: str) -> dict:
         for place, (one, other) in enumerate(zip(old.split("\n"), text.split("\n")))
         if one != other
     )
-    tree = parsed(root / fault.file)
+    tree = parse_file(root / fault.file)
     stem = Path(fault.file).stem
     if stem.endswith("kernels"):
         folder = str(Path(fault.file).parent)
@@ -414,7 +413,7 @@ def package_files(root: Path) -> list[str]:
 
 
 @cache
-def parsed(path: Path) -> ast.Module:
+def parse_file(path: Path) -> ast.Module:
     """Return the syntax tree of a file."""
     return ast.parse(path.read_text("utf-8"))
 
@@ -422,13 +421,15 @@ def parsed(path: Path) -> ast.Module:
 @cache
 def function_lines(path: Path) -> set:
     """Return the lines inside functions."""
-    functions = [node for node in ast.walk(parsed(path)) if isinstance(node, ast.FunctionDef)]
+    functions = [node for node in ast.walk(parse_file(path)) if isinstance(node, ast.FunctionDef)]
     return {line for node in functions for line in range(node.body[0].lineno, node.end_lineno + 1)}
 
 
 def lines_that_mention(path: Path, names: set) -> set:
     """Return the lines inside functions where one of these names stands."""
-    nodes = [node for node in ast.walk(parsed(path)) if isinstance(node, (ast.Name, ast.Attribute))]
+    nodes = [
+        node for node in ast.walk(parse_file(path)) if isinstance(node, (ast.Name, ast.Attribute))
+    ]
     mentioned = {
         node.lineno for node in nodes if getattr(node, "id", getattr(node, "attr", "")) in names
     }
@@ -445,7 +446,9 @@ class Reached:
     """
 
     def __init__(self, watched: dict, log: str):
-        self.watched, self.log, self.seen = watched, log, set()
+        self.watched = watched
+        self.log = log
+        self.seen = set()
 
     def start(self) -> None:
         """Trace all functions that are called from now on."""
@@ -482,7 +485,8 @@ class Plugin:
     """What a pytest process does that `run` starts: take chosen tests in their order, and record what tests reach."""
 
     def __init__(self, order: dict):
-        self.order, self.failed = order, False
+        self.order = order
+        self.failed = False
         self.reached = (
             Reached(read_watched(order["watched"]), order["log"]) if "log" in order else None
         )
@@ -563,7 +567,7 @@ def append(path: Path, row: dict) -> None:
         file.write(json.dumps(row) + "\n")
 
 
-def rows_of(path: Path) -> list[dict]:
+def read_rows(path: Path) -> list[dict]:
     """Read a file of JSON lines; none if there is no file."""
     return [json.loads(line) for line in path.read_text().splitlines()] if path.exists() else []
 
@@ -575,7 +579,9 @@ class Copy:
     """A copy of the checkout in which tests run, with its own bytecode and folder of compiled code."""
 
     def __init__(self, root: Path, work: Path, warm: Path):
-        self.tree, self.work, self.warm = work / "tree", work, warm
+        self.tree = work / "tree"
+        self.work = work
+        self.warm = warm
         shutil.copytree(root, self.tree, ignore=shutil.ignore_patterns(*NOT_COPIED), symlinks=True)
         (work / "plugin").mkdir()
         shutil.copy(__file__, work / "plugin" / "mutations.py")
@@ -641,7 +647,7 @@ class Copy:
         watched_file.write_text(
             json.dumps({str(self.tree / file): lines for file, lines in watched.items()})
         )
-        done = [row["test"] for row in rows_of(record)]
+        done = [row["test"] for row in read_rows(record)]
         order = {
             "watched": str(watched_file),
             "log": str(self.work / "log"),
@@ -652,7 +658,7 @@ class Copy:
 
     def outcome(self, fault: Fault, stages: list[list[str]], seconds: dict) -> str:
         """Plant a fault, run tests stage by stage until one fails, and say how it ended."""
-        text = planted_text(self.tree, fault)
+        text = text_with_fault(self.tree, fault)
         if text is None:
             return "gone"
         if not stages:
@@ -691,7 +697,9 @@ def link(source: str, target: str) -> None:
         shutil.copy2(source, target)
 
 
-def stages_of(number: int, fault: Fault, rows: list[dict], max_seconds: float) -> list[list[str]]:
+def choose_tests(
+    number: int, fault: Fault, rows: list[dict], max_seconds: float
+) -> list[list[str]]:
     """Return the tests for a fault in two stages, the quick tests of its own folder first.
 
     There are none where no test reaches the fault. The second stage ends with the other tests of
@@ -711,7 +719,9 @@ def stages_of(number: int, fault: Fault, rows: list[dict], max_seconds: float) -
         return not row["test"].startswith(own_folder), row["seconds"]
 
     ordered = [*sorted(reaching, key=rank), *sorted(beside, key=rank)]
-    first, second, spent = [], [], 0.0
+    first = []
+    second = []
+    spent = 0.0
     for row in ordered:
         spent += row["seconds"]
         if spent <= FIRST_SECONDS or not first:
@@ -753,66 +763,76 @@ def seed_cache(root: Path, warm: Path) -> None:
             target.chmod(0o700)
 
 
-def run(faults: list[Fault], results: Path, options: argparse.Namespace) -> None:
-    """Record what the tests reach, then run each fault that has no outcome yet."""
-    results.mkdir(parents=True, exist_ok=True)
-    record, outcomes = results / "tests.jsonl", results / "outcomes.jsonl"
-    (results / "faults.json").write_text(
-        json.dumps([fault._asdict() for fault in faults], indent=1)
-    )
-    root = options.root.resolve()
-    copies = SimpleQueue()
-    with (
-        tempfile.TemporaryDirectory(prefix="patchfem-faults-") as work,
-        ThreadPoolExecutor(options.jobs) as pool,
-    ):
-        warm = Path(work) / "warm"
-        warm.mkdir()
-        seed_cache(root, warm)
-        for job in range(options.jobs):
-            (Path(work) / str(job)).mkdir()
-            copies.put(Copy(root, Path(work) / str(job), warm))
+class Run:
+    """The run of the tests on faults, with its folder of results."""
 
-        def with_copy(action, *arguments) -> None:
-            own = copies.get()
-            try:
-                action(own, *arguments)
-            finally:
-                copies.put(own)
+    def __init__(self, faults: list[Fault], results: Path, options: argparse.Namespace):
+        self.faults = faults
+        self.results = results
+        self.options = options
+        self.root = options.root.resolve()
+        self.copies = SimpleQueue()
+        self.watched = watched_lines(self.root, faults)
+        self.tests = []
 
-        def reach(own: Copy, path: str) -> None:
-            own.reach(path, watched, record)
-            append(results / "recorded.jsonl", {"path": path})
-            say(f"{path} is recorded")
+    def start(self) -> None:
+        """Record what the tests reach, then run each fault that has no outcome yet."""
+        self.results.mkdir(parents=True, exist_ok=True)
+        write_faults(self.results / "faults.json", self.faults)
+        with (
+            tempfile.TemporaryDirectory(prefix="patchfem-faults-") as folder,
+            ThreadPoolExecutor(self.options.jobs) as pool,
+        ):
+            work = Path(folder)
+            (work / "warm").mkdir()
+            seed_cache(self.root, work / "warm")
+            for job in range(self.options.jobs):
+                (work / str(job)).mkdir()
+                self.copies.put(Copy(self.root, work / str(job), work / "warm"))
+            recorded = {row["path"] for row in read_rows(self.results / "recorded.jsonl")}
+            paths = test_paths(self.root, self.options.tests, self.options.without)
+            list(pool.map(self.record, [path for path in paths if path not in recorded]))
+            self.tests = [row for row in read_rows(self.results / "tests.jsonl") if row["passed"]]
+            done = {row["number"] for row in read_rows(self.results / "outcomes.jsonl")}
+            list(pool.map(self.judge, [n for n in range(len(self.faults)) if n not in done]))
 
-        def plant(own: Copy, number: int) -> None:
+    @contextmanager
+    def free_copy(self):
+        """Take a copy of the checkout that no other thread uses."""
+        own = self.copies.get()
+        try:
+            yield own
+        finally:
+            self.copies.put(own)
+
+    def record(self, path: str) -> None:
+        """Record what the tests of a path reach."""
+        with self.free_copy() as own:
+            own.reach(path, self.watched, self.results / "tests.jsonl")
+        append(self.results / "recorded.jsonl", {"path": path})
+        print_line(f"{path} is recorded")
+
+    def judge(self, number: int) -> None:
+        """Run the tests on a fault and store its outcome."""
+        fault = self.faults[number]
+        stages = choose_tests(number, fault, self.tests, self.options.seconds)
+        durations = {row["test"]: row["seconds"] for row in self.tests}
+        with self.free_copy() as own:
             began = time.monotonic()
-            stages = stages_of(number, faults[number], rows, options.seconds)
-            outcome = own.outcome(
-                faults[number], stages, {row["test"]: row["seconds"] for row in rows}
-            )
-            row = {
-                "number": number,
-                "outcome": outcome,
-                "seconds": round(time.monotonic() - began, 1),
-            }
-            row["tests"] = sum(map(len, stages))
-            row["reached_by"] = sum(number in row["reached"] for row in rows)
-            row["by"] = own.failed_test() if outcome == "caught" else ""
-            append(outcomes, row)
-            say(
-                f"{outcome:9}{row['seconds']:7.1f} s  {faults[number].file}:{faults[number].line}  {row['by'][:90]}"
-            )
-
-        watched = watched_lines(root, faults)
-        recorded = {row["path"] for row in rows_of(results / "recorded.jsonl")}
-        paths = test_paths(root, options.tests, options.without)
-        paths = [path for path in paths if path not in recorded]
-        list(pool.map(lambda path: with_copy(reach, path), paths))
-        rows = [row for row in rows_of(record) if row["passed"]]
-        done = {row["number"] for row in rows_of(outcomes)}
-        waiting = [number for number in range(len(faults)) if number not in done]
-        list(pool.map(lambda number: with_copy(plant, number), waiting))
+            outcome = own.outcome(fault, stages, durations)
+            seconds = round(time.monotonic() - began, 1)
+            failure = own.failed_test() if outcome == "caught" else ""
+        row = {
+            "number": number,
+            "outcome": outcome,
+            "seconds": seconds,
+            "tests": sum(map(len, stages)),
+            "reached_by": sum(number in row["reached"] for row in self.tests),
+            "by": failure,
+        }
+        append(self.results / "outcomes.jsonl", row)
+        place = f"{fault.file}:{fault.line}"
+        print_line(f"{outcome:9}{seconds:7.1f} s  {place}  {failure[:90]}")
 
 
 def test_paths(root: Path, given: list[str], left_out: list[str]) -> list[str]:
@@ -830,12 +850,17 @@ def test_paths(root: Path, given: list[str], left_out: list[str]) -> list[str]:
     return paths
 
 
-def say(text: str) -> None:
+def print_line(text: str) -> None:
     """Print a line at once."""
     print(time.strftime("%H:%M:%S"), text, flush=True)
 
 
 # ------------------------------------------------------------------------------------------------------------- outcomes
+
+
+def write_faults(path: Path, faults: list[Fault]) -> None:
+    """Write faults that were drawn."""
+    path.write_text(json.dumps([fault._asdict() for fault in faults], indent=1))
 
 
 def read_faults(path: Path) -> list[Fault]:
@@ -846,7 +871,7 @@ def read_faults(path: Path) -> list[Fault]:
 def read_outcomes(results: Path) -> dict:
     """Return {fault: outcome} of a run, finished or not."""
     faults = read_faults(results / "faults.json")
-    return {faults[row["number"]]: row["outcome"] for row in rows_of(results / "outcomes.jsonl")}
+    return {faults[row["number"]]: row["outcome"] for row in read_rows(results / "outcomes.jsonl")}
 
 
 def show(results: Path) -> None:
@@ -914,9 +939,9 @@ def main() -> None:
     given = parser.parse_args()
     if given.verb == "draw":
         faults = draw(given.root.resolve(), given.folders, given.seed, given.count)
-        given.faults.write_text(json.dumps([fault._asdict() for fault in faults], indent=1))
+        write_faults(given.faults, faults)
     elif given.verb == "run":
-        run(read_faults(given.faults), given.results, given)
+        Run(read_faults(given.faults), given.results, given).start()
     elif given.verb == "show":
         show(given.results)
     else:
