@@ -1,0 +1,54 @@
+"""Claims about measures of a response that planted faults showed to be unchecked."""
+
+import numpy as np
+import pytest
+
+from patchfem.core import Outcome, Response
+from patchfem.friction.laws.lugre import LuGre
+from patchfem.response import settling
+from patchfem.response.inside_steps import PARTS, divide_steps, motion_inside_steps
+from patchfem.response.measures import step_harmonic
+
+
+@pytest.mark.parametrize(
+    ("change", "outcome"), [(0.04, Outcome.STEADY), (0.06, Outcome.GROWS), (0.9, Outcome.GROWS)]
+)
+def test_exact_even_growth_counts_from_a_twentieth_of_the_tolerance(change, outcome):
+    amplitudes = 1 + 1e-3 * change * np.arange(6)
+    assert settling.classify(amplitudes, 1e-3) is outcome
+
+
+def test_exact_first_harmonic_of_a_square_wave_with_uneven_samples():
+    time = np.array([0.0, 0.1, 0.5, 0.8, 1.0])
+    force = step_harmonic(time, np.array([3.0, 3.0, -3.0, -3.0]), 2 * np.pi)
+    assert force == pytest.approx(-12j / np.pi, rel=1e-14)
+
+
+def test_exact_a_cubic_motion_is_followed_inside_its_steps():
+    motion = np.polynomial.Polynomial([0.2, 1.5, 0.7, 0.3])
+    time = np.array([0.0, 0.4, 1.1, 1.3])
+    steps = divide_steps(time, motion(time), motion.deriv()(time))
+    assert steps.time.shape == (3, PARTS)
+    np.testing.assert_allclose(steps.slide, motion(steps.time), rtol=1e-14)
+    np.testing.assert_allclose(steps.speed, motion.deriv()(steps.time), rtol=1e-13)
+
+
+def test_exact_force_of_lugre_inside_a_step_at_constant_speed():
+    """The bristles approach their limit exponentially over the relative displacement."""
+    law = LuGre(0.6, 0.4, 2e5, 1e-3, micro_damping=30.0, viscous=2.0)
+    speed = 5e-4
+    load = 80.0
+    time = np.array([0.0, 2e-3, 9e-3])
+    none = np.zeros(3)
+    window = Response(
+        time=time, modal=none, modal_rate=none, slide=speed * time, slide_rate=speed + none,
+        output=none, output_rate=none, acceleration=none, base_acceleration=none, force=none,
+        slip=none,
+    )  # fmt: skip
+    inside = motion_inside_steps(window, law, load)
+    assert inside.time.size == 2 * PARTS + 1
+    limit = 0.4 + 0.2 * np.exp(-0.25)
+    fraction = np.exp(-speed * inside.time * law.stiffness / limit)
+    np.testing.assert_allclose(inside.slide - inside.slip, limit / 2e5 * (1 - fraction), rtol=1e-9)
+    bristle_force = limit * (1 - fraction) + 30.0 * speed * fraction
+    np.testing.assert_allclose(inside.force, load * (bristle_force + 2.0 * speed), rtol=1e-9)
