@@ -10,7 +10,7 @@ from .profile import Profile
 AS_LONG = "the trace is as long as the patch"
 CENTRED = "the trace is centred on the patch"
 NOTES = (AS_LONG, CENTRED, "is rounded to")  # parts of sentences that cast no doubt on a result
-ROUND_OFF = 1e-3  # of the step; shorter lengths are round-off of x in the file
+ROUND_OFF = 1e-3  # fraction of the step; shorter lengths are round-off of x in the file
 MAX_MISSING_ELEMENTS = 0.5000001  # elements that a trace may lack at either end, with round-off
 MAX_STEP_ELEMENTS = 1.5  # elements; a larger distance of the samples gets a note
 

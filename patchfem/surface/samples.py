@@ -7,10 +7,10 @@ import numpy as np
 from ..core import PatchfemError, frozen_array, say
 from .profile import Profile
 
-MAX_LENGTH = 10.0  # [m] of a trace or any coordinate; larger ones have a wrong unit
-MIN_LENGTH = 1e-9  # [m] of a trace; a shorter one has a wrong unit
+MAX_LENGTH = 10.0  # [m] a longer trace, or a larger coordinate, has a wrong unit
+MIN_LENGTH = 1e-9  # [m] a shorter trace has a wrong unit
 ATOM_WIDTH = 1e-10  # [m] heights that span less have a wrong unit
-OUTLIER_FRACTION = 0.01  # of the heights at either end, which may be measurement faults
+OUTLIER_FRACTION = 0.01  # fraction of the heights at either end, which may be measurement faults
 MIN_ROUNDED = 10  # places; fewer do not show whether they are even apart from rounding
 MAX_ROUNDING = 0.75  # printed digits between a place and the fitted line, half of it by rounding
 DIGIT_TOL = 1e-4  # printed digits; a smaller distance from a multiple of a digit is round-off

@@ -22,11 +22,11 @@ from .parameters import MIN_SAMPLES, ROUND_OFF
 SUMMIT_FACTOR = 0.8968  # coefficient of 1/alpha in the variance of summit heights (Bush 1976)
 MIN_ALPHA = 1.5  # alpha of an isotropic surface whose waves all have the same length
 PERSSON = (0.4, 0.5)  # u_0 / rms height by Persson 2007, and by simulation (Pastewka 2013)
-SHARPEST_FRACTION = 0.005  # of the heights; on Gaussian surfaces they have 5 % of the curvature
-MAX_SHARPEST_POWER = 0.5  # of the mean square curvature; a larger fraction may be due to dust
-MAX_SPIKE_FRACTION = 0.1  # of the samples; more apparent spikes belong to the surface
-MAX_SKEWNESS = 0.5  # a larger one changes the stiffness by more than the theory is uncertain
-MAX_EXCESS = 1.0  # of the kurtosis over 3, for the same reason
+SHARPEST_FRACTION = 0.005  # fraction of the heights; they hold 5 % of a Gaussian curvature
+MAX_SHARPEST_POWER = 0.5  # fraction of the mean square curvature; more may be due to dust
+MAX_SPIKE_FRACTION = 0.1  # fraction of the samples; more apparent spikes belong to the surface
+MAX_SKEWNESS = 0.5  # skewness above this changes the stiffness by more than the theory is uncertain
+MAX_EXCESS = 1.0  # kurtosis minus 3, for the same reason
 MAX_DEVIATIONS = 3  # standard deviations that skewness and kurtosis of Gaussian traces reach
 
 

@@ -34,7 +34,7 @@ MAX_SIDE = 1000  # pixels along a side of the finest image, which limits the tim
 MAX_SCALE_RATIO = 1.5  # scatter of a plane / that of the quietest one; rougher parts are worn
 MIN_RIVAL = 0.5  # score of a second plane / fraction on the first, above which both may be unworn
 MIN_DISTANCE = 3.0  # standard deviations between two planes that count as different
-MARGIN = 0.1  # of the shorter side; wear may run out undetected this far beside a worn part
+MARGIN = 0.1  # fraction of the shorter side within which wear may run out undetected
 MAX_ROUNDS = 4  # rounds of fit and detection of wear; the worn part hardly changes after two
 
 

@@ -31,7 +31,7 @@ PLACEMENT = {  # name: (unit, definition)
     ),
 }
 HIDDEN = "mean depth of uniform or wedge-shaped wear that may have remained hidden"
-MIN_CORRELATION = 0.95  # of the unworn heights of two scans that show the same place
+MIN_CORRELATION = 0.95  # correlation of the unworn heights of scans of the same place
 MIN_CORRELATION_UNSURE = 0.98  # the same where the search found no significant place
 MIN_UNMEASURED = 0.1  # fraction of the worn part without heights that a sentence reports
 HALF_TURN_TOL = 0.2  # [rad] difference from pi below which a scan counts as turned by 180 degrees

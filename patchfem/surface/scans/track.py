@@ -10,17 +10,17 @@ from ..profile import runs_of
 from ..quantity import SIDE, Quantity, around, mean_of, refused
 from .alignment import ScanAlignment
 
-SMOOTHING = 0.025  # of the shorter side; Gaussian filter of the depths before their gradient
+SMOOTHING = 0.025  # fraction of the shorter side; Gaussian filter before the gradient is taken
 N_DIRECTION = 400  # heights along the shorter side from which the direction is found
 MIN_COHERENCE = 0.5  # coherence of the gradients: 1 for a straight track, 0 for a round pit
 MIN_DEVIATIONS = 5.0  # standard deviations of the mean section that a deep place exceeds
 MIN_DEPTH = 0.2  # fraction of the largest depth of the mean section that a deep place exceeds
 MIN_MEASURED = 0.3  # fraction of the sections that must be measured at a place of the mean section
-MIN_MARGIN = 0.1  # of the width of the track that must be measured beside it
+MIN_MARGIN = 0.1  # fraction of the width of the track that must be measured beside it
 MIN_AREA = 0.6  # fraction of the lost area of the mean section that a single track holds
 MAX_SECTIONS = 1000  # sections of the rotated map; more do not change the means
 MAX_PLACES = 4000  # places of a section, which limits the memory
-END_FRACTION = 0.1  # of the length of the track at each end, where sections are not measured
+END_FRACTION = 0.1  # fraction of the length of a track whose sections at each end are left out
 N_GROUPS = 16  # groups of neighbouring sections, each of which is measured once
 MIN_GROUPS = 6  # fewer groups give no interval by their scatter
 TEXTS = {  # name: (unit, definition)
