@@ -14,6 +14,7 @@ from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
 from patchfem.contact import unilateral
 from patchfem.contact.active_set import Ask, Operator, settle
 from patchfem.contact.gaps import crown, tilt
+from patchfem.contact.gradients import nearest
 from patchfem.contact.unilateral import SOLVED, press, press_by, solve, undetermined
 from patchfem.core import Compliance, Interface, NotConverged, Outcome, PatchfemError
 
@@ -273,7 +274,19 @@ def test_refuses_to_return_what_did_not_converge(monkeypatch):
             press(pair, np.zeros(101), LOAD)
 
 
-# ---- parts of the start
+@given(seed=st.integers(0, 2**32 - 1), size=st.integers(2, 60))
+def test_exact_nearest_forces_are_a_projection(seed, size):
+    """f - y = rigid q on f > 0 and y + rigid q <= 0 elsewhere: the conditions of the nearest point."""
+    rng = np.random.default_rng(seed)
+    rigid = np.stack([np.ones(size), np.linspace(-1, 1, size)], axis=1)
+    y, sums = rng.normal(size=size) * 10.0**rng.uniform(-3, 3), np.array([1.0, rng.uniform(-0.99, 0.99)])
+    f = nearest(y, rigid, sums)
+    assert np.abs(rigid.T @ f - sums).max() <= 1e-12 and f.min() >= 0
+    if np.count_nonzero(f) > 1:
+        q = np.linalg.lstsq(rigid[f > 0], (f - y)[f > 0], rcond=None)[0]
+        size = np.abs(y).max() + np.abs(rigid @ q).max()
+        assert np.abs(f - np.maximum(y + rigid @ q, 0)).max() <= 1e-9 * size
+
 
 
 # ---- random gaps on random operators, every control

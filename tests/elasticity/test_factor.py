@@ -80,28 +80,6 @@ def test_always_a_dissection_is_an_order_whose_last_cut_parts_the_mesh_in_halves
     assert cut.size <= 3 * np.sqrt(count)
 
 
-def test_order_cuts_of_a_square_grid_hold_the_fewest_nodes_and_the_factors_grow_as_n_log_n():
-    kept = []
-    for n in (32, 64, 128):
-        x, y = (part.ravel() for part in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
-        node = np.arange(n * n).reshape(n, n)
-        pairs = np.concatenate([np.stack([node[1:].ravel(), node[:-1].ravel()], 1),
-                                np.stack([node[:, 1:].ravel(), node[:, :-1].ravel()], 1)])
-        order, firsts = dissection(np.stack([x, y], 1).astype(float), pairs)
-        assert np.diff(firsts)[-1] == n  # the first cut is one line of the grid
-        # the graph's Laplacian, two unknowns a node
-        rows = np.concatenate([pairs[:, 0], pairs[:, 1], np.arange(n * n)])
-        columns = np.concatenate([pairs[:, 1], pairs[:, 0], np.arange(n * n)])
-        values = np.concatenate([np.full(2 * len(pairs), -1.0), np.full(n * n, 4.1)])
-        place = np.empty(n * n, np.int64)
-        place[order] = np.arange(n * n)
-        both = [(2 * place[rows] + k, 2 * place[columns] + k) for k in (0, 1)]
-        matrix = csc_matrix((np.tile(values, 2), (np.concatenate([r for r, _ in both]),
-                                                  np.concatenate([c for _, c in both]))))
-        kept.append(fronts.factorise(matrix, firsts).entries / (4 * n * n * np.log2(n)))
-    assert max(kept) <= 1.2 * 31 / 4  # George 1973: 31/4 n^2 log2 n
-
-
 def grounded(pairs, count: int, ground: float):
     """Stiffness (3 count, 3 count) of springs along random rows between pairs (e, 2) of nodes, each held besides."""
     rows = np.random.default_rng(2).normal(size=(len(pairs), 6))

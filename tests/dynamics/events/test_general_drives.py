@@ -10,7 +10,7 @@ from event_run import run, simulate
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from patchfem.core import BaseSine, Outcome, Start
+from patchfem.core import Outcome, Start
 from patchfem.dynamics.events.event_list import BORDER
 from patchfem.response.measures import energy_balance
 from patchfem.structure.drives import Recorded, Sweep
@@ -54,27 +54,6 @@ def test_exact_series_of_a_sweep(sweep):
 
 
 # the motion
-
-@pytest.mark.parametrize("omegas, slides, ratio, faces", [
-    ([1.0], [1.0], 1.0, 1), ([1.0], [1.0], 0.4, 1), ([1.0, 2.3, 4.0], [1.0, 0.5, 0.3], 0.5, 1), (None, None, 0.6, 2)])
-def test_exact_a_sine_as_a_series_moves_like_the_sine(omegas, slides, ratio, faces):
-    modes = random_basis(np.random.default_rng(3), 3, 2) if omegas is None else \
-        basis_of(omegas, 0.003, [slides])
-    static = np.full(faces, 0.7)
-    one, two = (simulate(modes, drive, static, ratio * static, 12, 6)
-                for drive in (BaseSine(1.0, 1.0), Sweep(0.5 / np.pi, 0.5 / np.pi, 200.0, 1.0)))
-    size = np.abs(one.amplitudes).max()
-    np.testing.assert_allclose(two.amplitudes, one.amplitudes, rtol=0, atol=1e-11 * size)
-    np.testing.assert_allclose(two.phasors, one.phasors, rtol=0, atol=1e-11 * size)
-    np.testing.assert_array_equal(two.log.what, one.log.what)
-    np.testing.assert_allclose(two.log.time, one.log.time, rtol=0, atol=1e-11)
-    np.testing.assert_allclose([two.ledger[k] for k in one.ledger], list(one.ledger.values()), rtol=1e-11, atol=1e-11)
-    assert two.acceleration == pytest.approx(one.acceleration, rel=1e-11)
-    assert two.loops[0].stuck == pytest.approx(one.loops[0].stuck, abs=1e-9)
-    np.testing.assert_allclose([x.force for x in two.loops], [x.force for x in one.loops], rtol=1e-11)
-    np.testing.assert_allclose(np.interp(one.window.time, two.window.time, two.window.base_acceleration),
-                               one.window.base_acceleration, atol=1e-4)
-    assert two.loops[0].work == pytest.approx(one.loops[0].work, rel=1e-11)
 
 
 def agrees(modes, drive, static, ratio, end, count):

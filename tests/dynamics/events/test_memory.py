@@ -6,7 +6,6 @@ import pytest
 from patchfem.core import PatchfemError
 from patchfem.dynamics.events import memory_kernels as kernels
 from patchfem.dynamics.events.elements import elements_of, stretches, table_of, virgin
-from patchfem.slip.shear_modes import jenkins_set
 
 
 class Follower:
@@ -57,20 +56,6 @@ def test_exact_memory_is_that_of_elements_one_by_one(seed):
         assert energy == pytest.approx(0.5 * k @ one.stretch**2, rel=1e-10, abs=1e-12)
         np.testing.assert_allclose(k * stretches(one.group, one.memory, 0), k * one.stretch, atol=1e-12)
     assert one.depth <= one.group.yield_slide.size + 1  # a turning point that says nothing more is forgotten
-
-
-@pytest.mark.parametrize("count", (100, 400))
-def test_exact_rod_on_a_friction_bed(count):
-    """H14: EA = tau = P = 1, tip 0.5 and loss 2/3 a cycle in the limit, 2/3 (1 - 1/n^2) of n points."""
-    far = (np.arange(count) + 0.5) / count  # distance of the points from the tip
-    rod = jenkins_set(np.minimum.outer(far, far), np.full(count, 1 / count))
-    one = Follower(rod.stiffness, rod.yield_slide)
-    assert one.to(0.5) == pytest.approx(1.0, rel=1e-12)
-    one.to(-0.5)
-    before = one.lost
-    one.to(0.5)
-    one.to(-0.5)
-    assert one.lost - before == pytest.approx(2 / 3 * (1 - 1 / count**2), rel=1e-10)
 
 
 def test_refuses_elements_that_are_none():

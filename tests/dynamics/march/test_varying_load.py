@@ -5,14 +5,12 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.optimize import brentq
 from varying_load_cases import LAWS, LOAD, MASS, STILL, balance, crowned, elastic, mechanical, modes
 
 from patchfem.contact.unilateral import solve_forces
 from patchfem.core import BaseSine, ModalBasis, PatchfemError, Start
 from patchfem.dynamics.march import varying_load
 from patchfem.friction.bonds.parameters import Bonds
-from patchfem.friction.bonds.recursion import Recursion
 from patchfem.model.structure import strip_rows
 
 POINTED = ["bonds", "growing", "plastic"]  # one loop; that of Coulomb and that of tanh are others to compile
@@ -175,44 +173,6 @@ def loses(name, seed, steps):
     held, spent = held[-1], spent[-1]
     assert done.ledger["friction"] == pytest.approx(spent, abs=1e-9 * (spent + held) + 1e-18)
     assert (np.abs(r.force) <= 0.3 * r.extra["normal_load"] + 1e-9 * LOAD).all()
-
-
-def test_exact_a_prescribed_load_is_a_bench_load_in_a_rig():
-    """One mode under N(t) = max(0, 100 + 150 cos) N against a plain step solve with the law of a bench."""
-    basis = modes([143.0], [1.0], [0.0], [0.0], 0.01)
-    drive, steps = BaseSine(60.0, 2 * np.pi * 143), 200
-
-    def weight(t):
-        return np.maximum(100 + 150 * np.cos(2 * np.pi * 90 * t + 0.3), 0.0)
-
-    done = varying_load.march(basis, drive, None, LAWS["bonds"], 4, steps, 4, load=weight)
-    from patchfem.dynamics.propagator import propagator
-
-    p, law = propagator(basis, drive, steps), Recursion(Bonds(0.3, 1e-6))
-    times, table, beta = np.arange(4 * steps + 1) * p.dt, p.tables(drive, 0, steps), p.beta[0, 0]
-    loads, z, v = weight(times), 0.0, 0.0
-    state, slides, forces = law.start(loads[:1]), [0.0], [0.0]
-    for i in range(4 * steps):
-        middle = (loads[i:i + 1] + loads[i + 1:i + 2]) / 2
-        ready = law.press(state, loads[i:i + 1], middle).state
-        row = table[i % steps]
-        rest = p.free[0, 0] * z + p.free[1, 0] * v + row[0], p.free[2, 0] * z + p.free[3, 0] * v + row[1]
-        free = rest[0] - z
-
-        def miss(dq, ready=ready, middle=middle, free=free):
-            return dq - free + beta * law.step(ready, dq, middle, middle, p.dt).mean[0]
-
-        dq = brentq(miss, free - 2e2 * beta, free + 2e2 * beta, xtol=1e-25, rtol=1e-15)
-        moved = law.step(ready, dq, middle, middle, p.dt)
-        state = law.press(moved.state, middle, loads[i + 1:i + 2]).state
-        accel = -(free - dq) / beta / MASS
-        z, v = rest[0] + p.push[0, 0] * accel, rest[1] + p.push[1, 0] * accel
-        slides.append(z)
-        forces.append(law.traction(state)[0])
-    assert done.response.slide == pytest.approx(np.array(slides), abs=1e-11 * np.abs(slides).max())
-    assert done.response.force == pytest.approx(np.array(forces), abs=1e-7)
-    assert done.response.extra["normal_load"] == pytest.approx(loads, rel=1e-14) and (loads == 0).any()
-    assert balance(done, basis) <= 1e-12
 
 
 def test_exact_strips_slide_by_yaw():

@@ -78,7 +78,6 @@ def dense(basis, drive, law, sets, response, steps: int) -> tuple:
     return np.array(slides), np.array(forces), loads
 
 
-@pytest.mark.share(0)
 @pytest.mark.parametrize("name", ["plastic", "bonds"])
 def test_exact_all_modes_are_the_nodes_themselves(name):
     """Every mode kept, sets that open and close: the march of the nodes behind the dense compliance."""
