@@ -4,14 +4,14 @@ mode, and the limit of slow motion is that of statics."""
 import event_run
 import numpy as np
 import pytest
-from event_reference import basis_of
+from event_reference import basis_of, random_basis
 
-from patchfem.core import BaseSine, ModalBasis
+from patchfem.core import BaseSine, ModalBasis, Segment
 from patchfem.dynamics.events import histories
 from patchfem.dynamics.events.elements import elements_of
 from patchfem.dynamics.events.plant import plant_of
 from patchfem.response.measures import energy_balance
-from patchfem.structure.drives import Recorded, Sweep
+from patchfem.structure.drives import Piecewise, Recorded, Sweep
 
 TWO = basis_of([1.0, 1.7], [0.05, 0.04], [[1.0, 0.5]], [1.0, 0.2], [1.0, -0.4])
 
@@ -49,6 +49,13 @@ def test_exact_long_pieces_are_the_short_ones(monkeypatch, ratio, friction):
     """Each release below kinetic friction rings, in short pieces."""
     groups = event_run.groups_of(TWO, friction, ratio * friction)
     same(*both(monkeypatch, TWO, BaseSine(1.0, 0.0005), groups, 2, 1), fewer=1 / 2 if ratio == 1 else 2 / 3)
+
+
+def test_exact_long_pieces_of_two_faces_and_of_segments(monkeypatch):
+    modes = random_basis(np.random.default_rng(5), 3, 2)
+    drive = Piecewise((Segment(0.0, 0.3, 1.0, 0.0007, 0.2), Segment(5000.0, -0.2, 0.7, 0.001, 1.0)), 12e3)
+    groups = event_run.groups_of(modes, np.array([0.3, 0.5]), np.array([0.3, 0.5]))
+    same(*both(monkeypatch, modes, drive, groups, 1, 1), 1e-11)
 
 
 @pytest.mark.parametrize("drive", [
