@@ -22,19 +22,6 @@ def swept():
     return pf.sweep(RIG, OVER)
 
 
-def test_exact_each_place_is_a_single_run(swept):
-    assert dict(swept.sizes) == {"friction_static": 2, "drive_acceleration": 2}
-    for i, static in enumerate(OVER["friction.static"]):
-        for j, level in enumerate(OVER["drive.acceleration"]):
-            here = swept.isel(friction_static=i, drive_acceleration=j)
-            single = pf.run(RIG, **{"friction.static": static, "drive.acceleration": level})
-            assert here.outcome == single.outcome
-            for name, one in single.measures.items():
-                alike(here[name], one.value, one)
-                alike(here[f"{name}_error"], one.error, one)
-                assert here[name].units == one.unit
-
-
 def test_exact_numbers_texts_ranges_and_the_table_say_the_same(swept):
     table = '[sweep]\n"friction.static" = "0.1,0.3"\n"drive.acceleration" = "1 g..5 g:2"\n'
     numbers = {"friction.static": np.array([0.1, 0.3]), "drive.acceleration": swept.drive_acceleration.values}

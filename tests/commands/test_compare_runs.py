@@ -108,12 +108,6 @@ def test_exact_the_verb_says_what_python_says_and_writes_a_page(runs, tmp_path):
     assert found["verdict"] in table and "worn volume" in table and "pressure peak" in table
 
 
-@pytest.mark.parametrize("ends, kind", [((0.0, 2.0), "a wedge"), ((2.0, 0.3), "a wedge"), ((1.0, 2.0), "uniform wear "
-                                         "with a wedge"), ((2.0, 1.7), "uniform wear"), ((1.0, 1.0), "uniform wear")])
-def test_exact_kinds_of_hidden_wear(ends, kind):
-    assert worn.describe_hidden_wear(ends) == kind
-
-
 STORY = re.search(r"in three commands:\n\n```bash\n(.*?)```\n\n((?:> [^\n]*\n)+)", GUIDE.read_text(), re.S)
 QUICK = ["--set", "drive.cycles=20", "--set", "contact.element_size=0.8 mm", "--set", "wear.jumps=2"]
 

@@ -29,7 +29,6 @@ from patchfem.export.summary import loop_of
 from patchfem.response.outcome import OPEN_LOOP
 from patchfem.response.rows import ROWS as MOTION
 from patchfem.runs.results.patch_rows import ROWS as STATIC
-from patchfem.runs.rig.rig import Passes
 from patchfem.scene.keys.quantities import KINDS
 from patchfem.scene.starting import text_of
 
@@ -107,15 +106,6 @@ def test_exact_progress_as_lines(capsys):
                                       "100% done, about 0 s left\n"
 
 
-def test_exact_progress_counts_all_passes_by_their_steps():
-    """A run at 400 steps a cycle, its half and its quarter, then one at 800 that nobody foresaw: no share falls."""
-    told = []
-    passes = Passes(told.append, 700)
-    for steps in (400, 200, 100, 800):
-        assert passes.told(steps, lambda progress: [progress(0.5), progress(1.0)] and "gone") == "gone"
-    assert told == pytest.approx([200 / 700, 400 / 700, 500 / 700, 600 / 700, 650 / 700, 1, 1, 1])
-
-
 def test_always_the_first_screen_has_an_example_of_every_verb_that_is_read():
     screen = cli().out
     assert screen == cli("--help").out and max(map(len, screen.splitlines())) <= 80
@@ -134,14 +124,6 @@ def test_always_a_plan_says_what_does_not_run_where_it_is_asked(tmp_path):
     assert "\nabsent" not in short and long.startswith(short) and "\nabsent" in f"\n{long[len(short):]}"
     assert "friction.law=iwan" in long[len(short):]
     assert "N/mm -> " in short and "the largest force of the drive" in short and "e+0" not in short
-
-
-def test_exact_a_run_that_compiles_tells_no_pace_at_its_first_share(capsys):
-    times = iter([0.0, 14.0, 25.0])
-    lines = shared.Lines(lambda: next(times))
-    for share in (0.003, 0.5):
-        lines(share)
-    assert capsys.readouterr().err == "0% done\n50% done, about 11 s left\n"
 
 
 @pytest.mark.parametrize("cycles, text", [

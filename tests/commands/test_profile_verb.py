@@ -7,12 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import ALWAYS, FROM_SHELL, cli, loaded
-from synthetic import sine
 
 from patchfem.export.results import FILES
 from patchfem.surface.files.read import read_surface
 from patchfem.surface.roughness.report import report_of
-from patchfem.surface.roughness.rows import AREAL, TABLE
 
 UM = 1e-6
 
@@ -167,9 +165,3 @@ def test_exact_the_flatness_of_the_brake_reuss_beam():
     answer = json.loads(cli("profile", folder / "brb_surface_data.mat", "--units", "m,m", "--json").out)["profiles"][0]
     assert answer["measures"]["Sz"]["value"] == pytest.approx(known["flatness_PV_um"] * UM, rel=1e-6)
     assert sorted(answer["shape"]) == [54, 246] and "596 of 13284 heights are missing" in answer["notes"][-1]
-
-
-def test_exact_every_parameter_of_the_table_is_in_some_report():
-    trace = sine(np.arange(4000) * UM, UM, 80 * UM, 0.2)
-    found = {one.name for one in report_of(trace, 250 * UM, (100 * UM, 3900 * UM)).values}
-    assert found == set(TABLE) - {row.name for row in AREAL}

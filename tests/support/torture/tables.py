@@ -1,16 +1,11 @@
-"""Files of numbers with wrong cells, heads and bytes: traces, scans, signals, paths, rows, universal and MATLAB files.
+"""Files of numbers with wrong cells, heads and bytes: traces, signals, paths, rows, loops and universal files.
 
 A wound that leaves no meaning (a word for a number, no unit, no rows, time that goes back) must be refused.
 """
 
-import io
-import json
-import zipfile
-
 import numpy as np
 import pyuff  # here, before any fork, as the next: each trial by itself would wait for them
 import scipy.optimize  # noqa: F401
-from scipy.io import savemat
 
 from .results import ran
 from .scenes import damage
@@ -123,46 +118,6 @@ def answered(trial: Trial, bad: bool, *words) -> None:
         strict(ended.out)
 
 
-def instruments(trial: Trial) -> None:
-    """Traces and scans as instruments and programs write them, with wounded bytes."""
-    kind = trial.draw("npy", "mat", "x3p", "dektak", "npz", "matrix")
-    x, z = np.arange(40.0), trial.r.normal(size=40)
-    file = io.BytesIO()
-    if kind == "npy":
-        np.save(file, trial.draw(np.column_stack([x, z]), np.empty((0, 2)), np.array([x, z], object), z[:, None, None],
-                                 np.full((5, 2), np.nan), np.column_stack([x, z]).astype("f2")), allow_pickle=True)
-    elif kind == "mat":
-        savemat(file, trial.draw({"x": x, "z": z}, {"z": z}, {"a": np.column_stack([x, z])}, {"x": x, "z": z[:3]},
-                                 {"x": x, "z": "text"}, {"x": x, "z": z * 1j}, {"x": {"y": 1}}, {}))
-    elif kind == "npz":
-        np.savez(file, x=x, z=z)
-    elif kind == "x3p":
-        _x3p(file, z)
-    elif kind == "matrix":
-        head = trial.draw("# Width: 8 um\n# Height: 5 um\n# Value units: um\n", "h = 5, w = 8\npixel size = 1 um\n",
-                          "# Breite: 8,0 µm\n# Höhe: 5,0 µm\n# Einheiten: um\n", "")
-        file.write((head + "".join("\t".join(f"{one:.4f}" for one in row) + "\n" for row in z.reshape(5, 8))).encode())
-    else:
-        file.write(("Scan Parameters\nLength,40 um\nStylus,Radius: 2.5 um\n\nLateral um,Raw Micrometer,\n"
-                    + "".join(f"{a:.1f},{b:.4f},\n" for a, b in zip(x, z))).encode())
-    data = file.getvalue() if trial.chance(0.3) else wounded(trial, file.getvalue())
-    name = "scan." + {"dektak": "csv", "matrix": "txt"}.get(kind, kind)
-    (trial.folder / name).write_bytes(data)
-    units = ("--units", "um,um") if kind in ("npy", "mat") or trial.chance(0.1) else ()
-    answered(trial, False, "profile", name, "--json", *units)
-
-
-def _x3p(file, z) -> None:
-    axes = "".join(f"<{name}><AxisType>{kind}</AxisType><DataType>D</DataType><Increment>1e-6</Increment>"
-                   f"<Offset>0</Offset></{name}>" for name, kind in (("CX", "I"), ("CY", "I"), ("CZ", "A")))
-    xml = ("<p:ISO5436_2 xmlns:p='http://www.opengps.eu/2008/ISO5436_2'><Record1><Revision>ISO5436 - 2000</Revision>"
-           f"<FeatureType>PRF</FeatureType><Axes>{axes}</Axes></Record1><Record3><MatrixDimension><SizeX>{z.size}"
-           "</SizeX><SizeY>1</SizeY><SizeZ>1</SizeZ></MatrixDimension><DataList>"
-           + "".join(f"<Datum>{one:.6g}</Datum>" for one in z) + "</DataList></Record3></p:ISO5436_2>")
-    with zipfile.ZipFile(file, "w") as archive:
-        archive.writestr("main.xml", xml)
-
-
 def signals(trial: Trial) -> None:
     """A recorded base motion of a rig."""
     data, bad = csv(trial, "signal")
@@ -211,27 +166,3 @@ def universal(trial: Trial) -> None:
         (trial.folder / "scene.toml").write_text(text_of(
             RUBS | {"structure": {"file": "lab.uff", "slide_at": "1:+x"}, "drive": BASE}), "utf-8")
         ran(trial, "scene.toml")
-
-
-def arrays(trial: Trial) -> None:
-    """Matrices of a rig in .npz and .mat, and records in .mat."""
-    mass, spring = np.diag([1.0, 0.5]), np.array([[3e5, -1e5], [-1e5, 1e5]])
-    given = {"M": mass, "K": spring, "C": 1e-5 * spring}
-    name = trial.draw(*given)
-    given[name] = trial.draw(
-        given[name], given[name] * (1 + 0.2j), -given[name], given[name][:1], np.empty((0, 0)), given[name] * np.nan,
-        given[name] * 1e300, given[name] * 1e-300, np.zeros((2, 2)), np.array([["a", "b"]]), given[name].astype(object),
-        np.ones((2, 2, 2)), given[name].astype("i1"), given[name] + [[0, 1e3], [0, 0]], np.array(3.0))
-    ending, file = trial.draw("npz", "mat"), io.BytesIO()
-    if ending == "npz":
-        np.savez(file, **given)
-    else:
-        savemat(file, given)
-    data = file.getvalue() if trial.chance(0.5) else wounded(trial, file.getvalue())
-    (trial.folder / f"rig.{ending}").write_bytes(data)
-    at = json.loads(trial.draw('{"slide_at": "1"}', '{"slide_at": "2", "base_at": "1"}', '{"slide_at": "9"}', "{}"))
-    (trial.folder / "scene.toml").write_text(text_of(
-        RUBS | {"structure": {"file": f"rig.{ending}"} | at, "drive": BASE}), "utf-8")
-    ran(trial, "scene.toml")
-    if ending == "mat":
-        trial.run("import", "rig.mat", "-o", "out.csv", "--map", "force=K(:,1) [N]", "--map", "time=M(:,1) [s]")
