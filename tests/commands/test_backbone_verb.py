@@ -69,16 +69,6 @@ def test_the_largest_damping_is_told_of_the_amplitudes_that_were_computed(scene,
         assert told in shown and ("largest" in shown) == bool(told)
 
 
-@pytest.mark.parametrize("words, said", [
-    (("--amplitudes", "1..2"), "bare number"), (("--amplitudes", "1 um..x"), "--amplitudes"),
-    (("--mode", "yaw"), "the modes of the rig are axial"), (("--method", "static"), "balance"),
-    (("--amplitudes", "0 um,1 um"), "--amplitudes")])
-def test_refuses_with_the_option_that_is_wrong(scene, capsys, words, said):
-    assert run("backbone", "joint.toml", *words) == 2
-    told = capsys.readouterr().err
-    assert said in told and "Traceback" not in told
-
-
 def test_exact_a_frequency_that_its_error_exceeds_is_in_the_table_alone():
     """One of 3.6 +- 9.8 kHz beside others of 100 Hz stretched the axis of the picture."""
     a, none = np.array([1e-6, 2e-6, 3e-6]), np.full(3, np.nan)

@@ -153,31 +153,6 @@ def test_refuses_from_python_what_the_command_refuses(files, count, direction, s
         pf.compare(*(files[0],) * count, direction=direction)
 
 
-def test_refuses_a_scene_without_a_patch(files, tmp_path):
-    (tmp_path / "point.toml").write_text('[normal]\nload = "10 N"\n[friction]\nlaw = "coulomb"\nstatic = 0.3\n[slide]\n'
-                                         'kind = "sine"\namplitude = "1 um"\nfrequency = "10 Hz"\n')
-    answer = cli("compare", *files[:2], "--scene", tmp_path / "point.toml", "-o", tmp_path / "out")
-    assert answer.code == 2 and "the scene has no [contact]" in answer.err
-
-
-@pytest.mark.parametrize("words, says", [
-    (("--direction", "z"), "compare --direction z: the direction must be x or y"),
-    (("--datum", "bent"), "compare --datum bent: give --datum straight, or leave it out if the datum may be bent"),
-    (("third.csv",), "compare: 3 files; two files are needed, or four"),
-])
-def test_refuses_with_exit_code_2(files, words, says):
-    answer = cli("compare", *files[:2], *words)
-    assert answer.code == 2 and says in answer.err and answer.out == ""
-
-
-def test_refuses_traces_too_short_for_the_band(tmp_path):
-    p = pair(1)
-    short = written(tmp_path / "short.csv", Profile(p.before.x[:150], p.before.z[:150], ""))
-    answer = cli("compare", short, short, "-o", tmp_path / "out")
-    assert answer.code == 2 and "but not the whole band 60 um to 110 um" in answer.err
-    assert not (tmp_path / "out").exists()
-
-
 def test_exact_neither_meshes_nor_compiled_code_are_imported(files, tmp_path):
     modules = loaded(FROM_SHELL, "compare", *files[:2], "-o", tmp_path / "out")
     assert not modules & {*ALWAYS, "skfem"}
@@ -194,16 +169,6 @@ def test_refuses_a_folder_with_files_of_others(tmp_path, verb):
     answer = cli(verb, *files, "-o", tmp_path / "data")
     assert answer.code == 2 and "not patchfem results" in answer.err
     assert all(path.read_text() == rows for path in files) and len(list((tmp_path / "data").iterdir())) == 2
-
-
-def test_refuses_what_is_not_there(files, tmp_path):
-    """A missing trace ends with 4, without a word of a scene where none is given; a missing scene with 2."""
-    answer = cli("compare", files[0], tmp_path / "none.csv", "-o", tmp_path / "out")
-    assert answer.code == 4 and answer.err.strip() == f"{tmp_path / 'none.csv'}: there is no such file"
-    for words in (("run", tmp_path / "none.toml"), ("compare", *files[:2], "--scene", tmp_path / "none.toml")):
-        answer = cli(*words, "-o", tmp_path / "out")
-        assert answer.code == 2 and "none.toml: cannot be read: No such file" in answer.err
-    assert not (tmp_path / "out").exists()
 
 
 def test_exact_a_told_shift_is_a_length(files, tmp_path, no_page):

@@ -280,19 +280,6 @@ def test_always_a_ratio_written_as_per_cent_is_remarked(tmp_path):
     assert "damping = 1 is a damping ratio: 1 means critical" in said[2].err
 
 
-def test_refuses_with_the_key_that_was_meant(tmp_path):
-    """A table where a key in it is wanted, a key without its table, and a verb that is an option."""
-    path = tmp_path / "rig.toml"
-    path.write_text(text_of("rig"), "utf-8")
-    swept = cli("sweep", path, "--over", "contact.tilt=1 urad,2 urad", "-o", tmp_path / "sweep")
-    assert swept.code == 2 and ("contact.tilt: is a table without a value of its own; choose a key of this table: "
-                                "contact.tilt.angle") in swept.err
-    bare = cli("check", path, "--set", "acceleration=20 g")
-    assert bare.code == 2 and "acceleration: unknown key; did you mean 'drive.acceleration'?" in bare.err
-    lost = cli("help")
-    assert lost.code == 2 and "`patchfem --help`" in lost.err and "`patchfem run --help`" in lost.err
-
-
 def test_exact_a_second_interface_reads_in_the_units_of_the_first():
     one = {"value": 1.0, "error": 0.0, "unit": "1"}
     assert pair("stick_fraction_2", one) == pair("stick_fraction", one) == "100 %"

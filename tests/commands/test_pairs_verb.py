@@ -94,18 +94,6 @@ def test_refuses_a_table_that_is_none(tmp_path, text, says):
         read_pairs(path)
 
 
-@pytest.mark.parametrize("words, code, says", [
-    (("--pairs", "nowhere.csv"), 4, "nowhere.csv: no such table"),
-    (("a.csv", "b.csv", "--pairs", "pairs.csv"), 2, "give the table alone, without other files"),
-    (("a.csv",), 2, "compare: give two files BEFORE and AFTER, or a table of pairs with --pairs"),
-    (("--pairs", "pairs.csv", "--scene", "rig.toml"), 2, "give the table alone, without --scene"),
-])
-def test_refuses_with_the_exit_code_of_the_contract(tmp_path, monkeypatch, words, code, says):
-    monkeypatch.chdir(tmp_path)
-    answer = cli("compare", *words)
-    assert answer.code == code and says in answer.err and answer.out == ""
-
-
 def test_refuses_a_table_of_which_no_pair_can_be_compared(tmp_path):
     (tmp_path / "pairs.csv").write_text("before,after\na.csv,b.csv\n")
     answer = cli("compare", "--pairs", tmp_path / "pairs.csv", "-o", tmp_path / "out")

@@ -103,24 +103,6 @@ def test_exact_means_over_files_a_table_of_them_and_the_levelled_heights(tmp_pat
     assert "counts twice" in cli("profile", names[0], names[0]).out
 
 
-@pytest.mark.parametrize("words, says", [
-    (("--cutoff", "0.25"), "patchfem: profile --cutoff: '0.25' is a bare number without a unit"),
-    (("--cutoff", "-1 mm"), "patchfem: profile --cutoff -1 mm: a length above zero is needed"),
-    (("--cutoff", "5 mm"), "the trace is 4 mm long; half a cut-off of 5 mm is trimmed at each end"),
-    (("--window", "1 mm"), "--window '1 mm': two positions are needed, such as '468 um,733 um'; a scan needs four"),
-    (("--window", "1 mm,9 mm"), "the window runs from 1 mm to 9 mm, but the trace runs from 0 um to 4 mm"),
-    (("--units", "mm"), "give two units, of x and of z"),
-])
-def test_refuses_with_exit_code_2(trace, words, says):
-    answer = cli("profile", trace, *words)
-    assert answer.code == 2 and says in answer.err and answer.out == ""
-
-
-def test_refuses_a_file_that_is_not_there(tmp_path):
-    answer = cli("profile", tmp_path / "none.csv")
-    assert answer.code == 4 and "none.csv: there is no such file" in answer.err
-
-
 def test_refuses_a_text_without_units(tmp_path):
     path = tmp_path / "bare.csv"
     path.write_text("".join(f"{k},{k % 7}\n" for k in range(50)))

@@ -146,13 +146,3 @@ def test_always_help_says_what_each_option_does_by_an_example(verb):
     words = shlex.split(" ".join(about[2].split()))
     assert words[:2] == ["patchfem", verb]
     assert app.parse_args(words[1:], exit_on_error=False, print_error=False)[0].__name__.rstrip("_") == verb
-
-
-def test_refuses_words_too_many_by_what_they_are():
-    answer = cli("new", "misalignment", "tilts.toml")
-    assert answer.code == 2 and answer.err == "patchfem: unexpected 'tilts.toml'; see `patchfem new --help`\n"
-    for words, said in ((("scatter", "--help"), "unknown verb 'scatter'; see `patchfem --help`"),
-                        (("swep", "a.toml"), "unknown verb 'swep'; did you mean `sweep`? see `patchfem --help`"),
-                        (("--foo",), "unknown option '--foo'; see `patchfem --help`")):
-        answer = cli(*words)
-        assert (answer.code, answer.err) == (2, f"patchfem: {said}\n")

@@ -24,7 +24,7 @@ from patchfem.elasticity.elasticity import lame
 from patchfem.elasticity.recovery import cells_of, quadratures
 from patchfem.export.fields import bodies, vtkhdf
 from patchfem.export.fields.series import Series
-from patchfem.export.fields.vtkhdf import NAME, rounded
+from patchfem.export.fields.vtkhdf import NAME, rounded, stepped
 from patchfem.export.fields.vtu import export
 
 KILLED = """\
@@ -184,3 +184,16 @@ def test_always_an_exported_series_is_about_as_small_as_the_fields(tmp_path, mon
     for name in ("stress", "von_mises"):
         assert np.array_equal(mesh.cell_data[name], frame.blocks["lower"].cell_data[name])
     assert np.array_equal(mesh.point_data["displacement"], frame.blocks["lower"].point_data["displacement"])
+
+
+@pytest.mark.parametrize("power", [-30, -3, 0, 12])
+def test_exact_rounding_to_a_step_is_to_the_nearest_multiple(power):
+    step = 2.0**power
+    values = (np.random.default_rng(power + 30).normal(size=6000) * step * 10.0**np.arange(-3, 9).repeat(500))
+    values = values.astype(np.float32)
+    found = stepped(values, step)
+    whole = found.astype(float) / step
+    assert found.dtype == np.float32 and np.array_equal(whole, np.round(whole))
+    assert (abs(found.astype(float) - values) <= step / 2).all() and (found != values).any()
+    odd = np.array([0.0, -0.0, np.inf, -np.inf, np.nan, 3e38], np.float32)
+    assert np.array_equal(stepped(odd, step), odd, equal_nan=True)

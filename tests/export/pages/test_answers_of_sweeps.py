@@ -315,3 +315,21 @@ def test_exact_keys_whose_intervals_overlap_stand_in_no_order():
     grid = [Share("a", 0.6, 0.6, 0.6, 0.6), Share("b", 0.4, 0.4, 0.4, 0.4), Share("c", 0.005, 0.005, 0.005, 0.005)]
     assert ranked.sentence({name: grid}) == ("Loop area depends most on a, which contributes to 60 % of the variance, "
                                              "then on b (40 %), then on c (below 1 %).")
+
+
+def test_always_a_motionless_case_of_a_sweep_over_levels_has_no_peak_frequency(tmp_path):
+    """Up to 3 g the block sticks at all frequencies: the first of them, 100.0 +- 0 Hz, was given as its peak."""
+    scene = tmp_path / "rig.toml"
+    scene.write_text(text_of("rig"), "utf-8")
+    swept = ["drive.waveform=sweep", "drive.from=140 Hz", "drive.to=146 Hz", "drive.rate=1 Hz/s",
+             "accuracy.method=harmonic"]
+    cli("sweep", scene, *(word for one in swept for word in ("--set", one)), "--over",
+                 "drive.acceleration=2 g,6 g", "-o", tmp_path / "out")
+    table = read_table(tmp_path / "out")
+    assert np.isnan(table["measures"]["peak_frequency"]["values"][0])
+    text = (tmp_path / "out" / "report.html").read_text("utf-8")
+    cases = text[text.index("id=cases"):] if "id=cases" in text else text[text.index(">Cases<"):]
+    assert "peak frequency [Hz]" in cases[:cases.index("</table>")].replace("</a>", "")
+    said = cli("run", scene, *(word for one in swept for word in ("--set", one)), "--set", "drive.acceleration=2 g",
+               "-o", tmp_path / "run").out
+    assert "peak_frequency                     - (the output does not move at any of the swept frequencies" in said

@@ -2,6 +2,7 @@
 
 import csv
 import shutil
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -9,8 +10,10 @@ from command_line import cli
 from limits import limited
 from scene_texts import COULOMB, POINT, SHORT
 
+from patchfem.campaigns.sweeps import sweep
 from patchfem.export.sweeps import chunks
 from patchfem.export.sweeps.chunks import Chunks
+from patchfem.runs.many import answers as kept
 from patchfem.runs.many import many
 from patchfem.runs.many.answers import Answers
 
@@ -165,3 +168,22 @@ def test_a_sweep_without_room_for_its_first_case_leaves_no_folder_but_what_was_t
     assert found.code == 4 and "a case cannot be written" in found.err
     assert [place.read_text() for place in tmp_path.rglob("*") if place.is_file()] == ["older"] * older
     assert [place.name for place in tmp_path.rglob("*") if place.is_dir()] == ["out"] * older
+
+
+def test_exact_columns_on_disk_make_the_same_tables(swept, scene, tmp_path, monkeypatch):
+    monkeypatch.setattr(kept, "MANY", 10)
+    monkeypatch.setattr(chunks, "MOST", 16)
+    monkeypatch.setattr(sweep, "MOST", 16)
+    out = tmp_path / "out"
+    assert cli("sweep", scene, *OVER, "-o", out, "--keep", "none").code == 3
+    for name in TABLES:
+        assert (out / name).read_bytes() == (swept / name).read_bytes()
+    assert 7 <= len(list((out / "chunks").iterdir())) <= 14
+    total = Answers.blank(11, tmp_path)
+    total.measure("loop_area", "J")
+    assert isinstance(total.values["loop_area"], kept.OnDisk)
+    total.values["loop_area"][[3, 5]] = 1.5, 2.5
+    assert total.values["loop_area"][3:6].tolist()[::2] == [1.5, 2.5] and np.isnan(total.values["loop_area"]).sum() == 9
+    assert np.asarray(total.values["loop_area"].reshape((11, 1))).shape == (11, 1) == np.shape(
+        total.values["loop_area"].reshape((11, 1)))
+    assert not [one for one in Path(tmp_path).iterdir() if one.name != "out"]

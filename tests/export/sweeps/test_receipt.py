@@ -97,3 +97,13 @@ def test_always_a_file_that_a_sweep_names_anywhere_counts(tmp_path, monkeypatch,
         assert told.code == 2 and "contains a sweep of another scene" in told.err
         assert cli("sweep", "rig.toml", *words, "--keep", "none", "-o", "out").code == 0
     assert last() == pytest.approx(2 * first, rel=1e-9)
+
+
+def test_always_the_content_of_a_file_that_a_word_names_counts(swept):
+    scene, *_ = swept
+    other = scene.parent / "push.csv"
+    other.write_text("1", encoding="utf-8")
+    before = receipt.sign(scene, words('drive.file="push.csv"'))
+    other.write_text("2", encoding="utf-8")
+    assert before != receipt.sign(scene, words('drive.file="push.csv"'))
+    assert receipt.sign(scene.parent / "none.toml", words()) == "" and receipt.read(scene.parent, "") == {}
