@@ -1,14 +1,18 @@
-"""For every test: one BLAS thread, so that two cores serve two tests, and no deadline, so that a busy machine fails
-nothing. A property test draws 20 examples, 5 where each is costly; with `-m slow` all of them run again, with ten times
-as many. The examples are the same in every run, so that a failure is of the change at hand; PATCHFEM_SEARCH=1 draws new
-ones."""
+"""Settings of all tests.
+
+- BLAS has one thread, so that two workers use two cores.
+- Property tests have no deadline and draw the same 20 examples in every run (5 under the profile "costly"). With
+  `-m slow` they draw ten times as many; with PATCHFEM_SEARCH=1 they draw new ones.
+- Cases of a test marked `share(places)` that are not at these places are marked slow.
+- Workers start with different folders, so that they do not wait for each other's compiled code.
+"""
 
 import gc
 import os
 import sys
 from pathlib import Path
 
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before numpy is imported, here and in child processes
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # set before NumPy is imported, here and in child processes
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -18,46 +22,54 @@ from patchfem.compiled import UNKEPT, cache_folder
 
 HERE = Path(__file__).parent
 
-os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))  # else an edited kernel runs as its old self
+# Without a folder per version of the sources numba runs the old code of an edited kernel.
+os.environ.setdefault("NUMBA_CACHE_DIR", str(cache_folder()))
 
-# half of the tests, in folders whose runs compile; then those that compile nothing, then what meets compiled code again
+# Folders whose tests compile code run first, folders that use this code again run last, all others in between.
 COMPILING = ("dynamics", "export", "model", "campaigns", "response", "runs", "commands", "friction")
 LATER = ("structure", "wear", "scene", "identify", "torture", "studies")
-compiled.PATIENCE = -1.0  # a test runs what is compiled, also where nothing is kept and little would have to run
 
-if sys.dont_write_bytecode:  # hundreds of child processes would each compile all that they import
-    sys.dont_write_bytecode, sys.pycache_prefix = False, str(cache_folder() / "bytecode")
+compiled.PATIENCE = -1.0  # a test runs compiled code also where a short run would choose plain Python
+
+if sys.dont_write_bytecode:
+    # Hundreds of child processes would each translate all modules that they import.
+    sys.dont_write_bytecode = False
+    sys.pycache_prefix = str(cache_folder() / "bytecode")
     os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
 
-def kept() -> set:
-    """Files of compiled functions."""
+def list_compiled_functions() -> set:
+    """Return the cached files of compiled functions."""
     return set((cache_folder() / "code").glob("*.code"))
 
 
-KEPT = kept()
+COMPILED_BEFORE = list_compiled_functions()
 
 
 def pytest_configure(config):
-    """How many examples a property test draws; "costly" is for @settings. Of the workers every other one collects from
-    the end: what one of them has read and rewritten the other finds as bytecode."""
-    odd = int(getattr(config, "workerinput", {}).get("workerid", "gw0")[2:]) % 2
-    if odd and len(config.args) == 1 and Path(config.args[0]).is_dir():
-        config.args = [str(path) for path in sorted(Path(config.args[0]).iterdir(), reverse=True)
+    """Set the number of examples, and let every second worker collect the folders in reverse order.
+
+    Two workers that collect in opposite orders do not translate the same modules to bytecode at the same time.
+    """
+    worker = int(getattr(config, "workerinput", {}).get("workerid", "gw0")[2:])
+    if worker % 2 and len(config.args) == 1 and Path(config.args[0]).is_dir():
+        paths = sorted(Path(config.args[0]).iterdir(), reverse=True)
+        config.args = [str(path) for path in paths
                        if path.match("test_*.py") or (path.is_dir() and path.name[0].isalpha())]
-    often = 10 if config.option.markexpr == "slow" else 1
-    for name, examples in (("patchfem", 20 * often), ("costly", 5 * often)):
-        settings.register_profile(name, max_examples=examples, deadline=None, suppress_health_check=list(HealthCheck),
+    factor = 10 if config.option.markexpr == "slow" else 1
+    for name, examples in (("patchfem", 20), ("costly", 5)):
+        settings.register_profile(name, max_examples=examples * factor, deadline=None,
+                                  suppress_health_check=list(HealthCheck),
                                   derandomize="PATCHFEM_SEARCH" not in os.environ)
     settings.load_profile("patchfem")
 
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_xdist_auto_num_workers(config):
-    """One worker a core for folders; none for files, single tests, -k and --lf, which are done before workers start."""
-    chosen = config.option.keyword or config.option.lf or config.option.collectonly
-    if chosen or not all(Path(word).is_dir() for word in config.args):
+    """Return one worker per core for folders, none for files, single tests, -k and --lf, which end sooner without."""
+    is_selection = config.option.keyword or config.option.lf or config.option.collectonly
+    if is_selection or not all(Path(word).is_dir() for word in config.args):
         config.option.dist = "no"
         return 0
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
@@ -65,43 +77,49 @@ def pytest_xdist_auto_num_workers(config):
 
 @pytest.hookimpl(hookwrapper=True)
 def pytest_pycollect_makeitem(collector):
-    """The cases of a test marked `share(places)` that stand at other places than these become slow, and with `-m slow`
-    all property tests."""
+    """Mark as slow what a normal run leaves out.
+
+    These are the cases of a test marked `share(places)` at other places. With `-m slow` all property tests are among
+    them, because they draw more examples there.
+    """
     made = (yield).get_result()
     for place, case in enumerate(made if isinstance(made, list) else ()):
         mark = case.get_closest_marker("share") if isinstance(case, pytest.Function) else None
-        again = collector.config.option.markexpr == "slow" and hasattr(getattr(case, "obj", None), "hypothesis")
-        if again or (mark and place not in [one % len(made) for one in mark.args]):
+        is_left_out = mark is not None and place not in [kept % len(made) for kept in mark.args]
+        draws_more = collector.config.option.markexpr == "slow" and hasattr(getattr(case, "obj", None), "hypothesis")
+        if is_left_out or draws_more:
             case.add_marker("slow")
 
 
 def pytest_collection_modifyitems(items):
-    """Of two workers one begins with the folders whose runs compile, the other in the middle, with those whose tests
-    compile nothing: neither waits for what the other compiles."""
-    rank = {name: place - len(COMPILING) for place, name in enumerate(COMPILING)} | {
-        name: place + 1 for place, name in enumerate(LATER)}
+    """Sort the tests by folder: those that compile code, those that need none, those that use compiled code again."""
+    rank = {name: place - len(COMPILING) for place, name in enumerate(COMPILING)}
+    rank |= {name: place + 1 for place, name in enumerate(LATER)}
 
-    def place(item) -> tuple:
+    def place_of(item) -> tuple:
         parts = item.path.relative_to(HERE).parts
         return rank.get(parts[0], 0 if len(parts) > 1 else 1), parts
 
-    items.sort(key=place)
+    items.sort(key=place_of)
 
 
 def pytest_terminal_summary(terminalreporter):
-    """What a cold run is told from a warm one by."""
-    terminalreporter.write_line(f"{len(KEPT)} compiled functions were kept, {len(kept() - KEPT)} more are now, in "
+    """Print how much code the run had to compile, which tells a cold run from a warm one."""
+    new = len(list_compiled_functions() - COMPILED_BEFORE)
+    terminalreporter.write_line(f"{len(COMPILED_BEFORE)} compiled functions were kept, {new} more are now, in "
                                 f"{cache_folder()}")
 
 
 def pytest_collection():
-    """No search for garbage among what is imported and collected."""
+    """Switch the garbage collector off while modules are imported and tests are collected."""
     gc.disable()
 
 
 def pytest_collection_finish(session):
-    """What has been imported and collected stays for good: no search for garbage goes through it again, and later ones
-    are rare, a twelfth of the CPU time of tests of much Python."""
+    """Keep what is imported and collected out of later searches for garbage, and make these rare.
+
+    This saves a twelfth of the CPU time of tests that run mostly Python.
+    """
     gc.collect()
     gc.freeze()
     gc.enable()
@@ -110,9 +128,13 @@ def pytest_collection_finish(session):
 
 @pytest.fixture(autouse=True)
 def machine_code_is_kept():
-    """Every compiled function that a test calls must be one whose machine code is kept: else each process that calls it
-    waits for numba, and where it is not cached either, for its compiler."""
+    """Fail a test that calls a compiled function whose machine code cannot be cached.
+
+    Each process that calls such a function would wait for numba and its compiler.
+    """
     yield
-    unkept, _ = sorted(UNKEPT), UNKEPT.clear()
-    assert not unkept, f"not kept as machine code: {', '.join(unkept)}; it allocates, or an argument is no float, " \
-        "whole number, array or tuple of these"
+    uncached = sorted(UNKEPT)
+    UNKEPT.clear()
+    assert not uncached, (
+        f"not kept as machine code: {', '.join(uncached)}; such a function allocates memory, or an argument is not a "
+        "number, an array or a tuple of these")
