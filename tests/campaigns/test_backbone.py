@@ -99,7 +99,7 @@ def test_a_mode_that_gains_energy_has_the_amplitude_of_flutter():
     assert found.flutter == pytest.approx(told.value, rel=0.01)
 
 
-def test_two_modes_are_told_by_name_and_held_by_shape():
+def test_two_modes_are_chosen_by_name_and_matched_by_shape():
     """The held mode with most of the axial coordinate is the axial one, whatever its place among the frequencies."""
     scene = shaken('law = "elastic-plastic"\nbond_length = "1 um"').replace("[drive]", """[[structure.mode]]
 name = "yaw"
@@ -359,7 +359,7 @@ def test_errors_say_what_they_leave_out_of_the_mesh():
     assert plain.curves and not any("the errors of" in note for note in plain.notes)
 
 
-def test_the_held_frequency_is_that_of_the_stiffness_which_a_run_prints():
+def test_the_stuck_frequency_follows_from_the_stiffness_of_a_run():
     found = backbone(pf.build(CROWNED), "", [1e-6], ("quasi-static",))
     told = pf.run(CROWNED[:CROWNED.index("[structure]")] + '[slide]\nkind = "sine"\namplitude = "1 um"\n'
                   'frequency = "1 Hz"\n').measures["tangential_stiffness"]

@@ -69,7 +69,7 @@ def test_exact_the_table_has_every_value_its_error_and_its_distance_to_the_best(
     assert "<svg" in (tmp_path / "out" / "cost_element_size.svg").read_text("utf-8")
 
 
-def test_exact_the_cheapest_run_is_one_that_finer_ones_confirm():
+def test_exact_the_cheapest_run_is_confirmed_by_finer_ones():
     runs = [made("lucky", 1, 1e-6, 1e-6), made("bad", 2, 1e-1, 1e-1), made("good", 3, 1e-3, 1e-3),
             made("best", 9, 1e-5)]
     assert cheapest(runs, 1e-2) == {"a": "good"} and cheapest(runs, 1e-6) == {"a": None}
@@ -90,7 +90,7 @@ def test_exact_the_sentence_names_the_cheapest_run_or_the_worst_measure():
     assert sentence(bold, 1e-2) == within
 
 
-def test_exact_of_settings_that_cost_the_same_the_smallest_is_named_and_one_without_effect_is_told():
+def test_exact_of_settings_of_equal_cost_the_smallest_is_named():
     """1600 steps per cycle at 0.042 CPU s were named where 100 at 0.040 s met the tolerance, with the same results."""
     seconds = {"100": 0.0402, "200": 0.0401, "400": 0.0404, "800": 0.0415, "1600": 0.0423}
     still = [made(label, each, 1e-3, 0.0) for label, each in seconds.items()]

@@ -129,7 +129,7 @@ def free_of(*names):
 # ---- every law from a loop of known numbers
 
 @pytest.mark.parametrize("law", ["coulomb", "elastic-plastic", "springs", "tanh", "bonds"])
-def test_exact_known_values_are_found_again(tmp_path, law):
+def test_exact_known_values_are_recovered(tmp_path, law):
     time, slide = rows()
     loop = table(tmp_path / "loop.csv", time, slide, forces(law, time, slide, TRUTH[law]))
     found = fit_loop(scene_of(tmp_path, law), loop, free_of(*TRUTH[law]))
@@ -139,7 +139,7 @@ def test_exact_known_values_are_found_again(tmp_path, law):
     assert np.ptp(found.keys.fit.intervals, axis=1) == pytest.approx(0, abs=1e-6)
 
 
-def test_exact_growth_is_found_again(tmp_path):
+def test_exact_growth_of_bonds_is_recovered(tmp_path):
     """The same numbers at the steps of the rows, the loop by the law itself: nothing is left over."""
     time, slide = rows(40)
     names = ["friction.static", "friction.kinetic", "friction.slip_growth"]

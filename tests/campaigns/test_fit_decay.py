@@ -31,7 +31,7 @@ def written(path, text: str, noise: float = 0.0, seed: int = 0, amplitudes=AMPLI
     return path
 
 
-def test_exact_a_made_up_joint_is_found_again(tmp_path):
+def test_exact_the_parameters_of_a_computed_decay_are_recovered(tmp_path):
     """Stiffness and exponent of an Iwan joint from its own curve, and the fitted scene has it."""
     found = pf.fit(START, to=written(tmp_path / "decay.csv", IWAN), free=FREE, out=tmp_path / "out")
     values = {name: one["value"] for name, one in found["values"].items()}

@@ -100,7 +100,7 @@ def test_exact_modal_mass_and_shares_of_a_force_at_its_own_place():
     assert "widen the peak at 143 Hz" in found.notes[0] and "0.004, and the value from the whole" in found.notes[0]
 
 
-def test_exact_the_base_tells_shares_and_no_mass():
+def test_exact_base_motion_determines_participations_but_no_mass():
     """Absolute acceleration of a block that holds 0.9 of its mass in two modes: A = -base * output each."""
     base, relative = driven("acceleration")
     found = of_drive({"time": TIME, "base_acceleration": base, "acceleration": base - relative / 2}, None, None,

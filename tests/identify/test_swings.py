@@ -46,7 +46,7 @@ def test_intervals_hold(kind):
 
 
 @pytest.mark.parametrize("name, power", [("displacement", 0), ("velocity", 1), ("acceleration", 2)])
-def test_exact_any_trace_tells_the_amplitude_of_the_displacement(name, power):
+def test_exact_any_trace_gives_the_amplitude_of_the_displacement(name, power):
     """Without noise: a displacement A leaves A w in the velocity, A w^2 in the acceleration."""
     zeta, w = 0.02, 500.0
     t = np.arange(2000) / 10000

@@ -27,7 +27,7 @@ def off(one) -> np.ndarray:
     return (one - DATA).ravel()
 
 
-def test_exact_the_least_squares_are_those_of_the_dear_model():
+def test_exact_the_least_squares_are_those_of_the_expensive_model():
     """With much left over; the share alone, without slopes, ends 1 % above."""
     best = fit(lambda values: off(dear(values)), BOX.low, BOX.high, starts=4, bars="")
     models = TwoModels(cheap, dear, off, BOX)
@@ -40,7 +40,7 @@ def test_exact_the_least_squares_are_those_of_the_dear_model():
     assert np.square(off(dear(BOX.values(u)))).sum() > 1.01 * best.rms**2 * DATA.size
 
 
-def test_refuses_a_dear_model_that_fails_everywhere():
+def test_refuses_an_expensive_model_that_fails_everywhere():
     def failing(values):
         raise PatchfemError("no motion")
 

@@ -239,7 +239,7 @@ cycles = 12
 """)
 
 
-def test_a_release_says_what_its_errors_leave_out_of_the_mesh():
+def test_a_release_states_what_its_errors_leave_out():
     result, said = pf.run(BEHIND_BONDS), "the errors of ring_frequency and ring_damping and of the decay curve include "
     (note,) = [one for one in result.notes if one.startswith("the errors of")]
     assert note.startswith(said + "the change on a coarser mesh, but not the energy that is lost in slip")
@@ -252,14 +252,14 @@ def test_a_release_says_what_its_errors_leave_out_of_the_mesh():
     ("[contact.shear]", '[contact.shear]\n[contact.grooves]\nwavelength = "80 um"\namplitude = "2 um"',
      "the contact slides on grooves"),
     ("slide = 1.0", "slide = 1.0\nnormal = 0.1", "the normal load changes")])
-def test_where_no_static_loop_tells_the_error_of_the_mesh_there_is_a_reason(old, new, why):
+def test_without_a_static_loop_the_error_of_the_mesh_has_a_reason(old, new, why):
     scene = CROWNED.replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"').replace(old, new, 1)
     error, said = left_by_mesh(pf.build(scene), None, None, np.array([1e-7, 1e-6]), int)
     assert said == why and not error.any()
 
 
 @pytest.mark.parametrize("begin", [0.0, 100.0])
-def test_exact_a_turn_at_which_the_force_jumps_is_told_from_outside(begin):
+def test_exact_a_reversal_at_which_the_force_jumps_is_extrapolated_from_both_sides(begin):
     """Two parabolas that meet at their crests, of accelerations 1 and 3: the cubic across the jump is bent by it."""
     crests = begin + np.array([0.2537, 0.7421])
     time = begin + np.arange(0.0, 1.0, 0.02)

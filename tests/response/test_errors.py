@@ -164,7 +164,7 @@ def test_exact_a_small_drive_is_met_as_a_large_one():
     assert floor_of(NAME, 0.0) == floor_of(NAME) == 1e-10 and floor_of("loop_area", 1e-12) == 1e-10
 
 
-def test_exact_a_bar_knows_what_kind_of_number_it_belongs_to():
+def test_exact_errors_depend_on_the_kind_of_measure():
     """Error of the parts and a share of the value; a phase modulo pi is at most a quarter turn off; a balance is 0 but
     for its error; a drift is a difference of means with digits of the amplitude."""
     values = {NAME: 2e-3, "slip_start_phase": 3.0, "energy_balance": 4e-9, "drift_per_cycle": 1e-12}

@@ -82,7 +82,7 @@ tolerance = 0.01
 """
 
 
-def test_always_the_list_of_a_block_that_is_pushed_once_is_foreseen():
+def test_always_the_plan_estimates_the_list_of_bonds_of_a_block_under_a_step():
     """It hardly moves on its bonds: one strip of each step, 3800 of them, was kept where 66 were planned."""
     scene = loads(PUSHED.format(cycles=12))
     foreseen, book = plan(scene).unknowns["bond_list_about"], run(scene, estimate=False).extra["book"]
@@ -126,7 +126,7 @@ tolerance = 0.003
 """
 
 
-def test_always_the_work_of_a_held_block_is_foreseen():
+def test_always_the_plan_estimates_the_work_of_a_stuck_block():
     """The increments that are tried are counted, each of which takes 2.5e-7 s per strip (measured); half of the strips
     at the end are there in the mean."""
     sine = HELD.format(order=1.085, cycles=4).replace('levels = ["24.7 m/s^2", "29.5 m/s^2"]',
@@ -162,7 +162,7 @@ tolerance = 0.01
 
 
 @pytest.mark.parametrize("order", ["0.0", "0.5"])
-def test_always_the_list_of_a_block_that_is_just_held_is_foreseen(order):
+def test_always_the_plan_estimates_the_list_of_bonds_of_a_barely_stuck_block(order):
     """Its limit is 1.13 times what holds it. Bonds of order 0 pull alike at any stretch: it turns back in every step,
     and each leaves a strip. 55 and 61 strips were planned."""
     scene = loads(JUST_HELD.format(order=order))
@@ -194,7 +194,7 @@ cycles = 200
 
 
 @pytest.mark.parametrize("kinetic, sticks", [(0.2, False), (0.85, True)])
-def test_exact_the_kinetic_coefficient_tells_whether_a_block_that_slips_sticks_again(kinetic, sticks):
+def test_exact_the_kinetic_coefficient_decides_whether_a_slipping_block_sticks_again(kinetic, sticks):
     text = SLIDES.format(kinetic=kinetic)
     found, run_ = plan(loads(text)), run(loads(text))
     said = next(one for one in found.verdict if one.startswith("D = 0.9 is below 1"))

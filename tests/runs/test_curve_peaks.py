@@ -101,7 +101,7 @@ def test_always_the_peak_of_a_random_rig_is_within_its_bars(seed):
     assert [one for one in outside(seed) if one[1] > 1] == []
 
 
-def test_exact_a_stuck_curve_has_the_peak_of_its_held_structure():
+def test_exact_the_curve_of_a_stuck_interface_has_the_peak_of_the_bonded_structure():
     """patchfem new damper under 100 kN: the platform stays on its spring, and the force meets one receptance."""
     text = text_of("damper")
     one = text[:text.index("\n[sweep]")] + text[text.index("\n[accuracy]"):]
@@ -134,7 +134,7 @@ def settles(seed: int) -> tuple | None:
 
 @pytest.mark.share(0, 1)
 @pytest.mark.parametrize("seeds", [(73_000_045,), (73_000_047,), tuple(range(73_000_000, 73_000_070))])
-def test_always_a_steady_run_tells_where_it_still_goes(seeds):
+def test_always_the_steady_amplitude_of_a_run_holds_that_of_the_harmonic_balance(seeds):
     """Of 25 held-out runs that were steady, 18 ended outside the bar of their last window, one by 1.3 %; of the 19
     estimates 18 hold."""
     told = []
@@ -149,7 +149,7 @@ def test_always_a_steady_run_tells_where_it_still_goes(seeds):
     assert np.mean(told or [1]) >= (0.9 if len(told) > 9 else 1)
 
 
-def test_exact_a_run_that_checks_a_curve_looks_near_its_top_alone():
+def test_exact_the_coarser_curve_is_computed_near_the_peak():
     """Down to 0.8 of the peak and a quarter of that way beyond; another peak of that height, or a short curve, is
     searched as a whole."""
     f = np.linspace(50, 250, 201)

@@ -47,6 +47,7 @@ def test_exact_a_linear_curve_is_the_sum_of_its_modes():
     found = pf.run(RIG)
     curve = found.extra["curve"]
     np.testing.assert_allclose(curve["amplitude"], amplitude(curve["frequency"]), rtol=1e-12)
+    np.testing.assert_allclose(curve["multiplier"], np.exp(-ZETA * 2 * np.pi * 73 / curve["frequency"]), rtol=1e-9)
     fine = np.linspace(60, 210, 200001)
     assert np.abs(np.interp(fine, curve["frequency"], curve["amplitude"]) / amplitude(fine) - 1).max() < 0.01
     top = found.measures["relative_displacement_amplitude"].value

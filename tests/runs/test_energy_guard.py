@@ -65,7 +65,7 @@ def test_refuses_steady_where_energy_is_lost(tmp_path, monkeypatch):
     ("march", 2e-8, 1e-6, False), ("march", 9e-9, 0.0, True), ("exact", 2e-8, None, False),
     ("harmonic", 6e-8, 1e-7, True), ("harmonic", 6e-8, 1e-9, False),
     ("march", float("nan"), None, True), ("march", None, None, True)])
-def test_always_an_engine_closes_its_balance_as_it_says(engine, value, error, closes):
+def test_always_an_energy_balance_above_its_limit_is_reported(engine, value, error, closes):
     said = unbalanced(ENGINES[engine], {"energy_balance": Measure(value, "1", error, 1e-8)})
     assert (said == "") is closes
 

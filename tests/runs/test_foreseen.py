@@ -48,7 +48,7 @@ def test_refuses_before_anything_is_made_with_the_key_that_drives_it(text, sets,
 
 
 @pytest.mark.parametrize("method, cycles", [("march", 3e6), ("exact", 3e6)])
-def test_always_the_histories_of_a_long_run_take_what_the_plan_says(method, cycles):
+def test_always_the_plan_estimates_the_memory_of_the_histories(method, cycles):
     """What 1000 cycles take is left out. Over 3e6 cycles the plan said as little as over 1000: a tenth."""
     text = POINT + COULOMB + STRUCTURE
     code = ("import sys; import patchfem as pf; pf.run(sys.argv[1], say=lambda text: None, "
@@ -95,7 +95,7 @@ def test_exact_a_group_with_a_limit_leaves_what_it_has_not_used(tmp_path):
 
 @pytest.mark.share(1)
 @pytest.mark.parametrize("law, least", [(COULOMB, 150), (TANH, 200), (TANH, 300)])
-def test_refuses_in_one_line_what_the_process_may_not_take(tmp_path, law, least):
+def test_refuses_in_one_line_a_run_beyond_the_memory_limit(tmp_path, law, least):
     path = tmp_path / "a.toml"
     path.write_text(POINT + law + MODE + STRUCTURE[len(MODE):])
     done = subprocess.run([sys.executable, "-m", "patchfem", "run", path, "-o", tmp_path / "out"], timeout=120,

@@ -75,7 +75,7 @@ def test_always_what_slides_for_ever_under_a_step_has_no_bar():
 @pytest.mark.parametrize(("drift", "outcome"), [(0.0, Outcome.STEADY), (0.9e-11, Outcome.STEADY),
                                                 (-6e-9, Outcome.TRANSIENT), (3.1e-11, Outcome.TRANSIENT)])
 @pytest.mark.parametrize("sine", [True, False])
-def test_always_a_motion_whose_middle_moves_on_is_not_steady(drift, outcome, sine):
+def test_always_a_motion_that_drifts_is_not_steady(drift, outcome, sine):
     """The amplitude of 18.6 nm stays; a drift of the tolerance, 1e-3 of it, and of the floor of 1e-11 m is none."""
     sizes = np.full(6, 18.6e-9)
     measures = {"relative_displacement_amplitude": Measure(18.6e-9, "m", 1e-12, 1e-10),

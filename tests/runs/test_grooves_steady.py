@@ -84,7 +84,7 @@ def test_exact_the_multipliers_of_next_to_no_friction_are_those_of_the_valley():
     assert np.abs(np.angle(found)) == pytest.approx(np.abs(np.angle(np.exp(1j * own * drive.period))), abs=1e-3)
 
 
-def test_always_pieces_that_give_way_move_as_a_march_has_them():
+def test_always_elastic_pieces_move_as_in_a_march():
     """Points behind the shear modes of a patch: the march at the same steps."""
     pieces = BLOCK + 'element_size = "2 mm"\ngrooves = {wavelength = "80 um", amplitude = "7.5 um"}\n[contact.shear]\n'
     text = pieces + RIG[RIG.index("[friction]"):].replace('"coulomb"', '"elastic-plastic"\nbond_length = "1 um"')

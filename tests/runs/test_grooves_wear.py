@@ -95,7 +95,7 @@ SOFT = PIECES.replace("[friction]", "[contact.shear]\n[friction]")
     (RIG, {"drive.acceleration": "5 g", "drive.cycles": 20, "contact.grooves.lifted_mass": "0.4 kg"}),
     pytest.param(RIG, {"drive.acceleration": "5 g", "drive.cycles": 20, "friction.law": "elastic-plastic",
                        "friction.bond_length": "5 nm"}, marks=pytest.mark.slow)])
-def test_exact_pieces_that_give_way_wear_by_the_work_of_their_friction(text, more):
+def test_exact_elastic_pieces_wear_by_the_work_of_their_friction(text, more):
     """Slip and normal force of every point along the flank: their sum over the patch is what the books say, kappa times
     friction's own work (form 'energy') or that over mu, and the flanks lose their share of it."""
     for form, part in (("archard", MU), ("energy", 1.0)):

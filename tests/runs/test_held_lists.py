@@ -105,7 +105,7 @@ tolerance = 0.003
 @pytest.mark.share(0, 1)
 @pytest.mark.parametrize(("text", "more"), [(RIG.format(reading="report", push=5.739), 1.0), (MASSES, 1.0),
                                             (RELEASED, 1.5)], ids=["mode", "masses", "released"])
-def test_always_a_held_block_ends_within_the_steps_that_plan_counts(monkeypatch, text, more):
+def test_always_the_steps_of_a_stuck_block_are_within_those_of_the_plan(monkeypatch, text, more):
     """more: strips over those foreseen, one per step; steps of a released block are cut into pieces at its start."""
     scene, counted = loads(text), [0]
     foreseen, old = plan(scene), march.Run._steps
@@ -151,7 +151,7 @@ tolerance = 0.2
 """
 
 
-def test_always_the_list_of_levels_that_growing_bonds_just_hold_is_foreseen():
+def test_always_the_plan_estimates_the_list_of_growing_bonds_under_levels():
     """D 1.2 of the largest level: one strip per step, and one of each piece that a step is cut into."""
     foreseen, found = plan(loads(LEVELS)), run(loads(LEVELS), estimate=False)
     book = found.extra["book"]
@@ -159,7 +159,7 @@ def test_always_the_list_of_levels_that_growing_bonds_just_hold_is_foreseen():
     assert foreseen.unknowns["bond_list_about"] == pytest.approx(book["strips"] - book["substeps"], rel=0.05)
 
 
-def test_refuses_a_held_block_whose_list_grows_too_long(monkeypatch):
+def test_refuses_a_stuck_block_whose_list_of_bonds_grows_too_long(monkeypatch):
     """Its seconds grow with the square of its cycles: the run is stopped after a sixtieth of the limit or more."""
     scene = loads(RIG.format(reading="report", push=5.739).replace("cycles = 6", "cycles = 600"))
     begin = process_time()

@@ -50,7 +50,7 @@ def values(text, *given):
 @pytest.mark.parametrize("law, method", [
     ("elastic-plastic", "auto"), ("elastic-plastic", "march"), ("elastic-plastic", "harmonic"), ("coulomb", "auto"),
     ("coulomb", "harmonic"), ("tanh", "auto"), ("nonlocal", "harmonic")])
-def test_exact_each_instrument_sees_the_one_motion(law, method):
+def test_exact_accelerometer_and_gauge_read_the_same_motion(law, method):
     """Friction knows nothing of instruments: the acceleration is that of a run whose output is the accelerometer, and
     the displacement that of one whose output is the gauge."""
     text = POINT + LAWS[law] + MODES + (f'[accuracy]\nmethod = "{method}"\n' if method != "auto" else "")

@@ -202,7 +202,7 @@ def test_exact_elements_of_strips_are_those_of_one_patch():
         assert force[0] == pytest.approx(force[1], rel=1e-3)
 
 
-def test_a_rigid_patch_moves_as_a_point_and_says_so():
+def test_a_rigid_patch_moves_as_a_point_with_a_warning():
     rigid = ALONE.replace("[structure.interface.contact.shear]\n", "")
     point = masses(1) + held(1, 0) + f'[[structure.interface]]\nbetween = [1, 0]\n{LAW}load = "100 N"\n' + DRIVE
     one, two = pf.run(rigid), pf.run(point)

@@ -136,7 +136,7 @@ def test_exact_figure_16_of_the_report(written):
 
 @pytest.mark.share(0)
 @pytest.mark.parametrize("method", ["exact", "march"])
-def test_exact_two_alike_masses_side_by_side_are_one_twice(written, method):
+def test_exact_two_equal_masses_side_by_side_move_as_one(written, method):
     words = ("--set", f"accuracy.method={method}")
     if method == "march":
         words += ("--set", "accuracy.steps_per_cycle=400")

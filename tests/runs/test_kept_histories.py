@@ -128,7 +128,7 @@ def test_exact_how_runs_end():
     SOFT + MODE.replace("[structure]", '[structure]\ntravel = "0.9 mm"') + SINE.replace("6 g", "9 g")
     + '[accuracy]\nmethod = "march"\n',
 ], ids=["part of a cycle", "sweep", "travel"])
-def test_exact_a_run_for_an_error_has_the_measures_of_a_whole_one(text):
+def test_exact_a_run_that_keeps_only_its_last_cycles_has_the_same_measures(text):
     """It keeps nothing from before the last cycles and reads the same from these.
 
     Sums over the whole run are taken in other pieces, so these have another last digit.

@@ -25,7 +25,7 @@ def nothing_kept():
     store.clear()
 
 
-def test_exact_runs_of_one_patch_are_those_that_share_nothing(monkeypatch):
+def test_exact_runs_that_share_a_patch_equal_runs_that_share_nothing(monkeypatch):
     made, jenkins_set = [], jenkins_elements.shear_modes.jenkins_set
     monkeypatch.setattr(jenkins_elements.shear_modes, "jenkins_set",
                         lambda *given: made.append(given) or jenkins_set(*given))

@@ -43,7 +43,7 @@ def test_exact_notes_are_printed_and_written_beside_the_warnings(tmp_path):
 
 # ---------------------------------------------------------------------------------------------- mesh files, tall pieces
 @pytest.mark.parametrize("kept", [2, 16])
-def test_exact_a_mesh_held_in_part_has_one_answer_in_three_formats_and_says_so(kept, tmp_path):
+def test_exact_a_mesh_fixed_on_part_of_a_face_gives_a_note_in_three_formats(kept, tmp_path):
     """lower_far on 2 of its 16 edges of 0.8 mm: 1.6 of 12.8 mm."""
     m = drawn("quads", graded_grid(12.8e-3, 6.4e-3, 0.8e-3))
     far = np.flatnonzero(m.edge_tags == EDGE_TAGS["lower_far"])
@@ -64,7 +64,7 @@ def test_exact_a_mesh_held_in_part_has_one_answer_in_three_formats_and_says_so(k
     assert (approaches[0] > 3 * flat) == (kept == 2)
 
 
-def test_exact_a_mesh_with_a_hole_says_so_with_its_area(tmp_path):
+def test_exact_a_note_states_the_area_of_a_hole_in_the_mesh(tmp_path):
     """Two cells of 0.8 mm side by side left out of the lower piece."""
     m = drawn("quads", graded_grid(12.8e-3, 6.4e-3, 0.8e-3))
     middle = m.points[m.quads].mean(axis=1)
@@ -81,7 +81,7 @@ def test_exact_a_mesh_with_a_hole_says_so_with_its_area(tmp_path):
     assert gone.size == 2 and said == [[], [f"{told} intended, close it in the mesh"]]
 
 
-def test_exact_a_tall_piece_says_its_share_of_the_load_under_which_it_buckles():
+def test_exact_a_note_states_the_fraction_of_the_buckling_load():
     """Euler's column, clamped and free: pi^2 E' I/(4 H^2), I = width length^3/12."""
     text = '[contact]\nlength = "10 mm"\nwidth = "1 m"\nheight = "{} mm"\nload = "{} N"\nelement_size = "0.5 mm"\n' \
            'substrate = {{young = "100 GPa", poisson = 0.3, density = "4000 kg/m^3"}}\n'
@@ -96,7 +96,7 @@ def test_exact_a_tall_piece_says_its_share_of_the_load_under_which_it_buckles():
 # ---------------------------------------------------------------------------------------------------- sliding away
 @pytest.mark.parametrize("share, said, outcome", [
     (0.09, False, "done"), (0.11, True, "done"), (0.99, True, "done"), (1.01, True, "leaves_contact")])
-def test_exact_a_bench_says_how_far_it_slides_off_a_full_contact(share, said, outcome):
+def test_exact_a_warning_states_how_far_a_bench_slides_off_the_contact(share, said, outcome):
     found = ran(COATED + COULOMB + SINE.format(f"{12.7 * share} mm"), False)
     line = f"the slide amplitude, {12.7 * share:.3g} mm, is {share:.2g} of the contact length 12.7 mm"
     assert any(text.startswith(line) for text in found.warnings) == said

@@ -26,7 +26,7 @@ def warned(law: str, cycles) -> tuple:
     return done, [one for one in done.warnings if CLOSED in one]
 
 
-def test_exact_the_first_loop_from_rest_is_told_with_the_cycles_of_a_steady_one():
+def test_exact_a_warning_names_the_cycles_until_the_loop_is_steady():
     first, told = warned(BOUC, 1)
     second, none = warned(BOUC, 2)
     third, _ = warned(BOUC, 3)

@@ -93,7 +93,7 @@ def test_exact_normal_stiffness_is_the_slope_of_the_load_over_the_approach(law, 
 
 
 @pytest.mark.parametrize("law", SKINS)
-def test_exact_asperities_give_way_in_shear_without_the_pieces(law):
+def test_exact_asperities_deform_in_shear_also_under_rigid_pieces(law):
     """A slow loop far inside the sticking range has the slope of the skin alone, and with [contact.shear] of both."""
     bench = '[friction]\nlaw = "coulomb"\nstatic = 1e4\n[slide]\nkind = "triangle"\namplitude = "1 nm"\n' \
             'speed = "1 mm/s"\n'
@@ -320,7 +320,7 @@ def test_always_what_leaves_the_model_is_said(tables, keys, said):
     ('[contact.profile]\nfile = "hollow.csv"\n', (True, True),
      r", from x = -6.35 to -(\S+) mm \(left end\) and from \1 to 6.35 mm \(right end\); peak"),
     ("", (True, True), "^100 % of the length in contact; peak")], ids=["left", "right", "middle", "both", "whole"])
-def test_exact_the_answer_says_where_the_contact_is(tmp_path, shape, ends, told):
+def test_exact_the_summary_states_the_places_of_the_contact(tmp_path, shape, ends, told):
     """The parts of the contact add up to its share of the length, and their outer edges lie 2 half-widths apart."""
     x = np.linspace(-6.35, 6.35, 501)
     (tmp_path / "hollow.csv").write_text("x [mm],z [um]\n" + "".join(

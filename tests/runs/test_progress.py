@@ -16,14 +16,14 @@ def scene(law, *sets):
 
 @pytest.mark.share(0, 1, 2, 6)
 @pytest.mark.parametrize("law, sets", [(law, ()) for law in LAWS] + [("coulomb", ("accuracy.method=march",))])
-def test_exact_who_looks_on_sees_the_same_motion(law, sets):
+def test_exact_a_progress_callback_changes_no_result(law, sets):
     alone = pf.run(scene(law, *sets))
     seen = pf.run(scene(law, *sets), progress=lambda share: None)
     assert {name: (one.value, one.error) for name, one in alone.measures.items()} == \
            {name: (one.value, one.error) for name, one in seen.measures.items()}
 
 
-def test_always_a_long_run_is_told_on_the_way():
+def test_always_a_long_run_reports_its_progress():
     """Under a sweep, for a motion that repeats is not run to its end."""
     head, drive = text_of("rig").replace('"coulomb"', f'"nonlocal"\n{KEYS["nonlocal"]}').split("[drive]")
     drive = '[drive]\nkind = "base"\nwaveform = "sweep"\nfrom = "120 Hz"\nto = "160 Hz"\nrate = "2 Hz/s"\n' \

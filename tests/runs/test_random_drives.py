@@ -49,7 +49,7 @@ def test_exact_energies_balance_under_elastic_plastic_friction():
         "the frequency response (H1) has no peak")
 
 
-def test_each_seed_is_another_record_and_the_same_one_again():
+def test_each_seed_gives_its_own_reproducible_record():
     first, again, other = (pf.run(RIG, **{"drive.seed": seed, "drive.duration": "1 s"}).measures for seed in (1, 1, 2))
     assert first["relative_displacement_rms"].value == again["relative_displacement_rms"].value
     assert first["relative_displacement_rms"].value != other["relative_displacement_rms"].value

@@ -73,7 +73,7 @@ tolerance = 1e-2
 """
 
 
-def test_always_a_sweep_of_amplitudes_knows_the_loops_of_a_joint_as_well_as_single_runs():
+def test_always_loops_of_a_sweep_have_errors_like_those_of_single_runs():
     cases = [build(scene.loads(JOINT.format(size))) for size in (0.2, 1.4, 10.0)]
     for own, shared in zip(cases, meshed(cases), strict=True):
         alone, found = (run(one).measures["loop_area"] for one in (own, shared))
@@ -81,7 +81,7 @@ def test_always_a_sweep_of_amplitudes_knows_the_loops_of_a_joint_as_well_as_sing
         assert abs(found.value - alone.value) <= found.error + alone.error
 
 
-def test_always_a_sweep_of_amplitudes_is_told_the_same_remedies_as_single_runs():
+def test_always_cases_of_a_sweep_have_the_remedies_of_single_runs():
     """A shared mesh has other nodes, so that errors differ a little; what cures them is the same."""
     text = JOINT.replace("tolerance = 1e-2", "tolerance = 1e-3")
     cases = [build(scene.loads(text.format(size))) for size in (0.2, 1.4)]

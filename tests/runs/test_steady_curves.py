@@ -87,7 +87,7 @@ def test_exact_the_onset_of_slip_of_an_element_in_closed_form():
     assert first - found.error <= found.value <= 1.002 * first + found.error and found.error < 1e-3 * first
 
 
-def test_exact_a_level_without_a_bounded_motion_is_a_row_that_says_so():
+def test_exact_a_level_without_a_bounded_motion_has_the_outcome_grows():
     """Without damping at resonance friction bounds the motion to a/mu N < 4/pi and not beyond."""
     text = POINT + COULOMB + MODE.replace("0.003", "0") + LEVELS.format('"3 g", "4.5 g", "6 g"', 12)
     run = pf.run(text, **STEADY)
@@ -103,7 +103,7 @@ LOCKED = POINT + '[friction]\nlaw = "elastic-plastic"\nstatic = 0.05\nbond_lengt
 SINE = '[drive]\nkind = "base"\nfrequency = "{} Hz"\nacceleration = "5 g"\ncycles = {}\n'
 
 
-def test_exact_a_balanced_motion_that_lasts_is_shown_not_one_that_does_not():
+def test_exact_of_several_balanced_motions_the_stable_one_is_shown():
     """Beside an interlock of 80 um three motions balance at 180 Hz, 58, 83 and 125 um, and the balance comes to the
     second one, whose disturbances grow eightfold a cycle. A march from rest comes to the third, the only one that
     lasts."""

@@ -64,7 +64,7 @@ def test_refuses_no_motion_that_grows():
 
 
 @pytest.mark.parametrize("level", ["6 g", "8 g"])
-def test_exact_a_run_that_has_not_settled_tells_where_it_goes(level):
+def test_exact_the_steady_amplitude_of_an_unsettled_run_is_that_of_the_map(level):
     """Thirty cycles at resonance are far from enough, beyond the knee too: the steady amplitude is that of the map."""
     run, steady = (pf.run(RIG, **{"drive.acceleration": level, "accuracy.method": method})
                    for method in ("exact", "harmonic"))

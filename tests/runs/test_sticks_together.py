@@ -19,7 +19,7 @@ def limited():
 
 @pytest.mark.share(1, 3, 5)
 @pytest.mark.parametrize("seed", range(2, 10))
-def test_exact_faces_that_decide_at_one_instant(seed, limited):
+def test_exact_interfaces_that_stick_or_slip_at_one_instant(seed, limited):
     """Two of each kind; the slides are those of the reference to 1e-6 of the largest at every event, most to 1e-13."""
     found = compared(spec(seed))
     assert right(found), found

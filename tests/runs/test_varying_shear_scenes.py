@@ -37,7 +37,7 @@ def test_order_the_amplitude_settles_with_the_number_of_modes(law):
         assert np.ptp(one.response.extra["normal_load"]) > 0.5 * one.patch.pressure.load
 
 
-def test_exact_fields_of_a_patch_that_gives_way():
+def test_exact_fields_of_a_patch_with_shear():
     """The holder's slide is slip, what the pieces take of the compliance itself and the stretch of the springs, which
     is at most that of springs of stiffness mu sigma/eps_0; friction keeps below mu of the pressure there."""
     found = result_of(*SETS, PLASTIC, "accuracy.shear_modes=65")
@@ -52,7 +52,7 @@ def test_exact_fields_of_a_patch_that_gives_way():
     assert seen > 100
 
 
-def test_exact_run_says_its_modes_and_checks_them():
+def test_exact_a_run_names_its_tangential_modes_and_bounds_their_error():
     """A sentence names how many modes stand for what gives way; half as many, coarser steps and a coarser mesh give the
     error of every measure."""
     found = result_of(*SETS, SKIN, estimate=True)

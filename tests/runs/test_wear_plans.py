@@ -37,14 +37,14 @@ def model_of(shape: str, more: str):
 @pytest.mark.share(1, 3)
 @pytest.mark.parametrize("shape, cycles", [(TILT.format("0.1 mrad"), 1e5), (TILT.format("0.1 mrad"), 1e8),
                                            (TILT.format("0.5 mrad"), 1e7), (CROWN.format("10 m"), 1e7)])
-def test_always_a_plan_tells_the_jumps_within_a_factor_of_one_and_a_half(shape, cycles):
+def test_always_a_plan_estimates_the_jumps_of_wear_within_half(shape, cycles):
     model = model_of(shape, f"cycles = {cycles:g}\n")
     patch = solve_all(model.patch, model.accuracy.tolerance, False)[0]
     taken = len(evolve(model, patch, (None, None)).moments) - 1
     assert 1 / 1.5 < jumps_about(model) / taken < 1.5
 
 
-def test_exact_asked_jumps_and_those_of_asperities_that_touch_everywhere():
+def test_exact_jumps_of_a_scene_and_of_asperities_in_full_contact():
     assert jumps_about(model_of(TILT.format("0.1 mrad"), "cycles = 1e8\njumps = 7\n")) == 7
     rough = '[contact.asperities]\nlaw = "exponential"\nnormal_stiffness = "1e13 Pa/m"\ndecay_length = "2.5 um"\n'
     assert jumps_about(model_of(rough, "cycles = 1e8\n")) == SMOOTH

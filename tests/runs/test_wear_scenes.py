@@ -126,7 +126,7 @@ def worn_folder(tmp_path_factory):
     return scene.parent / "out"
 
 
-def test_exact_files_hold_the_way_of_the_wear(worn_folder):
+def test_exact_files_hold_the_history_of_the_wear(worn_folder):
     with xr.open_dataset(worn_folder / "result.nc", engine="h5netcdf") as data:
         load = (data.weight * data.normal_stress).sum("x")
         assert load.values == pytest.approx(LOAD, rel=1e-10)
@@ -285,7 +285,7 @@ def test_exact_a_coating_worn_through_ends_the_run_at_its_cycle(more):
     assert [one.outcome == "worn_through" for one in apart] == [False, True]
 
 
-def test_refuses_an_interrupted_run_of_another_scene_and_names_the_way_on(tmp_path, monkeypatch):
+def test_refuses_to_resume_the_run_of_another_scene(tmp_path, monkeypatch):
     scene, save = tmp_path / "worn.toml", evolve.save_state
     scene.write_text(TILTED + COULOMB + SINE + WEAR)
 
@@ -305,7 +305,7 @@ def test_refuses_an_interrupted_run_of_another_scene_and_names_the_way_on(tmp_pa
 
 
 @pytest.mark.parametrize("quiet, state, told", [((), "wear.npz", 1), (("-q",), "wear.npz", 0), ((), "", 0)])
-def test_exact_a_run_that_begins_anew_says_once_that_a_kept_state_is_dropped(tmp_path, quiet, state, told):
+def test_exact_a_new_run_says_once_that_it_discards_a_saved_state(tmp_path, quiet, state, told):
     scene = tmp_path / "plain.toml"
     scene.write_text(SINE + COULOMB + '[normal]\nload = "10 N"\n')
     (tmp_path / "out.partial").mkdir()

@@ -41,7 +41,7 @@ def test_exact_two_halves_are_the_closed_form_of_the_whole(place):
     np.testing.assert_array_equal(found.extra["wear"]["cycle"][[0, -1]], [0, 1e6])
 
 
-def test_exact_compare_tells_from_where_the_cycles_count(place):
+def test_exact_compare_states_the_cycles_of_the_run_before(place):
     ran(place, HALF, "wear.start=one/result.nc").save(place / "two")
     found = pf.compare(place / "one", place / "two")
     assert "1e+06 cycles of wear after those of one/result.nc (the surface before: 1e+06 cycles)" in \

@@ -91,7 +91,7 @@ def test_exact_the_bond_length_changes_with_wear():
     assert found.measures["loop_area"].value == pytest.approx(4 * MU * LOAD * (10e-6 - 4e-6 * grown), rel=1e-3)
 
 
-def test_always_wear_beyond_the_table_is_told():
+def test_always_wear_beyond_the_table_gives_a_warning():
     found = ran('wear.friction.depth=["0 um","1 um"]', "wear.friction.coefficient_factor=[1,0.9]")
     assert found.measures["static_coefficient"].value == pytest.approx(0.9 * MU, rel=1e-12)
     assert [one for one in found.warnings if "is larger than the last value of wear.friction.depth, 1 um" in one]

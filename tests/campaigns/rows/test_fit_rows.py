@@ -111,7 +111,7 @@ def linear_rows(noise=0.0, scale=1.0, seed=1, seen=1.0):
     return out
 
 
-def test_exact_a_linear_rig_is_found_from_closed_forms(tmp_path):
+def test_exact_a_linear_rig_is_recovered_from_closed_forms(tmp_path):
     """Rows of an oscillator in closed form give back its frequency, its damping and the factors of both readings."""
     gains = "measured.acceleration_gain=0.5..2", "measured.displacement_gain=0.5..2"
     found = fitted(scene_of(tmp_path, LINEAR), table(tmp_path, linear_rows(scale=1.3, seen=0.8)),
@@ -153,13 +153,13 @@ def rubbed(tmp_path_factory):
     return out
 
 
-def test_exact_a_rubbing_rig_is_found_from_its_own_rows(tmp_path, rubbed):
+def test_exact_a_rig_with_friction_is_recovered_from_its_own_rows(tmp_path, rubbed):
     found = fitted(scene_of(tmp_path, RUBS), table(tmp_path, rubbed), free(*RUBS_FREE))
     assert found.keys.fit.values == pytest.approx([0.45, 2.4e6], rel=1e-5)
     assert any("steady motions are computed" in text for text in found.keys.warnings)
 
 
-def test_always_the_fit_does_not_see_what_is_held_or_left_out(tmp_path, rubbed):
+def test_always_rows_held_out_or_left_out_do_not_change_the_fit(tmp_path, rubbed):
     """Other readings in the rows held out, and in those left out, change no bit of the values, nor of any start."""
     scene = scene_of(tmp_path, RUBS, f"structure.bonded.stiffness={TRUE['structure.bonded.stiffness']}")
     wanted, rows = free("friction.static=0.3..0.6"), rubbed[1::2]
@@ -295,7 +295,7 @@ def test_exact_starts_of_another_shape_count_for_nothing(tmp_path, text):
     assert Starts(tmp_path / "starts.json", "one", True).known == {}
 
 
-def test_placebos_are_whole_fits_of_their_own(tmp_path):
+def test_placebos_are_complete_fits(tmp_path):
     """The rows of a rig with a damping of 0.03, fitted with it and with another."""
     scene = scene_of(tmp_path, LINEAR, "structure.mode.axial.damping=0.03")
     found = fitted(scene, table(tmp_path, linear_rows()), free("structure.mode.axial.frequency=120 Hz..160 Hz"),

@@ -102,7 +102,7 @@ def test_always_spread_cases_hold_the_ends_of_every_axis():
     assert found.spread(720) == list(range(720))
 
 
-def test_exact_a_mistake_of_all_drawn_cases_is_told_once():
+def test_exact_a_mistake_of_all_drawn_cases_is_reported_once():
     text = BENCH.replace("static = 0.3", "static = 0.3\nkinetic = 0.3")
     with pytest.raises(SceneError) as refused:
         cases_of(Asked(Path("a.toml"), text), Request(("friction.static=0.2..0.25",), None, 100))

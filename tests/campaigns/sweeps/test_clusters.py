@@ -68,7 +68,7 @@ class Worn:
         return self.error
 
 
-def test_always_says_what_a_worker_has_otherwise():
+def test_always_the_differences_of_a_worker_are_named():
     here = Cluster.__new__(Cluster)
     here.name, mine = "--executor dask:tcp://x:1", own_of(work(Path("a.toml")))
     said = str(here._other(mine | {"patchfem": "0.3.0 (sources 12345678)", "files": "other"}, mine))

@@ -53,7 +53,7 @@ def test_always_cases_that_march_alone_are_counted_so():
      "sweep friction.kinetic, too, remove this key from the "),
     ("kinetic = 0.3\n", 8, "4 of 8 cases", "sweep friction.kinetic, too, remove this key from the scene, or give"),
     ("", 64, "", "")])
-def test_exact_a_contradiction_in_half_of_a_range_is_told_before_and_leaves_a_plan(more, count, of, helps):
+def test_exact_a_contradiction_in_half_of_a_range_is_reported_and_leaves_a_plan(more, count, of, helps):
     """static is drawn from 0.2 to 0.4 beside kinetic = 0.3. Every 8th point of Sobol's sequence is in one half: the
     plan once refused the whole sweep."""
     asked = Asked(Path("a.toml"), POINT + COULOMB + more + SHORT)

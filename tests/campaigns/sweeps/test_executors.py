@@ -133,7 +133,7 @@ def test_exact_a_chunk_that_died_is_halved_until_the_case_that_kills_is_alone():
     assert sorted(n for chunk in fine for n in chunk) == [n for n in range(1000) if n != 617] and len(fine) <= 10
 
 
-def test_exact_the_time_left_is_told_when_something_was_done():
+def test_exact_the_remaining_time_is_known_after_the_first_chunks():
     """By the work of all workers but of their first chunks, the last chunk counting most."""
     clock = Clock(4000, 2)
     assert clock(1, 7.0) is None and clock(1, 9.0) is None  # each brings what its cases run by

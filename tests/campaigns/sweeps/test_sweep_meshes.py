@@ -31,3 +31,11 @@ def test_exact_processes_that_begin_before_the_meshes_are_chosen_take_them():
     assert pool.ready == [] and found.numerics == here.numerics
     for name, values in here.values.items():
         np.testing.assert_allclose(found.values[name], values, rtol=1e-9)
+
+
+def test_exact_no_more_processes_begin_than_cases():
+    pool = Pool(3)
+    pool.begin(WORK, 2)
+    assert len(pool.ready) == 2
+    pool.end()
+    assert not pool.ready

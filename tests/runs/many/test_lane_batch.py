@@ -97,7 +97,7 @@ def test_always_a_batch_that_is_contradicted_is_exact(monkeypatch):
 
 
 @pytest.mark.parametrize("law", EXACT[:3])
-def test_exact_what_sticks_is_told_by_lanes(law):
+def test_exact_lanes_answer_stuck_cases(law):
     """Cases that end stuck, with their rings: the answers of the exact batch within the bars, and no measure less."""
     base = base_of(load(SCENE.format(law=LAWS[law])))
     cases = [build(base.changed([f"normal.load={load} N", f"structure.mode.axial.damping={damping}"]))

@@ -59,7 +59,7 @@ def test_exact_batch_is_the_single_runs(law, count):
     held_against(cases, one_by_one.solve(cases), batch(cases))
 
 
-def test_always_few_cells_are_told_from_many():
+def test_always_errors_of_few_cells_hold_the_result_of_many():
     """Cells of a density that a tolerance asks for: the answers of all 769 lie within the bars, where small cycles
     slip too, for which the first cells are too few."""
     base = base_of(load(SCENE.format(law=LAWS["iwan"], kind="base", kind_size=SIZES["base"])))
