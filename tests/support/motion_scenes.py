@@ -13,7 +13,7 @@ LAWS = ("coulomb", "coulomb", "weakening", "weakening", "elastic-plastic", "elas
 DRIVES = ("sine", "sine", "sine", "sine", "force", "force", "step", "sweep", "levels", "file", "free", "free")
 
 
-def wide(r, low: float, high: float) -> float:
+def draw_log_uniform(r, low: float, high: float) -> float:
     """A number whose logarithm is evenly spread."""
     return float(np.exp(r.uniform(np.log(low), np.log(high))))
 
@@ -22,16 +22,16 @@ def spec(seed: int) -> dict:
     """Numbers of a random scene in SI units, by name; a seed gives the same scene always."""
     r = np.random.default_rng(seed)
     law, drive = str(r.choice(LAWS)), str(r.choice(DRIVES))
-    own, mass = wide(r, 20, 400), wide(r, 0.2, 2)
-    omega, size = 2 * np.pi * own, wide(r, 5, 80)
+    own, mass = draw_log_uniform(r, 20, 400), draw_log_uniform(r, 0.2, 2)
+    omega, size = 2 * np.pi * own, draw_log_uniform(r, 5, 80)
     out = {"seed": seed, "law": law, "drive": drive, "mass": mass, "size": size,
            "frequency": own * float(r.choice([1.0, r.uniform(0.5, 1.6)])),
            "tolerance": float(r.choice([1e-3, 1e-2])), "cycles": int(r.choice([12, 20, 40])), "seeded": omega}
     out["modes"] = _modes(r, own)
     base = out["modes"][0]["base"]
-    out["load"] = mass * size * base / 0.3 * wide(r, 0.15, 1.1)
+    out["load"] = mass * size * base / 0.3 * draw_log_uniform(r, 0.15, 1.1)
     reach = size * base / omega**2
-    out |= _law(r, law, out["load"], reach, reach * omega)
+    out |= draw_law_keys(r, law, out["load"], reach, reach * omega)
     _structure(r, out, omega)
     _drive(r, out, own, reach)
     _contact(r, out)
@@ -78,22 +78,22 @@ def _modes(r, own: float) -> list:
     for k in range(count):
         base = float(r.uniform(0.65, 0.9) if k == 0 else r.uniform(-0.25, 0.25))
         left -= base**2
-        out.append({"frequency": own if k == 0 else own * wide(r, 0.4, 4), "base": base,
+        out.append({"frequency": own if k == 0 else own * draw_log_uniform(r, 0.4, 4), "base": base,
                     "damping": float(r.choice([0.003, 0.01, 0.05, 0.2] + [0.0] * (k == 0 and count == 1))),
                     "slide": 1.0 if k == 0 else float(r.uniform(-0.4, 0.4)),
                     "output": 1.0 if k == 0 else float(r.uniform(-0.5, 0.5))})
     return out
 
 
-def _law(r, law: str, load: float, reach: float, speed: float) -> dict:
+def draw_law_keys(r, law: str, load: float, reach: float, speed: float) -> dict:
     """Keys of [friction] by name; the lengths are shares of the motion that the drive alone makes."""
-    length, out = reach * wide(r, 0.01, 0.6), {"static": 0.3}
+    length, out = reach * draw_log_uniform(r, 0.01, 0.6), {"static": 0.3}
     if law == "weakening" or law in ("growing", "lugre"):
         out["kinetic"] = 0.3 * float(r.uniform(0.3, 0.95))
     if law in ("elastic-plastic", "stretch", "growing", "order", "report", "convolution"):
         out["bond_length"] = length
     if law == "tanh":
-        out["reference_speed"] = speed * wide(r, 1e-3, 0.1)
+        out["reference_speed"] = speed * draw_log_uniform(r, 1e-3, 0.1)
     if law in ("iwan", "bouc-wen", "lugre"):
         out["stiffness"] = 0.3 * load / length
     if law == "iwan":
@@ -101,10 +101,10 @@ def _law(r, law: str, load: float, reach: float, speed: float) -> dict:
     if law == "bouc-wen":
         out |= {"exponent": float(r.choice([1.0, 2.0, 1.5])), "shape": float(r.choice([0.5, 0.8, 1.0]))}
     if law == "lugre":
-        out |= {"stribeck_speed": speed * wide(r, 0.01, 0.3), "micro_damping": 0.05 * 0.3 * load / speed,
+        out |= {"stribeck_speed": speed * draw_log_uniform(r, 0.01, 0.3), "micro_damping": 0.05 * 0.3 * load / speed,
                 "viscous": 0.01 * 0.3 * load / speed}
     if law == "growing":
-        out |= {"rest_growth": speed / reach * length * wide(r, 1, 30), "slip_growth": length * wide(r, 0.2, 2),
+        out |= {"rest_growth": speed / reach * length * draw_log_uniform(r, 1, 30), "slip_growth": length * draw_log_uniform(r, 0.2, 2),
                 "rest_speed": speed * 0.01}
     if law == "order":
         out["order"] = float(r.choice([0.5, 1.5, 2.0]))
@@ -117,17 +117,17 @@ def _structure(r, out: dict, omega: float) -> None:
     """One interface on modes, or two masses with an interface each; a spring beside the contact, bonded or stiff."""
     out["several"] = out["law"] not in ("order", "report", "convolution") and r.random() < 0.12
     if out["several"]:
-        stiff = [out["mass"] * omega**2 * wide(r, 0.3, 2) for _ in range(3)]
-        out["masses"] = {"mass": [out["mass"], out["mass"] * wide(r, 0.3, 2)], "stiffness": stiff,
+        stiff = [out["mass"] * omega**2 * draw_log_uniform(r, 0.3, 2) for _ in range(3)]
+        out["masses"] = {"mass": [out["mass"], out["mass"] * draw_log_uniform(r, 0.3, 2)], "stiffness": stiff,
                          "damper": [0.01 * float(np.sqrt(k * out["mass"])) for k in stiff],
-                         "loads": [out["load"], out["load"] * wide(r, 0.2, 1)],
+                         "loads": [out["load"], out["load"] * draw_log_uniform(r, 0.2, 1)],
                          "pairs": [[1, 0], [2, 0] if r.random() < 0.5 else [1, 2]]}
         return
     if r.random() < 0.12:
-        out["bonded"] = {"stiffness": out["mass"] * omega**2 * wide(r, 0.1, 2),
+        out["bonded"] = {"stiffness": out["mass"] * omega**2 * draw_log_uniform(r, 0.1, 2),
                          "damping": out["mass"] * omega * float(r.choice([0.0, 0.01]))}
     if r.random() < 0.08 and out["law"] not in ("order", "report", "convolution"):
-        out["cubic"] = out["mass"] * omega**2 / (out["size"] / omega**2)**2 * wide(r, 0.01, 0.3)
+        out["cubic"] = out["mass"] * omega**2 / (out["size"] / omega**2)**2 * draw_log_uniform(r, 0.01, 0.3)
 
 
 def _drive(r, out: dict, own: float, reach: float) -> None:
@@ -162,14 +162,14 @@ def _contact(r, out: dict) -> None:
         out["load_amplitude"], out["load_frequency"] = out["load"] * float(r.uniform(0.1, 0.6)), out["frequency"] / 2
     elif draw < 0.22:
         shear = out["law"] in ("coulomb", "elastic-plastic", "stretch") and r.random() < 0.6
-        out["patch"] = {"shear": shear, "tilt": float(r.choice([0.0, wide(r, 1e-5, 2e-4)])), "elements": 24}
+        out["patch"] = {"shear": shear, "tilt": float(r.choice([0.0, draw_log_uniform(r, 1e-5, 2e-4)])), "elements": 24}
 
 
-def _row(table: str, values: dict) -> str:
-    return f"[{table}]\n" + "".join(f"{key} = {value}\n" for key, value in values.items())
+def table(name: str, values: dict) -> str:
+    return f"[{name}]\n" + "".join(f"{key} = {value}\n" for key, value in values.items())
 
 
-def _q(value: float, unit: str) -> str:
+def quantity(value: float, unit: str) -> str:
     return f'"{float(value)!r} {unit}"'
 
 
@@ -179,11 +179,11 @@ NAMES = {"weakening": "coulomb", "stretch": "nonlocal", "growing": "nonlocal", "
          "report": "nonlocal"}
 
 
-def law_keys(s: dict) -> dict:
+def write_law_keys(s: dict) -> dict:
     """Keys of the law as a scene writes them."""
     name = NAMES.get(s["law"], s["law"])
     out = {"law": f'"{name}"'} | ({"reading": '"report"'} if s["law"] == "report" else {})
-    return out | {k: _q(v, UNITS[k]) if k in UNITS else repr(float(v)) for k, v in s["keys"].items()}
+    return out | {k: quantity(v, UNITS[k]) if k in UNITS else repr(float(v)) for k, v in s["keys"].items()}
 
 
 def text(s: dict, signal: str = "signal.csv") -> str:
@@ -193,37 +193,37 @@ def text(s: dict, signal: str = "signal.csv") -> str:
     parts = []
     if s["patch"] is not None:
         p = s["patch"]
-        parts.append(_row("contact", {"length": '"12.7 mm"', "width": '"12.7 mm"', "height": '"6.35 mm"',
-                                      "load": _q(s["load"], "N"), "substrate": '"Ti-8Al-1Mo-1V"',
-                                      "element_size": _q(12.7e-3 / p["elements"], "m")}))
+        parts.append(table("contact", {"length": '"12.7 mm"', "width": '"12.7 mm"', "height": '"6.35 mm"',
+                                      "load": quantity(s["load"], "N"), "substrate": '"Ti-8Al-1Mo-1V"',
+                                      "element_size": quantity(12.7e-3 / p["elements"], "m")}))
         parts += ["[contact.shear]\n"] * p["shear"]
-        parts += [_row("contact.tilt", {"angle": _q(p["tilt"], "rad")})] * (p["tilt"] > 0)
+        parts += [table("contact.tilt", {"angle": quantity(p["tilt"], "rad")})] * (p["tilt"] > 0)
     else:
-        more = {"amplitude": _q(s["load_amplitude"], "N"), "frequency": _q(s["load_frequency"], "Hz")} \
+        more = {"amplitude": quantity(s["load_amplitude"], "N"), "frequency": quantity(s["load_frequency"], "Hz")} \
             if "load_amplitude" in s else {}
-        parts.append(_row("normal", {"load": _q(s["load"], "N")} | more))
-    parts += [_row("friction", law_keys(s)), _row("structure", {"moving_mass": _q(s["mass"], "kg")})]
+        parts.append(table("normal", {"load": quantity(s["load"], "N")} | more))
+    parts += [table("friction", write_law_keys(s)), table("structure", {"moving_mass": quantity(s["mass"], "kg")})]
     if "bonded" in s:
-        parts.append(_row("structure.bonded", {"stiffness": _q(s["bonded"]["stiffness"], "N/m"),
-                                               "damping": _q(s["bonded"]["damping"], "N s/m")}))
+        parts.append(table("structure.bonded", {"stiffness": quantity(s["bonded"]["stiffness"], "N/m"),
+                                               "damping": quantity(s["bonded"]["damping"], "N s/m")}))
     if "cubic" in s:
-        parts.append(_row("structure.stiffening", {"cubic": _q(s["cubic"], "N/m^3")}))
+        parts.append(table("structure.stiffening", {"cubic": quantity(s["cubic"], "N/m^3")}))
     for k, mode in enumerate(s["modes"]):
-        parts.append("[" + _row("structure.mode", {"name": f'"m{k}"', "frequency": _q(mode["frequency"], "Hz")} | {
+        parts.append("[" + table("structure.mode", {"name": f'"m{k}"', "frequency": quantity(mode["frequency"], "Hz")} | {
             key: repr(mode[key]) for key in ("damping", "slide", "base", "output")}).replace("]", "]]", 1))
     return "".join(parts) + _driven(s, signal) + _accuracy(s)
 
 
 def _masses(s: dict) -> str:
     m = s["masses"]
-    parts = [_row("structure", {"masses": "[" + ", ".join(_q(one, "kg") for one in m["mass"]) + "]"})]
+    parts = [table("structure", {"masses": "[" + ", ".join(quantity(one, "kg") for one in m["mass"]) + "]"})]
     for pair, k, c in zip(([1, 0], [2, 1], [2, 0]), m["stiffness"], m["damper"]):
-        parts.append("[" + _row("structure.spring", {"between": pair, "stiffness": _q(k, "N/m")}).replace("]", "]]", 1))
-        parts.append("[" + _row("structure.damper", {"between": pair, "coefficient": _q(c, "N s/m")}).replace(
+        parts.append("[" + table("structure.spring", {"between": pair, "stiffness": quantity(k, "N/m")}).replace("]", "]]", 1))
+        parts.append("[" + table("structure.damper", {"between": pair, "coefficient": quantity(c, "N s/m")}).replace(
             "]", "]]", 1))
     for pair, load in zip(m["pairs"], m["loads"]):
-        keys = {"between": pair, "load": _q(load, "N")} | law_keys(s)
-        parts.append("[" + _row("structure.interface", keys).replace("]", "]]", 1))
+        keys = {"between": pair, "load": quantity(load, "N")} | write_law_keys(s)
+        parts.append("[" + table("structure.interface", keys).replace("]", "]]", 1))
     return "".join(parts)
 
 
@@ -233,31 +233,31 @@ def _driven(s: dict, signal: str) -> str:
     pushed = {"mass": 1} if s["several"] else {}
     cycles = {"cycles": s["cycles"]}
     if kind == "free":
-        out = _row("structure.start", {"displacement": "[" + ", ".join(_q(x, "m") for x in s["start"]) + "]"})
-        return out + _row("drive", {"kind": '"free"'} | cycles)
+        out = table("structure.start", {"displacement": "[" + ", ".join(quantity(x, "m") for x in s["start"]) + "]"})
+        return out + table("drive", {"kind": '"free"'} | cycles)
     if kind == "force":
-        return _row("drive", {"kind": '"force"', "frequency": _q(s["frequency"], "Hz"), "force": _q(force, "N")}
+        return table("drive", {"kind": '"force"', "frequency": quantity(s["frequency"], "Hz"), "force": quantity(force, "N")}
                     | pushed | cycles)
     if kind == "step":
-        return _row("drive", {"kind": '"base"', "waveform": '"step"', "acceleration": _q(size, "m/s^2")} | cycles)
+        return table("drive", {"kind": '"base"', "waveform": '"step"', "acceleration": quantity(size, "m/s^2")} | cycles)
     if kind == "sweep":
         w = s["sweep"]
-        return _row("drive", {"kind": '"base"', "waveform": '"sweep"', "from": _q(w["from"], "Hz"),
-                              "to": _q(w["to"], "Hz"), "rate": _q(w["rate"], "Hz/s"),
-                              "acceleration": _q(size, "m/s^2")})
+        return table("drive", {"kind": '"base"', "waveform": '"sweep"', "from": quantity(w["from"], "Hz"),
+                              "to": quantity(w["to"], "Hz"), "rate": quantity(w["rate"], "Hz/s"),
+                              "acceleration": quantity(size, "m/s^2")})
     if kind == "levels":
-        rows = "[" + ", ".join(_q(one, "m/s^2") for one in s["levels"]) + "]"
-        return _row("drive", {"kind": '"base"', "waveform": '"levels"', "frequency": _q(s["frequency"], "Hz"),
+        rows = "[" + ", ".join(quantity(one, "m/s^2") for one in s["levels"]) + "]"
+        return table("drive", {"kind": '"base"', "waveform": '"levels"', "frequency": quantity(s["frequency"], "Hz"),
                               "levels": rows} | cycles)
     if kind == "file":
-        return _row("drive", {"kind": '"base"', "waveform": '"file"', "file": f'"{signal}"'})
-    return _row("drive", {"kind": '"base"', "frequency": _q(s["frequency"], "Hz"),
-                          "acceleration": _q(size, "m/s^2")} | cycles)
+        return table("drive", {"kind": '"base"', "waveform": '"file"', "file": f'"{signal}"'})
+    return table("drive", {"kind": '"base"', "frequency": quantity(s["frequency"], "Hz"),
+                          "acceleration": quantity(size, "m/s^2")} | cycles)
 
 
 def _accuracy(s: dict) -> str:
     method = {"method": f'"{s["method"]}"'} if "method" in s else {}
-    return _row("accuracy", {"tolerance": s["tolerance"]} | method)
+    return table("accuracy", {"tolerance": s["tolerance"]} | method)
 
 
 def record(s: dict) -> str:

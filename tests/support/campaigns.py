@@ -1,0 +1,278 @@
+"""Random campaigns: how many stated errors hold against independent references.
+
+    python tests/support/campaigns.py run KIND FILE --first SEED --count N [--truth OTHER]
+    python tests/support/campaigns.py score FILE...
+    python tests/support/campaigns.py compare BEFORE AFTER
+
+`run` adds one line of JSON to FILE for each seed that FILE does not contain, so that a run that was stopped goes on.
+`--truth` takes the reference values from an earlier FILE, also of another version of the package. `score` prints the
+share of errors that hold, for each measure and each engine. `compare` prints two files side by side for the scenes that
+both contain. Choose seeds that nobody used (tests/README.md), and write them down before the run.
+
+A kind of campaign is a function `compare_scene(seed, folder, earlier)` that returns a `line` or None for a seed that
+does not belong to the kind. A stated error *holds* if it is at least as large as the difference from the reference. It
+is *sharp* if it is at most five times that difference, or too small to matter.
+"""
+
+import argparse
+import json
+import signal
+import tempfile
+from collections import defaultdict
+from importlib import import_module
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+KINDS = {  # name on the command line -> module and function
+    "rigs": ("random_rigs", "compare_rig"),
+    "harmonic": ("random_rigs", "compare_harmonic_rig"),
+    "reduced": ("reduced_chains", "compare_chain"),
+    "planes": ("plane_chains", "compare_chain"),
+    "point-benches": ("point_benches", "compare_bench"),
+    "partial-slip": ("micro_slip", "compare_bench"),
+    "printed-benches": ("printed_sums", "compare_bench"),
+    "printed-rigs": ("printed_sums", "compare_rig"),
+    "shear-joints": ("shear_scenes", "compare_joint"),
+    "shear-rigs": ("shear_scenes", "compare_rig"),
+    "shear-chains": ("shear_scenes", "compare_chain"),
+    "static": ("static_scenes", "compare_patch"),
+    "traces": ("random_traces", "compare_trace"),
+    "stick-together": ("sticks_together", "compare_rig"),
+    "lanes": ("lane_cases", "compare_cases"),
+    "decay-fits": ("decay_fits", "compare_fit"),
+}
+MAX_CPU_SECONDS = 60  # of one scene with its reference; a longer one is noted as failed
+SHARP_FACTOR = 5.0  # a sharp error is at most so many times the true error
+SHARP_FRACTION = 1e-8  # of the value; a smaller error is sharp because nobody can use more digits
+FLOOR_FRACTION = 1e-3  # of the floor of a measure; a smaller difference does not count
+ROUND_OFF = 1e-9  # of the value; a smaller difference does not count
+
+
+class Row(NamedTuple):
+    """A measure of a scene beside its reference; `doubt` is the uncertainty of the reference itself."""
+
+    name: str
+    value: float
+    error: float
+    floor: float
+    truth: float
+    doubt: float
+
+    @property
+    def true_error(self) -> float:
+        """Difference from the reference; a phase is compared modulo pi."""
+        gap = abs(self.truth - self.value)
+        if self.name == "slip_start_phase":
+            return min(gap, abs(np.pi - gap))
+        return gap
+
+    @property
+    def holds(self) -> bool:
+        """Whether the stated error is at least the true error, apart from the doubt of the reference."""
+        ignored = max(FLOOR_FRACTION * self.floor, ROUND_OFF * abs(self.value))
+        return self.true_error <= self.error + self.doubt + ignored
+
+    @property
+    def is_sharp(self) -> bool | None:
+        """Whether the stated error is not much larger than the true error; None where the reference cannot say."""
+        if self.error <= max(self.floor, SHARP_FRACTION * abs(self.value)):
+            return True
+        if self.true_error <= 2 * self.doubt:
+            return None
+        return self.error <= SHARP_FACTOR * self.true_error
+
+
+class Score(NamedTuple):
+    """Shares of a list of lines: of scenes whose errors all hold, of errors that hold, of errors that are sharp."""
+
+    n_scenes: int
+    right_scenes: float
+    n_errors: int
+    held: float
+    sharp: float
+
+
+def measure_rows(measures, truths: dict, doubts: dict, names=None) -> list:
+    """List the measures (of a result) that have a value, an error and a reference.
+
+    Parameters
+    ----------
+    measures : mapping of name to Measure
+    truths, doubts : dict
+        Reference values and their own uncertainties by name.
+    names : collection of str, optional
+        Names that count; all if omitted.
+    """
+    return [
+        Row(name, one.value, one.error, one.floor, truths[name], doubts.get(name, 0.0))
+        for name, one in measures.items()
+        if name in truths
+        and None not in (one.value, one.error)
+        and (names is None or name in names)
+    ]
+
+
+def strip_number(name: str) -> str:
+    """Return the name of a measure without the number of its interface."""
+    head, _, number = name.rpartition("_")
+    return head if number.isdigit() else name
+
+
+def rows_of(line: dict) -> list:
+    """Rows of a stored line."""
+    return [Row(*row) for row in line["rows"]]
+
+
+def fraction(values: list) -> float:
+    """Fraction of the known values (not None) that are true."""
+    known = [value for value in values if value is not None]
+    return float(np.mean(known)) if known else float("nan")
+
+
+def score(lines: list) -> Score:
+    """Score the lines that have rows."""
+    scenes = [rows_of(line) for line in lines if line["rows"]]
+    rows = [row for scene in scenes for row in scene]
+    return Score(
+        n_scenes=len(scenes),
+        right_scenes=fraction([all(row.holds for row in scene) for scene in scenes]),
+        n_errors=len(rows),
+        held=fraction([row.holds for row in rows]),
+        sharp=fraction([row.is_sharp for row in rows]),
+    )
+
+
+def print_score(lines: list) -> None:
+    """Print the errors that do not hold, then the shares for each measure and each engine."""
+    by_name = defaultdict(list)
+    for line in lines:
+        for row in rows_of(line):
+            by_name[strip_number(row.name)].append(row)
+            if not row.holds:
+                print(
+                    f"too small: seed {line['seed']}, {line.get('group')}, {line.get('engine')}:",
+                    *row,
+                )
+    for name, rows in sorted(by_name.items()):
+        held, sharp = (
+            fraction([row.holds for row in rows]),
+            fraction([row.is_sharp for row in rows]),
+        )
+        print(f"{name:34s} {len(rows):5d} errors, {held:6.1%} hold, {sharp:6.1%} are sharp")
+    for engine in [*engines_of(lines), None]:
+        some = [line for line in lines if engine in (None, line.get("engine"))]
+        print(f"{engine or 'all':12s}", describe(score(some)))
+    for line in lines:
+        if not line["rows"]:
+            print(f"not compared: seed {line['seed']}, {line.get('refused', line.get('outcome'))}")
+
+
+def engines_of(lines: list) -> list:
+    """Names of the engines of the lines that have rows."""
+    return sorted({line.get("engine") or "" for line in lines if line["rows"]} - {""})
+
+
+def describe(shares: Score) -> str:
+    """Write a score in one sentence."""
+    return (
+        f"{shares.n_scenes} scenes, all errors hold in {shares.right_scenes:.1%}; {shares.n_errors} errors, "
+        f"{shares.held:.1%} hold, {shares.sharp:.1%} are sharp"
+    )
+
+
+def print_comparison(before: list, after: list) -> None:
+    """Print the scores of two files, and the ratios of seconds and steps, for the scenes that both contain."""
+    old = {line["seed"]: line for line in before}
+    pairs = [(old[line["seed"]], line) for line in after if line["seed"] in old]
+    pairs = [pair for pair in pairs if all(line["rows"] for line in pair)]
+    for engine in [*engines_of([new for _, new in pairs]), None]:
+        some = [pair for pair in pairs if engine in (None, pair[1].get("engine"))]
+        print(engine or "all")
+        for label, column in (("before", 0), ("after", 1)):
+            print(f"    {label:7s}", describe(score([pair[column] for pair in some])))
+        for key in ("seconds", "steps"):
+            ratios = [
+                new[key] / first[key] for first, new in some if first.get(key) and new.get(key)
+            ]
+            if ratios:
+                print(
+                    f"    {key} after/before: median {np.median(ratios):.3f}, largest {max(ratios):.2f}"
+                )
+        counts = [
+            sum(len(pair[column].get("warnings") or ()) for pair in some) for column in (0, 1)
+        ]
+        print(f"    warnings: {counts[0]} before, {counts[1]} after")
+
+
+def read_lines(names) -> list:
+    """Read the stored lines of files."""
+    return [
+        json.loads(line) for name in names for line in Path(name).read_text("utf-8").splitlines()
+    ]
+
+
+def stop_scene(*_) -> None:
+    """End a scene that takes too long (a signal handler)."""
+    raise TimeoutError(f"more than {MAX_CPU_SECONDS} CPU seconds")
+
+
+def run_campaign(compare_scene, seeds, file: Path, earlier: dict) -> None:
+    """Compare the scenes of the seeds that the file does not contain; store a line after each.
+
+    Parameters
+    ----------
+    compare_scene : callable
+        `compare_scene(seed, folder, earlier_line)` returns a line, or None to leave the seed out.
+    seeds : iterable of int
+    file : Path
+    earlier : dict
+        Lines of an earlier run by seed, whose reference values are used again.
+    """
+    signal.signal(signal.SIGPROF, stop_scene)
+    done = {line["seed"] for line in read_lines([file])} if file.exists() else set()
+    for seed in seeds:
+        if seed in done:
+            continue
+        signal.setitimer(signal.ITIMER_PROF, MAX_CPU_SECONDS)
+        try:
+            with tempfile.TemporaryDirectory() as folder:
+                line = compare_scene(seed, Path(folder), earlier.get(seed))
+        except (TimeoutError, RuntimeError, AssertionError, ValueError) as error:
+            line = {"rows": [], "refused": f"failed: {error!r}"}
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        if line is not None:
+            with file.open("a", encoding="utf-8") as out:
+                out.write(json.dumps({"seed": seed} | line, default=float) + "\n")
+
+
+def main() -> None:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    verbs = parser.add_subparsers(dest="verb", required=True)
+    run = verbs.add_parser("run")
+    run.add_argument("kind", choices=KINDS)
+    run.add_argument("file", type=Path)
+    run.add_argument("--first", type=int, required=True)
+    run.add_argument("--count", type=int, required=True)
+    run.add_argument("--truth", type=Path)
+    verbs.add_parser("score").add_argument("files", nargs="+")
+    compare = verbs.add_parser("compare")
+    compare.add_argument("before")
+    compare.add_argument("after")
+    request = parser.parse_args()
+    if request.verb == "score":
+        print_score(read_lines(request.files))
+        return
+    if request.verb == "compare":
+        print_comparison(read_lines([request.before]), read_lines([request.after]))
+        return
+    module, function = KINDS[request.kind]
+    earlier = {line["seed"]: line for line in read_lines([request.truth])} if request.truth else {}
+    seeds = range(request.first, request.first + request.count)
+    run_campaign(getattr(import_module(module), function), seeds, request.file, earlier)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,178 @@
+"""Random benches of every friction law without a patch, against an integration of the law over the prescribed motion.
+
+Campaign `point-benches` of `campaigns`. The reference integrates the rate equation of the law (`motion_laws`) by DOP853
+from event to event, and uses nothing of the package.
+"""
+
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+from campaigns import measure_rows
+from motion_reference import Motion
+from motion_scenes import draw_law_keys, draw_log_uniform, quantity, table, write_law_keys
+
+import patchfem as pf
+
+LAWS = (
+    "coulomb",
+    "weakening",
+    "elastic-plastic",
+    "iwan",
+    "tanh",
+    "bouc-wen",
+    "lugre",
+    "stretch",
+    "growing",
+    "report",
+)
+N_SAMPLES = 20000  # of the last cycle, at which the reference is read
+SAMPLING_DOUBT = (
+    1e-6  # of the values that are read from samples; a peak between two of them is missed by less
+)
+SAMPLED = ("friction_force_peak", "secant_stiffness", "equivalent_stiffness")
+TOLERANCES = (
+    1e-11,
+    1e-12,
+)  # relative error of a step of the two integrations, whose difference is the doubt
+
+
+def draw_bench(seed: int) -> dict:
+    """Draw the numbers of a bench in SI units; the laws take turns."""
+    r = np.random.default_rng(seed)
+    law = LAWS[seed % len(LAWS)]
+    load, frequency = draw_log_uniform(r, 20, 2000), draw_log_uniform(r, 1, 300)
+    amplitude = draw_log_uniform(r, 1e-6, 1e-4)
+    omega = 2 * np.pi * frequency
+    numbers = {
+        "law": law,
+        "load": load,
+        "frequency": frequency,
+        "amplitude": amplitude,
+        "cycles": int(r.integers(2, 5)),
+        "tolerance": float(r.choice([1e-2, 1e-3, 1e-4])),
+        # what the independent program reads besides: one mode that the motion does not move
+        "several": False,
+        "patch": None,
+        "drive": "sine",
+        "mass": 1.0,
+        "size": amplitude * omega**2,
+        "seeded": omega,
+        "modes": [
+            {"frequency": frequency, "base": 1.0, "damping": 0.0, "slide": 1.0, "output": 1.0}
+        ],
+    }
+    return numbers | draw_law_keys(r, law, load, amplitude, amplitude * omega)
+
+
+def write_bench(bench: dict) -> str:
+    """Write the scene of a bench."""
+    slide = {
+        "kind": '"sine"',
+        "amplitude": quantity(bench["amplitude"], "m"),
+        "frequency": quantity(bench["frequency"], "Hz"),
+        "cycles": bench["cycles"],
+    }
+    return (
+        table("normal", {"load": quantity(bench["load"], "N")})
+        + table("friction", write_law_keys(bench))
+        + table("slide", slide)
+        + table("accuracy", {"tolerance": bench["tolerance"]})
+    )
+
+
+class PrescribedMotion(Motion):
+    """The motion A sin(omega t) with a friction law, whose force does not act back on the motion."""
+
+    def start(self):
+        y = super().start()
+        y[1] = self.s["amplitude"] * self.s["seeded"]
+        return y
+
+    def forces(self, t, y, pull=None):
+        law, part = self.laws[0], self.parts[0]
+        return np.array([law.mode * law.kinetic if law.set_valued else law.force(y[part], y[1], t)])
+
+    def slope(self, t, y):
+        law, part = self.laws[0], self.parts[0]
+        out = np.empty_like(y)
+        out[0] = y[1]
+        out[1] = -self.s["size"] * np.sin(self.s["seeded"] * t)
+        out[part] = law.rate(y[part], y[1], t)
+        out[-1] = self.forces(t, y)[0] * y[1]
+        return out
+
+    def turn(self, t, y, k, g):
+        law = self.laws[0]
+        if law.set_valued:
+            law.mode = -law.mode
+        else:
+            super().turn(t, y, k, g)
+
+
+def integrate_bench(bench: dict, rtol: float) -> dict:
+    """Integrate a bench and return its measures by name."""
+    motion = PrescribedMotion(bench)
+    law, part, period = motion.laws[0], motion.parts[0], 1 / bench["frequency"]
+    end = bench["cycles"] * period
+    times, forces, displacements = [], [], []
+    peak = 0.0
+    works = {}
+    for stretch in motion.run(end, rtol, start=None if law.set_valued else motion.start()[:-1]):
+        law.mode, law.side = stretch.modes[0]
+        if stretch.turns:
+            law.turns = stretch.turns[0]
+        begin, stop = stretch.times[0], stretch.times[-1]
+        count = max(int(N_SAMPLES * (stop - begin) / period), 2)
+        t = np.linspace(begin, stop, count)
+        y = stretch.solution(t).T
+        f = np.array([motion.forces(*pair)[0] for pair in zip(t, y)])
+        peak = max(peak, np.abs(f).max())
+        for moment in (end - period, end):
+            if begin <= moment <= stop:
+                works[moment] = float(stretch.solution(moment)[-1])
+        last = t >= end - period * (1 + 1e-12)
+        times.append(t[last])
+        forces.append(f[last])
+        displacements.append(y[last, 0])
+    t, f, q = map(np.concatenate, (times, forces, displacements))
+    turn = np.exp(-1j * bench["seeded"] * t)
+    high, low = np.argmax(q), np.argmin(q)
+    measures = {
+        "loop_area": works[end] - works[end - period],
+        "friction_work": works[end],
+        "friction_force_peak": peak,
+        "friction_ratio_end": f[-1] / bench["load"],
+        "secant_stiffness": (f[high] - f[low]) / (q[high] - q[low]),
+        "equivalent_stiffness": (np.trapezoid(f * turn, t) / np.trapezoid(q * turn, t)).real,
+    }
+    if law.set_valued:  # where the motion turns, the force is any between the two friction limits
+        del measures["secant_stiffness"], measures["friction_force_peak"]
+    return measures
+
+
+def compare_bench(seed: int, folder: Path, earlier: dict | None = None) -> dict:
+    """Compare a bench with its reference; see `campaigns`."""
+    bench = draw_bench(seed)
+    begin = process_time()
+    try:
+        result = pf.run(write_bench(bench))
+    except pf.PatchfemError as error:
+        return {"group": bench["law"], "rows": [], "refused": str(error)}
+    line = {
+        "group": bench["law"],
+        "engine": "bench",
+        "seconds": process_time() - begin,
+        "warnings": list(result.warnings),
+        "steps": result.extra.get("steps_per_cycle"),
+    }
+    if earlier and "true" in earlier:
+        line |= {key: earlier[key] for key in ("true", "doubt")}
+    else:
+        first, second = (integrate_bench(bench, rtol) for rtol in TOLERANCES)
+        line["true"] = second
+        line["doubt"] = {
+            name: abs(value - first[name]) + (name in SAMPLED) * SAMPLING_DOUBT * abs(value)
+            for name, value in second.items()
+        }
+    return line | {"rows": measure_rows(result.measures, line["true"], line["doubt"])}
