@@ -1,8 +1,7 @@
 """Random benches behind [contact.shear] against an own finite-element and partial-slip solver.
 
-`python micro_slip.py score 52000 60` scores 60 benches from seed 52000 on: crowned, tilted or both,
-coated or not, slid by 0.02 to 2 of the slide at which all of the patch slips, at tolerances of 1e-2
-to 1e-4. `table 52100 12` lists errors at four tolerances.
+Campaign `partial-slip` of `campaigns`. The benches are crowned, tilted or both, coated or not, and slide by 0.02 to 2
+of the relative displacement at which the whole patch slips, at tolerances of 1e-2 to 1e-4.
 
 The solver shares nothing with patchfem. The half of a pair is a grid of biquadratic elements,
 assembled as sums of Kronecker products. Pressure and shear are constant on the cells of the
@@ -12,14 +11,16 @@ cells, the missing shear r = g - t at the slide q solves r >= 0, C r >= C g - q,
 uncertainty of the reference.
 """
 
-import sys
-from collections import defaultdict
+from pathlib import Path
 from time import process_time
 
 import numpy as np
+from campaigns import measure_rows
 from scipy.interpolate import PchipInterpolator
 from scipy.sparse import bmat, csc_matrix, kron, lil_matrix
 from scipy.sparse.linalg import splu
+
+import patchfem as pf
 
 MATERIALS = (("steel", 210e9, 0.3), ("titanium", 121e9, 0.32), ("aluminium", 70e9, 0.33))
 COATING = 250e9, 0.24  # Young's modulus [Pa] and Poisson's ratio
@@ -244,8 +245,8 @@ class Reference:
                                                                * np.pi)}
 
 
-def solved(seed):
-    """(bench with its amplitude, measures of the fine grid, their differences from the coarse one)."""
+def solve_bench(seed: int) -> tuple:
+    """Return a bench with its amplitude, the measures of the fine grid and their differences from the coarse one."""
     bench = Bench(seed)
     fine, coarse = Reference(bench, 1.5), Reference(bench, 1.0)
     bench.amplitude = float(bench.share * bench.static * bench.load / fine.stiffness)
@@ -253,60 +254,22 @@ def solved(seed):
     return bench, found, {name: abs(value - other[name]) for name, value in found.items()}
 
 
-def run(bench, tolerance):
-    """(measures, CPU seconds, nodes) of patchfem, without operators that it keeps on disk."""
-    from patchfem.runs.run import run as run_scene
-    from patchfem.scene.scene import loads
+def compare_bench(seed: int, folder: Path, earlier: dict | None = None) -> dict:
+    """Compare a bench with its reference; see `campaigns`."""
+    if earlier and "true" in earlier:
+        bench, true, doubt = Bench(seed), earlier["true"], earlier["doubt"]
+        bench.amplitude = earlier["amplitude"]
+    else:
+        bench, true, doubt = solve_bench(seed)
     begin = process_time()
-    result = run_scene(loads(bench.text(), "bench.toml", [f"accuracy.tolerance={tolerance}"]), fresh=True)
-    return result.measures, process_time() - begin, result.patch.x.size
-
-
-def score(first, count):
-    """Print the share of errors that hold, per measure."""
-    every, seconds = defaultdict(list), []
-    for seed in range(first, first + count):
-        bench, true, unsure = solved(seed)
-        found, spent, nodes = run(bench, bench.tolerance)
-        seconds.append(spent)
-        missed = {}
-        for name, value in true.items():
-            one = found.get(name)
-            if one is None or one.value is None or one.error is None:
-                continue
-            # below a thousandth of the floor a digit is nothing; nor is the reference better than its own change
-            apart = max(abs(one.value - value) - unsure[name], 0.0)
-            missed[name] = apart / max(one.error, 1e-3 * one.floor)
-            size = max(abs(value), 1e-300)
-            every[name].append((missed[name], one.error / size, abs(one.value - value) / size))
-        out = {name: round(float(miss), 2) for name, miss in missed.items() if miss > 1}
-        print(seed, bench.kind, "coated" if bench.thick else "bare", f"share {bench.share:.3f} tol {bench.tolerance}",
-              f"nodes {nodes} {spent:.2f} s; reference loop {unsure['loop_area'] / abs(true['loop_area']):.1e}",
-              f"K {unsure['tangential_stiffness'] / true['tangential_stiffness']:.1e}", out, flush=True)
-    print(f"CPU s: median {np.median(seconds):.2f}, mean {np.mean(seconds):.2f}, largest {max(seconds):.2f}")
-    for name, rows in every.items():
-        miss, wide, off = np.array(rows).T
-        print(f"{name:22s} {100 * np.mean(miss <= 1):5.1f} % of {miss.size}, worst {miss.max():.2f}, median error "
-              f"{np.median(wide):.1e} true {np.median(off):.1e}")
-
-
-def table(first, count):
-    """Print error and true error of four measures at four tolerances."""
-    names = ("loop_area", "friction_force_peak", "equivalent_stiffness", "tangential_stiffness")
-    for seed in range(first, first + count):
-        bench, true, unsure = solved(seed)
-        print(seed, bench.kind, f"share {bench.share:.3f}, reference",
-              ", ".join(f"{name} {unsure[name] / abs(true[name]):.0e}" for name in names))
-        before = None
-        for tolerance in ("1e-2", "1e-3", "1e-4", "1e-5"):
-            found, spent, nodes = run(bench, tolerance)
-            cells = [f"{found[name].error / abs(true[name]):.1e}/{abs(found[name].value / true[name] - 1):.0e}"
-                     for name in names]
-            grows = [name for name, one in found.items() if before and one.error is not None and name in true
-                     and before[name].error is not None and one.error > before[name].error * (1 + 1e-9)]
-            print("  ", tolerance, nodes, f"{spent:.2f} s", *cells, "GROWS" if grows else "", *grows, flush=True)
-            before = found
-
-
-if __name__ == "__main__":
-    {"score": score, "table": table}[sys.argv[1]](int(sys.argv[2]), int(sys.argv[3]))
+    result = pf.run(bench.text(), **{"accuracy.tolerance": float(bench.tolerance)})
+    return {
+        "group": bench.kind,
+        "engine": "coated" if bench.thick else "bare",
+        "seconds": process_time() - begin,
+        "warnings": list(result.warnings),
+        "true": true,
+        "doubt": doubt,
+        "amplitude": bench.amplitude,
+        "rows": measure_rows(result.measures, true, doubt),
+    }

@@ -113,7 +113,7 @@ class PrescribedMotion(Motion):
 def integrate_bench(bench: dict, rtol: float) -> dict:
     """Integrate a bench and return its measures by name."""
     motion = PrescribedMotion(bench)
-    law, part, period = motion.laws[0], motion.parts[0], 1 / bench["frequency"]
+    law, period = motion.laws[0], 1 / bench["frequency"]
     end = bench["cycles"] * period
     times, forces, displacements = [], [], []
     peak = 0.0
