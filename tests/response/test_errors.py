@@ -12,6 +12,7 @@ from patchfem.response.errors import (
     coarser_errors,
     convergence_error,
     convergence_errors,
+    merged_cell_errors,
     orders,
     step_errors,
     with_errors,
@@ -115,6 +116,12 @@ def test_exact_two_runs_take_the_order_that_is_declared(ratio, order):
     fine, coarse = values_at(1.0, ratio, order=order)
     found = coarser_errors(fine | {"loop_area": 1.0}, coarse, fine, ratio=ratio, order=order)
     assert found == {NAME: pytest.approx(SAFETY * 1e-3)}
+
+
+def test_exact_instants_of_events_are_of_first_order_in_the_cells_and_other_measures_of_second():
+    fine, coarse = {"stick_fraction": 0.2, "loop_area": 1.0}, {"stick_fraction": 0.21, "loop_area": 1.15}
+    found = merged_cell_errors(fine, coarse, fine)
+    assert found == {"stick_fraction": pytest.approx(0.01), "loop_area": pytest.approx(0.03)}
 
 
 def test_exact_a_phase_is_compared_modulo_pi():

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 from command_line import cli
-from motion_bars import held
-from plane_bars import chain, compared
-from plane_bars import text as text_of
+from plane_chains import chain, compare_chain
+from plane_chains import text as text_of
 
 import patchfem as pf
 
@@ -100,8 +99,8 @@ SEEDS = (2, 12)  # three interfaces, one of two in a plane
 
 
 def test_always_errors_hold_an_independent_integration_of_the_rate_equations(tmp_path):
-    rows = [row for seed in SEEDS for row in compared(chain(seed), tmp_path)["rows"]]
-    assert len(rows) >= 14 and np.mean([held(row) for row in rows]) >= 0.95
+    rows = [row for seed in SEEDS for row in compare_chain(seed, tmp_path)["rows"]]
+    assert len(rows) >= 14 and np.mean([row.holds for row in rows]) >= 0.95
 
 
 def test_exact_energy_balances_and_force_stays_within_its_circle(tmp_path):

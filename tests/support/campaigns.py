@@ -37,7 +37,6 @@ KINDS = {  # name on the command line -> module and function
     "shear-joints": ("shear_scenes", "compare_joint"),
     "shear-rigs": ("shear_scenes", "compare_rig"),
     "shear-chains": ("shear_scenes", "compare_chain"),
-    "static": ("static_scenes", "compare_patch"),
     "traces": ("random_traces", "compare_trace"),
     "stick-together": ("sticks_together", "compare_rig"),
     "lanes": ("lane_cases", "compare_cases"),

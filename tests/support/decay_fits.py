@@ -1,6 +1,6 @@
-"""In how many fits to a decay the chi square found is within 1 % of the least one beside the true values.
+"""Random fits to a decay, against the least chi square beside the true values.
 
-    python tests/support/decay_fits.py --seeds 8000-8029
+Campaign `decay-fits` of `campaigns`: the chi square of a fit holds if it is within 1 % of the least one.
 
 An even seed makes a block held by a power-law joint (Segalman 2005, 400 sliders), an odd one a block held by one spring
 and slider in series, each with a spring and a viscous damper besides. Mass 1 kg, 100 Hz without the joint, a damping
@@ -10,18 +10,15 @@ that of central differences in steps of 1/400 of a period, kept at every eighth 
 2e-4 to 2e-3 of the release. `import --decay` reads it. The fit frees the keys of the joint, each in a range of two
 decades that lies at random around the truth, and begins at a random place in it. The least chi square beside the truth
 is that of a descent from there by harmonic balance alone. Seeds below 8000 are for making the fit, those from 8000 on
-are held out. Printed: a line per seed (both chi squares, their ratio, CPU seconds and evaluations), and the count
-within 1 %.
+are held out.
 """
 
-import argparse
-import json
-import tempfile
 from pathlib import Path
 from time import process_time
 from typing import NamedTuple
 
 import numpy as np
+from campaigns import Row
 
 import patchfem as pf
 from patchfem.campaigns.backbone.curves import backbone
@@ -74,9 +71,9 @@ def sliders(law: str, stiffness: float, force: float, chi: float) -> tuple:
     if law == "elastic-plastic":
         return np.array([stiffness]), np.array([force])
     most = force * (1 + BETA) / (stiffness * (BETA + (chi + 1) / (chi + 2)))
-    edges = np.linspace(0, 1, SLIDERS + 1)**(1 / (1 + chi / 2))
-    k = np.append(np.diff(edges**(chi + 1)), BETA) / (1 + BETA)
-    moment = np.append((chi + 1) / (chi + 2) * np.diff(edges**(chi + 2)), BETA) / (1 + BETA)
+    edges = np.linspace(0, 1, SLIDERS + 1) ** (1 / (1 + chi / 2))
+    k = np.append(np.diff(edges ** (chi + 1)), BETA) / (1 + BETA)
+    moment = np.append((chi + 1) / (chi + 2) * np.diff(edges ** (chi + 2)), BETA) / (1 + BETA)
     return stiffness * k, stiffness * most * moment
 
 
@@ -90,7 +87,9 @@ def released(k, limit, damping: float, start: float) -> tuple:
     for n in range(out.size * KEPT):
         if n % KEPT == 0:
             out[n // KEPT] = x
-        after = (2 * x - (1 - loss) * before - step**2 * (OWN**2 * x + force.sum() / MASS)) / (1 + loss)
+        after = (2 * x - (1 - loss) * before - step**2 * (OWN**2 * x + force.sum() / MASS)) / (
+            1 + loss
+        )
         force = np.clip(force + k * (after - x), -limit, limit)
         before, x = x, after
     return step * KEPT * np.arange(out.size), out
@@ -110,24 +109,36 @@ def made(seed: int, place: Path) -> Made:
         start = even(2, 10) * force / stiffness
         time, x = released(*sliders(law, stiffness, force, chi), damping, start)
         x = x + even(2e-4, 2e-3) * start * rng.standard_normal(x.size)
-        record.write_text("time [s],displacement [m]\n" + "".join(f"{t!r},{y!r}\n" for t, y in zip(time.tolist(),
-                                                                                                 x.tolist())))
+        record.write_text(
+            "time [s],displacement [m]\n"
+            + "".join(f"{t!r},{y!r}\n" for t, y in zip(time.tolist(), x.tolist()))
+        )
         try:
             imported.imported(record, place, (), False, imported.Estimate(decay=True))
             break
         except PatchfemError:
             continue
     static = force / LOAD
-    truth = {"friction.static": static, "friction.stiffness": stiffness, "friction.chi": chi} if law == "iwan" else \
-        {"friction.static": static, "friction.bond_length": force / stiffness}
-    keys = f'stiffness = "{stiffness!r} N/m"\nchi = {chi!r}\nbeta = {BETA}' if law == "iwan" else \
-        f'bond_length = "{force / stiffness!r} m"'
+    truth = (
+        {"friction.static": static, "friction.stiffness": stiffness, "friction.chi": chi}
+        if law == "iwan"
+        else {"friction.static": static, "friction.bond_length": force / stiffness}
+    )
+    keys = (
+        f'stiffness = "{stiffness!r} N/m"\nchi = {chi!r}\nbeta = {BETA}'
+        if law == "iwan"
+        else f'bond_length = "{force / stiffness!r} m"'
+    )
     free, begin = {}, {}
     for key, value in truth.items():
         low = value / even(1.5, 60)
         free[key] = (-0.95, 0.0) if key == "friction.chi" else (low, 100 * low)
-        begin[key] = float(rng.uniform(-0.95, 0.0)) if key == "friction.chi" else even(low, 100 * low)
-    return Made(SCENE.format(law=law, static=static, keys=keys, damping=damping), free, begin, truth)
+        begin[key] = (
+            float(rng.uniform(-0.95, 0.0)) if key == "friction.chi" else even(low, 100 * low)
+        )
+    return Made(
+        SCENE.format(law=law, static=static, keys=keys, damping=damping), free, begin, truth
+    )
 
 
 def chi_square(fitted) -> float:
@@ -142,52 +153,41 @@ def least(one: Made, place: Path, wanted: list) -> float:
     base = Base(pf.load(one.scene))
 
     def residual(values) -> np.ndarray:
-        model = build(base.changed([key.assigned(float(value)) for key, value in zip(wanted, values)]))
-        curve = backbone(model, "", np.unique(amplitude), ("balance",), errors=False).curves["balance"]
+        model = build(
+            base.changed([key.assigned(float(value)) for key, value in zip(wanted, values)])
+        )
+        curve = backbone(model, "", np.unique(amplitude), ("balance",), errors=False).curves[
+            "balance"
+        ]
         return ((np.array([curve.frequency, curve.damping]) - measured) / error).ravel()
 
     box = space([key.low for key in wanted], [key.high for key in wanted])
-    return descend(Counted(residual, box, quick=True), box.unit(list(one.truth.values())), range(len(wanted)))[1]
+    return descend(
+        Counted(residual, box, quick=True), box.unit(list(one.truth.values())), range(len(wanted))
+    )[1]
 
 
-def compared(seed: int, known: dict) -> dict:
-    """Of a seed: chi squares found and beside the truth (of `known`, where it is there), CPU seconds and evaluations of
-    the first, rows."""
-    with tempfile.TemporaryDirectory() as folder:
-        place = Path(folder) / "decay.csv"
-        one = made(seed, place)
-        free = [f"{key}={low!r}{UNITS.get(key, '')}..{high!r}{UNITS.get(key, '')}"
-                for key, (low, high) in one.free.items()]
-        best = known[seed] if seed in known else least(one, place, ranges(free)[0])
-        sets = {key: f"{value!r}{UNITS[key]}" if key in UNITS else value for key, value in one.start.items()}
-        begin = process_time()
-        try:
-            fitted = fit_curve(pf.load(one.scene, **sets), place, free)
-            chi, count, values = chi_square(fitted), fitted.keys.fit.evaluations, fitted.keys.fit.values.tolist()
-        except PatchfemError as reason:
-            chi, count, values = np.inf, 0, str(reason)
-        return {"seed": seed, "rows": int(read_curve(place)[0].size), "least": best, "found": chi, "ratio": chi / best,
-                "seconds": process_time() - begin, "evaluations": count, "values": values,
-                "true_values": list(one.truth.values())}
-
-
-def main() -> None:
-    """The seeds of the command line."""
-    ask = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
-    ask.add_argument("--seeds", default="8000-8029", help="first-last")
-    ask.add_argument("--known", type=Path, help="what an earlier call printed, from which the least chi squares come")
-    given = ask.parse_args()
-    lines = given.known.read_text().splitlines() if given.known else []
-    known = {one["seed"]: one["least"] for one in map(json.loads, filter(lambda line: line.startswith("{"), lines))}
-    first, last = map(int, given.seeds.split("-"))
-    ratios = []
-    for seed in range(first, last + 1):
-        one = compared(seed, known)
-        ratios.append(one["ratio"])
-        print(json.dumps(one), flush=True)
-    print(f"{sum(ratio <= 1 + NEAR for ratio in ratios)} of {len(ratios)} within {100 * NEAR:g} % of the least chi "
-          "square beside the truth")
-
-
-if __name__ == "__main__":
-    main()
+def compare_fit(seed: int, folder: Path, earlier: dict | None = None) -> dict:
+    """Compare the chi square of a fit with the least one beside the truth; see `campaigns`."""
+    place = folder / "decay.csv"
+    one = made(seed, place)
+    free = [
+        f"{key}={low!r}{UNITS.get(key, '')}..{high!r}{UNITS.get(key, '')}"
+        for key, (low, high) in one.free.items()
+    ]
+    best = earlier["least"] if earlier else least(one, place, ranges(free)[0])
+    sets = {
+        key: f"{value!r}{UNITS[key]}" if key in UNITS else value for key, value in one.start.items()
+    }
+    begin = process_time()
+    try:
+        fitted = fit_curve(pf.load(one.scene, **sets), place, free)
+    except PatchfemError as reason:
+        return {"rows": [], "refused": str(reason), "least": best}
+    chi = chi_square(fitted)
+    return {
+        "seconds": process_time() - begin,
+        "steps": fitted.keys.fit.evaluations,
+        "least": best,
+        "rows": [Row("chi_square", max(chi, best), NEAR * best, 0.0, best, 0.0)],
+    }

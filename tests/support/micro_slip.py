@@ -26,14 +26,16 @@ MATERIALS = (("steel", 210e9, 0.3), ("titanium", 121e9, 0.32), ("aluminium", 70e
 COATING = 250e9, 0.24  # Young's modulus [Pa] and Poisson's ratio
 MASS = np.array([[4, 2, -1], [2, 16, 2], [-1, 2, 4]]) / 30  # quadratic element of length 1
 STIFFNESS = np.array([[7, -8, 1], [-8, 16, -8], [1, -8, 7]]) / 3
-GRADIENT = np.array([[-3, -4, 1], [4, 0, -4], [-1, 4, 3]]) / 6  # derivative of the row by the column
+GRADIENT = (
+    np.array([[-3, -4, 1], [4, 0, -4], [-1, 4, 3]]) / 6
+)  # derivative of the row by the column
 
 
 def line_matrix(element, lengths, scale):
     """Global matrix (2 n + 1, 2 n + 1) of quadratic elements; scale: (n,) factor of each."""
     out = lil_matrix((2 * lengths.size + 1, 2 * lengths.size + 1))
     for k, factor in enumerate(scale):
-        out[2 * k:2 * k + 3, 2 * k:2 * k + 3] += factor * element
+        out[2 * k : 2 * k + 3, 2 * k : 2 * k + 3] += factor * element
     return csc_matrix(out)
 
 
@@ -44,8 +46,10 @@ def stiffness_of(columns, rows, young, poisson):
     """
     hx, hy = np.diff(columns), np.diff(rows)
     lame, shear = young * poisson / ((1 + poisson) * (1 - 2 * poisson)), young / (2 + 2 * poisson)
-    mass, stiff, grad = (line_matrix(*part) for part in
-                         ((MASS, hx, hx), (STIFFNESS, hx, 1 / hx), (GRADIENT, hx, np.ones(hx.size))))
+    mass, stiff, grad = (
+        line_matrix(*part)
+        for part in ((MASS, hx, hx), (STIFFNESS, hx, 1 / hx), (GRADIENT, hx, np.ones(hx.size)))
+    )
     free = 2 * hy.size
 
     def along_y(element, lengths, scale):
@@ -55,8 +59,11 @@ def stiffness_of(columns, rows, young, poisson):
         return kron(stiff, along_y(MASS, hy, a * hy)) + kron(mass, along_y(STIFFNESS, hy, b / hy))
 
     mixed = kron(grad, along_y(GRADIENT, hy, lame).T) + kron(grad.T, along_y(GRADIENT, hy, shear))
-    uu, vv = terms(lame + 2 * shear, shear), kron(stiff, along_y(MASS, hy, shear * hy)) + \
-        kron(mass, along_y(STIFFNESS, hy, (lame + 2 * shear) / hy))
+    uu, vv = (
+        terms(lame + 2 * shear, shear),
+        kron(stiff, along_y(MASS, hy, shear * hy))
+        + kron(mass, along_y(STIFFNESS, hy, (lame + 2 * shear) / hy)),
+    )
     return csc_matrix(bmat([[uu, mixed], [mixed.T, vv]])), free
 
 
@@ -65,8 +72,12 @@ def compliances(columns, rows, young, poisson, cells, width):
     matrix, free = stiffness_of(columns, rows, young, poisson)
     size = matrix.shape[0]
     order = np.argsort(np.tile(np.repeat(np.arange(2 * columns.size - 1), free), 2), kind="stable")
-    factor = splu(matrix[order][:, order], permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0,
-                  options={"SymmetricMode": True})
+    factor = splu(
+        matrix[order][:, order],
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=0.0,
+        options={"SymmetricMode": True},
+    )
     place = np.empty(size, int)
     place[order] = np.arange(size)
     out = []
@@ -74,12 +85,14 @@ def compliances(columns, rows, young, poisson, cells, width):
         nodes = np.array([[place[offset + (2 * c + k) * free] for k in range(3)] for c in cells])
         found = np.empty((len(cells), len(cells)))
         for first in range(0, len(cells), 64):
-            part = nodes[first:first + 64]
+            part = nodes[first : first + 64]
             load = np.zeros((size, len(part)))
             for column, triple in enumerate(part):
                 load[triple, column] = (1 / 6, 4 / 6, 1 / 6)
             moved = factor.solve(load)
-            found[:, first:first + 64] = (moved[nodes[:, 0]] + 4 * moved[nodes[:, 1]] + moved[nodes[:, 2]]) / 6
+            found[:, first : first + 64] = (
+                moved[nodes[:, 0]] + 4 * moved[nodes[:, 1]] + moved[nodes[:, 2]]
+            ) / 6
         out.append((found + found.T) / width)
     return out
 
@@ -91,7 +104,11 @@ def complementary(matrix, right, load=None):
         index = np.flatnonzero(active)
         ones = np.ones(index.size)
         block = matrix[np.ix_(index, index)]
-        both = np.linalg.solve(block, np.stack([right[index], ones], axis=1)) if index.size else np.zeros((0, 2))
+        both = (
+            np.linalg.solve(block, np.stack([right[index], ones], axis=1))
+            if index.size
+            else np.zeros((0, 2))
+        )
         level = 0.0 if load is None else (load - both[:, 0].sum()) / both[:, 1].sum()
         force = np.zeros(right.size)
         force[index] = both[:, 0] + level * both[:, 1]
@@ -120,7 +137,7 @@ class Bench:
         draw = np.random.default_rng(seed)
         self.kind = draw.choice(["crown", "tilt", "both"])
         self.length, self.width = draw.uniform(10e-3, 60e-3), draw.uniform(5e-3, 45e-3)
-        self.height, self.load = draw.uniform(3e-3, 25e-3), 10**draw.uniform(1.5, 4)
+        self.height, self.load = draw.uniform(3e-3, 25e-3), 10 ** draw.uniform(1.5, 4)
         self.name, self.young, self.poisson = MATERIALS[draw.integers(3)]
         self.static, self.thick = draw.uniform(0.1, 0.6), draw.choice([0.0, 1.0], p=[0.6, 0.4])
         self.thick *= draw.uniform(50e-6, 400e-6)
@@ -128,31 +145,43 @@ class Bench:
         reach = draw.uniform(0.15, 1.8) * self.length / 2  # half-width of Hertz
         self.radius = reach**2 * np.pi * plane / 2 / (4 * self.load / self.width)
         opening = 2 * self.load * 2 * self.height / (plane * self.length * self.width) / self.length
-        self.angle = 10**draw.uniform(-0.7, 1.5) * opening
+        self.angle = 10 ** draw.uniform(-0.7, 1.5) * opening
         self.crowned, self.tilted = self.kind != "tilt", self.kind != "crown"
         if self.kind == "both":
             self.angle *= 0.3
-        self.share = 10**draw.uniform(np.log10(0.02), np.log10(2))
+        self.share = 10 ** draw.uniform(np.log10(0.02), np.log10(2))
         self.tolerance = draw.choice(["1e-2", "1e-3", "1e-3", "1e-4"])
         self.cycles = int(draw.integers(2, 4))
         self.amplitude = None
 
     def gap(self, x):
         """Gap [m] at x [m] of the unloaded faces."""
-        return (x**2 / (2 * self.radius) if self.crowned else 0.0) + (self.angle * x if self.tilted else 0.0)
+        return (x**2 / (2 * self.radius) if self.crowned else 0.0) + (
+            self.angle * x if self.tilted else 0.0
+        )
 
     def text(self):
         """Scene file; the amplitude has to be set."""
-        out = [f'[contact]\nlength = "{self.length!r} m"\nwidth = "{self.width!r} m"\nheight = "{self.height!r} m"',
-               f'load = "{self.load!r} N"',
-               f'substrate = {{young = "{self.young!r} Pa", poisson = {self.poisson!r}, density = "7000 kg/m^3"}}']
+        out = [
+            f'[contact]\nlength = "{self.length!r} m"\nwidth = "{self.width!r} m"\nheight = "{self.height!r} m"',
+            f'load = "{self.load!r} N"',
+            f'substrate = {{young = "{self.young!r} Pa", poisson = {self.poisson!r}, density = "7000 kg/m^3"}}',
+        ]
         if self.thick:
-            out += [f'[contact.coating]\nthickness = "{self.thick!r} m"', 'material = {young = '
-                    f'"{COATING[0]!r} Pa", poisson = {COATING[1]!r}, density = "14500 kg/m^3"}}']
+            out += [
+                f'[contact.coating]\nthickness = "{self.thick!r} m"',
+                "material = {young = "
+                f'"{COATING[0]!r} Pa", poisson = {COATING[1]!r}, density = "14500 kg/m^3"}}',
+            ]
         out += [f'[contact.crown]\nradius = "{self.radius!r} m"'] if self.crowned else []
         out += [f'[contact.tilt]\nangle = "{self.angle!r} rad"'] if self.tilted else []
-        out += ['[contact.shear]\n[friction]\nlaw = "coulomb"', f"static = {self.static!r}", '[slide]\nkind = "sine"',
-                f'amplitude = "{self.amplitude!r} m"', f'frequency = "10 Hz"\ncycles = {self.cycles}\n']
+        out += [
+            '[contact.shear]\n[friction]\nlaw = "coulomb"',
+            f"static = {self.static!r}",
+            '[slide]\nkind = "sine"',
+            f'amplitude = "{self.amplitude!r} m"',
+            f'frequency = "10 Hz"\ncycles = {self.cycles}\n',
+        ]
         return "\n".join(out).replace("np.float64(", "").replace(")", "")
 
 
@@ -189,10 +218,14 @@ class Reference:
         open_ends = [end for end in ends if abs(end) < half * (1 - 1e-9)]
 
         def size(x):
-            out = min([wide * least + slope * abs(x - end) for end in open_ends] + [inside]) \
-                if ends[0] <= x <= ends[1] else min([wide * least + slope * abs(x - end) for end in ends])
+            out = (
+                min([wide * least + slope * abs(x - end) for end in open_ends] + [inside])
+                if ends[0] <= x <= ends[1]
+                else min([wide * least + slope * abs(x - end) for end in ends])
+            )
             corner = self.bench.length * 2e-3 + 3 * slope * min(half - x, half + x)
             return min(out, max(corner, self.bench.length * 1e-3), self.bench.length / 12)
+
         return size
 
     def _ends(self, cells, chosen, force):
@@ -206,11 +239,16 @@ class Reference:
 
         def size(y):
             far = bench.height * 4e-3 + 0.5 / fine * (bench.height - y)
-            at_coat = np.inf if not bench.thick else bench.thick / 3 + 0.4 / fine * abs(y - bench.thick)
+            at_coat = (
+                np.inf if not bench.thick else bench.thick / 3 + 0.4 / fine * abs(y - bench.thick)
+            )
             return max(min(near + 0.35 / fine * y, far, at_coat), near)
+
         rows = spaced(0.0, bench.height, size)
         if bench.thick:
-            rows = np.append(spaced(0.0, bench.thick, size), spaced(bench.thick, bench.height, size)[1:])
+            rows = np.append(
+                spaced(0.0, bench.thick, size), spaced(bench.thick, bench.height, size)[1:]
+            )
         middle = (rows[1:] + rows[:-1]) / 2
         young = np.where(middle < bench.thick, COATING[0], bench.young)
         poisson = np.where(middle < bench.thick, COATING[1], bench.poisson)
@@ -220,29 +258,46 @@ class Reference:
         """Measures by their names in patchfem."""
         bench, amplitude = self.bench, self.bench.amplitude
         free = self.shear @ self.limit
-        slides = amplitude * (np.arange(161) / 160)**2
-        lack = np.array([self.stiffness * q - self.limit.sum() + complementary(self.shear, free - q)[0].sum()
-                         for q in slides])
+        slides = amplitude * (np.arange(161) / 160) ** 2
+        lack = np.array(
+            [
+                self.stiffness * q - self.limit.sum() + complementary(self.shear, free - q)[0].sum()
+                for q in slides
+            ]
+        )
         lack[0] = 0.0
         curve = PchipInterpolator(slides, np.maximum(lack, 0.0))
         area = curve.antiderivative()
 
         def loop(a):
             return float(4 * a * curve(a) - 8 * area(a))
+
         force = self.stiffness * amplitude - float(curve(amplitude))
-        stored = float(-area(amplitude) - 4 * area(amplitude / 2) + amplitude * curve(amplitude)) \
-            - loop(amplitude) / 4 - loop(amplitude / 2) / 2
-        lost = loop(amplitude) / 4 + (bench.cycles - 0.5) * loop(amplitude) + loop(amplitude / 2) / 2
+        stored = (
+            float(-area(amplitude) - 4 * area(amplitude / 2) + amplitude * curve(amplitude))
+            - loop(amplitude) / 4
+            - loop(amplitude / 2) / 2
+        )
+        lost = (
+            loop(amplitude) / 4 + (bench.cycles - 0.5) * loop(amplitude) + loop(amplitude / 2) / 2
+        )
         angle = (np.arange(4000) + 0.5) * np.pi / 4000
         back = curve(amplitude) - 2 * curve(amplitude * (1 - np.cos(angle)) / 2)
         end = float(curve(amplitude) - 2 * curve(amplitude / 2))
-        return {"tangential_stiffness": self.stiffness, "loop_area": loop(amplitude),
-                "slip_amplitude": loop(amplitude) / (4 * self.limit.sum()), "friction_force_peak": force,
-                "secant_stiffness": force / amplitude, "energy_stored": stored, "energy_dissipated": lost,
-                "friction_work": lost + stored, "friction_ratio_peak": force / bench.load,
-                "friction_ratio_end": end / bench.load,
-                "equivalent_stiffness": self.stiffness - float(2 / np.pi / amplitude * np.mean(back * np.cos(angle))
-                                                               * np.pi)}
+        return {
+            "tangential_stiffness": self.stiffness,
+            "loop_area": loop(amplitude),
+            "slip_amplitude": loop(amplitude) / (4 * self.limit.sum()),
+            "friction_force_peak": force,
+            "secant_stiffness": force / amplitude,
+            "energy_stored": stored,
+            "energy_dissipated": lost,
+            "friction_work": lost + stored,
+            "friction_ratio_peak": force / bench.load,
+            "friction_ratio_end": end / bench.load,
+            "equivalent_stiffness": self.stiffness
+            - float(2 / np.pi / amplitude * np.mean(back * np.cos(angle)) * np.pi),
+        }
 
 
 def solve_bench(seed: int) -> tuple:

@@ -8,9 +8,38 @@ from itertools import count as from_
 
 import numpy as np
 
-LAWS = ("coulomb", "coulomb", "weakening", "weakening", "elastic-plastic", "elastic-plastic", "iwan", "tanh",
-        "bouc-wen", "lugre", "stretch", "stretch", "growing", "order", "report", "convolution")
-DRIVES = ("sine", "sine", "sine", "sine", "force", "force", "step", "sweep", "levels", "file", "free", "free")
+LAWS = (
+    "coulomb",
+    "coulomb",
+    "weakening",
+    "weakening",
+    "elastic-plastic",
+    "elastic-plastic",
+    "iwan",
+    "tanh",
+    "bouc-wen",
+    "lugre",
+    "stretch",
+    "stretch",
+    "growing",
+    "order",
+    "report",
+    "convolution",
+)
+DRIVES = (
+    "sine",
+    "sine",
+    "sine",
+    "sine",
+    "force",
+    "force",
+    "step",
+    "sweep",
+    "levels",
+    "file",
+    "free",
+    "free",
+)
 
 
 def draw_log_uniform(r, low: float, high: float) -> float:
@@ -24,9 +53,17 @@ def spec(seed: int) -> dict:
     law, drive = str(r.choice(LAWS)), str(r.choice(DRIVES))
     own, mass = draw_log_uniform(r, 20, 400), draw_log_uniform(r, 0.2, 2)
     omega, size = 2 * np.pi * own, draw_log_uniform(r, 5, 80)
-    out = {"seed": seed, "law": law, "drive": drive, "mass": mass, "size": size,
-           "frequency": own * float(r.choice([1.0, r.uniform(0.5, 1.6)])),
-           "tolerance": float(r.choice([1e-3, 1e-2])), "cycles": int(r.choice([12, 20, 40])), "seeded": omega}
+    out = {
+        "seed": seed,
+        "law": law,
+        "drive": drive,
+        "mass": mass,
+        "size": size,
+        "frequency": own * float(r.choice([1.0, r.uniform(0.5, 1.6)])),
+        "tolerance": float(r.choice([1e-3, 1e-2])),
+        "cycles": int(r.choice([12, 20, 40])),
+        "seeded": omega,
+    }
     out["modes"] = _modes(r, own)
     base = out["modes"][0]["base"]
     out["load"] = mass * size * base / 0.3 * draw_log_uniform(r, 0.15, 1.1)
@@ -35,19 +72,32 @@ def spec(seed: int) -> dict:
     _structure(r, out, omega)
     _drive(r, out, own, reach)
     _contact(r, out)
-    if drive in ("sine", "force", "free", "step") and law in ("coulomb", "weakening") and r.random() < 0.15 \
-            and not out["several"]:
+    if (
+        drive in ("sine", "force", "free", "step")
+        and law in ("coulomb", "weakening")
+        and r.random() < 0.15
+        and not out["several"]
+    ):
         out["method"] = "march"
-    if drive in ("sine", "force") and law not in ("order", "report", "growing", "weakening") and r.random() < 0.15 \
-            and not (out["several"] or out["patch"] or out.get("cubic") or out.get("load_amplitude")):
+    if (
+        drive in ("sine", "force")
+        and law not in ("order", "report", "growing", "weakening")
+        and r.random() < 0.15
+        and not (out["several"] or out["patch"] or out.get("cubic") or out.get("load_amplitude"))
+    ):
         out["method"] = "harmonic"
     return out
 
 
 HELD_OUT = 29_000_000  # the first seed of the held-out rigs
 # laws that each method has: events, yields, high order, and those of which only a march is chosen
-METHODS = {"events": ("coulomb", "weakening"), "yields": ("elastic-plastic", "iwan"),
-           "smooth": ("tanh", "bouc-wen", "lugre", "stretch", "growing"), "march": LAWS, "harmonic": LAWS}
+METHODS = {
+    "events": ("coulomb", "weakening"),
+    "yields": ("elastic-plastic", "iwan"),
+    "smooth": ("tanh", "bouc-wen", "lugre", "stretch", "growing"),
+    "march": LAWS,
+    "harmonic": LAWS,
+}
 
 
 def held_out(count: int) -> list:
@@ -67,10 +117,17 @@ def fits(s: dict, method: str) -> bool:
     if s["law"] not in METHODS[method]:
         return False
     if method == "harmonic":
-        return s["drive"] in ("sine", "force") and s["law"] not in ("order", "report", "growing", "weakening") \
+        return (
+            s["drive"] in ("sine", "force")
+            and s["law"] not in ("order", "report", "growing", "weakening")
             and not (s["several"] or s["patch"] or s.get("cubic") or s.get("load_amplitude"))
+        )
     sheared = bool(s["patch"]) and s["patch"]["shear"]
-    return method == "march" or not (sheared or "cubic" in s or "load_amplitude" in s) or method == "yields"
+    return (
+        method == "march"
+        or not (sheared or "cubic" in s or "load_amplitude" in s)
+        or method == "yields"
+    )
 
 
 def _modes(r, own: float) -> list:
@@ -78,10 +135,17 @@ def _modes(r, own: float) -> list:
     for k in range(count):
         base = float(r.uniform(0.65, 0.9) if k == 0 else r.uniform(-0.25, 0.25))
         left -= base**2
-        out.append({"frequency": own if k == 0 else own * draw_log_uniform(r, 0.4, 4), "base": base,
-                    "damping": float(r.choice([0.003, 0.01, 0.05, 0.2] + [0.0] * (k == 0 and count == 1))),
-                    "slide": 1.0 if k == 0 else float(r.uniform(-0.4, 0.4)),
-                    "output": 1.0 if k == 0 else float(r.uniform(-0.5, 0.5))})
+        out.append(
+            {
+                "frequency": own if k == 0 else own * draw_log_uniform(r, 0.4, 4),
+                "base": base,
+                "damping": float(
+                    r.choice([0.003, 0.01, 0.05, 0.2] + [0.0] * (k == 0 and count == 1))
+                ),
+                "slide": 1.0 if k == 0 else float(r.uniform(-0.4, 0.4)),
+                "output": 1.0 if k == 0 else float(r.uniform(-0.5, 0.5)),
+            }
+        )
     return out
 
 
@@ -99,13 +163,22 @@ def draw_law_keys(r, law: str, load: float, reach: float, speed: float) -> dict:
     if law == "iwan":
         out |= {"chi": float(r.uniform(-0.7, 0.0)), "beta": float(r.choice([0.0, 0.5, 2.0]))}
     if law == "bouc-wen":
-        out |= {"exponent": float(r.choice([1.0, 2.0, 1.5])), "shape": float(r.choice([0.5, 0.8, 1.0]))}
+        out |= {
+            "exponent": float(r.choice([1.0, 2.0, 1.5])),
+            "shape": float(r.choice([0.5, 0.8, 1.0])),
+        }
     if law == "lugre":
-        out |= {"stribeck_speed": speed * draw_log_uniform(r, 0.01, 0.3), "micro_damping": 0.05 * 0.3 * load / speed,
-                "viscous": 0.01 * 0.3 * load / speed}
+        out |= {
+            "stribeck_speed": speed * draw_log_uniform(r, 0.01, 0.3),
+            "micro_damping": 0.05 * 0.3 * load / speed,
+            "viscous": 0.01 * 0.3 * load / speed,
+        }
     if law == "growing":
-        out |= {"rest_growth": speed / reach * length * draw_log_uniform(r, 1, 30), "slip_growth": length * draw_log_uniform(r, 0.2, 2),
-                "rest_speed": speed * 0.01}
+        out |= {
+            "rest_growth": speed / reach * length * draw_log_uniform(r, 1, 30),
+            "slip_growth": length * draw_log_uniform(r, 0.2, 2),
+            "rest_speed": speed * 0.01,
+        }
     if law == "order":
         out["order"] = float(r.choice([0.5, 1.5, 2.0]))
     if law == "report":
@@ -118,16 +191,23 @@ def _structure(r, out: dict, omega: float) -> None:
     out["several"] = out["law"] not in ("order", "report", "convolution") and r.random() < 0.12
     if out["several"]:
         stiff = [out["mass"] * omega**2 * draw_log_uniform(r, 0.3, 2) for _ in range(3)]
-        out["masses"] = {"mass": [out["mass"], out["mass"] * draw_log_uniform(r, 0.3, 2)], "stiffness": stiff,
-                         "damper": [0.01 * float(np.sqrt(k * out["mass"])) for k in stiff],
-                         "loads": [out["load"], out["load"] * draw_log_uniform(r, 0.2, 1)],
-                         "pairs": [[1, 0], [2, 0] if r.random() < 0.5 else [1, 2]]}
+        out["masses"] = {
+            "mass": [out["mass"], out["mass"] * draw_log_uniform(r, 0.3, 2)],
+            "stiffness": stiff,
+            "damper": [0.01 * float(np.sqrt(k * out["mass"])) for k in stiff],
+            "loads": [out["load"], out["load"] * draw_log_uniform(r, 0.2, 1)],
+            "pairs": [[1, 0], [2, 0] if r.random() < 0.5 else [1, 2]],
+        }
         return
     if r.random() < 0.12:
-        out["bonded"] = {"stiffness": out["mass"] * omega**2 * draw_log_uniform(r, 0.1, 2),
-                         "damping": out["mass"] * omega * float(r.choice([0.0, 0.01]))}
+        out["bonded"] = {
+            "stiffness": out["mass"] * omega**2 * draw_log_uniform(r, 0.1, 2),
+            "damping": out["mass"] * omega * float(r.choice([0.0, 0.01])),
+        }
     if r.random() < 0.08 and out["law"] not in ("order", "report", "convolution"):
-        out["cubic"] = out["mass"] * omega**2 / (out["size"] / omega**2)**2 * draw_log_uniform(r, 0.01, 0.3)
+        out["cubic"] = (
+            out["mass"] * omega**2 / (out["size"] / omega**2) ** 2 * draw_log_uniform(r, 0.01, 0.3)
+        )
 
 
 def _drive(r, out: dict, own: float, reach: float) -> None:
@@ -137,7 +217,11 @@ def _drive(r, out: dict, own: float, reach: float) -> None:
     if kind == "sweep":
         low, high = own * r.uniform(0.6, 0.9), own * r.uniform(1.1, 1.5)
         ends = (low, high) if r.random() < 0.5 else (high, low)
-        out["sweep"] = {"from": float(ends[0]), "to": float(ends[1]), "rate": float((high - low) * own / 30)}
+        out["sweep"] = {
+            "from": float(ends[0]),
+            "to": float(ends[1]),
+            "rate": float((high - low) * own / 30),
+        }
     elif kind == "levels":
         out["levels"] = [out["size"] * part for part in (0.4, 0.7, 1.0)]
         out["cycles"] = int(r.choice([8, 15]))
@@ -148,7 +232,10 @@ def _drive(r, out: dict, own: float, reach: float) -> None:
         out["record"] = [time.tolist(), (out["size"] * value / np.abs(value).max()).tolist()]
     elif kind == "free":
         count = 2 if out["several"] else len(out["modes"])
-        out["start"] = [reach * float(r.uniform(2, 8)), *(reach * float(r.uniform(-1, 1)) for _ in range(count - 1))]
+        out["start"] = [
+            reach * float(r.uniform(2, 8)),
+            *(reach * float(r.uniform(-1, 1)) for _ in range(count - 1)),
+        ]
 
 
 def _contact(r, out: dict) -> None:
@@ -159,10 +246,17 @@ def _contact(r, out: dict) -> None:
     draw = r.random()
     varies = out["law"] in ("coulomb", "elastic-plastic", "tanh", "stretch") and "cubic" not in out
     if draw < 0.06 and varies and out["drive"] != "levels":
-        out["load_amplitude"], out["load_frequency"] = out["load"] * float(r.uniform(0.1, 0.6)), out["frequency"] / 2
+        out["load_amplitude"], out["load_frequency"] = (
+            out["load"] * float(r.uniform(0.1, 0.6)),
+            out["frequency"] / 2,
+        )
     elif draw < 0.22:
         shear = out["law"] in ("coulomb", "elastic-plastic", "stretch") and r.random() < 0.6
-        out["patch"] = {"shear": shear, "tilt": float(r.choice([0.0, draw_log_uniform(r, 1e-5, 2e-4)])), "elements": 24}
+        out["patch"] = {
+            "shear": shear,
+            "tilt": float(r.choice([0.0, draw_log_uniform(r, 1e-5, 2e-4)])),
+            "elements": 24,
+        }
 
 
 def table(name: str, values: dict) -> str:
@@ -173,17 +267,33 @@ def quantity(value: float, unit: str) -> str:
     return f'"{float(value)!r} {unit}"'
 
 
-UNITS = {"bond_length": "m", "reference_speed": "m/s", "stiffness": "N/m", "stribeck_speed": "m/s",
-         "micro_damping": "N s/m", "viscous": "N s/m", "rest_growth": "m/s^2", "slip_growth": "m", "rest_speed": "m/s"}
-NAMES = {"weakening": "coulomb", "stretch": "nonlocal", "growing": "nonlocal", "order": "nonlocal",
-         "report": "nonlocal"}
+UNITS = {
+    "bond_length": "m",
+    "reference_speed": "m/s",
+    "stiffness": "N/m",
+    "stribeck_speed": "m/s",
+    "micro_damping": "N s/m",
+    "viscous": "N s/m",
+    "rest_growth": "m/s^2",
+    "slip_growth": "m",
+    "rest_speed": "m/s",
+}
+NAMES = {
+    "weakening": "coulomb",
+    "stretch": "nonlocal",
+    "growing": "nonlocal",
+    "order": "nonlocal",
+    "report": "nonlocal",
+}
 
 
 def write_law_keys(s: dict) -> dict:
     """Keys of the law as a scene writes them."""
     name = NAMES.get(s["law"], s["law"])
     out = {"law": f'"{name}"'} | ({"reading": '"report"'} if s["law"] == "report" else {})
-    return out | {k: quantity(v, UNITS[k]) if k in UNITS else repr(float(v)) for k, v in s["keys"].items()}
+    return out | {
+        k: quantity(v, UNITS[k]) if k in UNITS else repr(float(v)) for k, v in s["keys"].items()
+    }
 
 
 def text(s: dict, signal: str = "signal.csv") -> str:
@@ -193,34 +303,79 @@ def text(s: dict, signal: str = "signal.csv") -> str:
     parts = []
     if s["patch"] is not None:
         p = s["patch"]
-        parts.append(table("contact", {"length": '"12.7 mm"', "width": '"12.7 mm"', "height": '"6.35 mm"',
-                                      "load": quantity(s["load"], "N"), "substrate": '"Ti-8Al-1Mo-1V"',
-                                      "element_size": quantity(12.7e-3 / p["elements"], "m")}))
+        parts.append(
+            table(
+                "contact",
+                {
+                    "length": '"12.7 mm"',
+                    "width": '"12.7 mm"',
+                    "height": '"6.35 mm"',
+                    "load": quantity(s["load"], "N"),
+                    "substrate": '"Ti-8Al-1Mo-1V"',
+                    "element_size": quantity(12.7e-3 / p["elements"], "m"),
+                },
+            )
+        )
         parts += ["[contact.shear]\n"] * p["shear"]
         parts += [table("contact.tilt", {"angle": quantity(p["tilt"], "rad")})] * (p["tilt"] > 0)
     else:
-        more = {"amplitude": quantity(s["load_amplitude"], "N"), "frequency": quantity(s["load_frequency"], "Hz")} \
-            if "load_amplitude" in s else {}
+        more = (
+            {
+                "amplitude": quantity(s["load_amplitude"], "N"),
+                "frequency": quantity(s["load_frequency"], "Hz"),
+            }
+            if "load_amplitude" in s
+            else {}
+        )
         parts.append(table("normal", {"load": quantity(s["load"], "N")} | more))
-    parts += [table("friction", write_law_keys(s)), table("structure", {"moving_mass": quantity(s["mass"], "kg")})]
+    parts += [
+        table("friction", write_law_keys(s)),
+        table("structure", {"moving_mass": quantity(s["mass"], "kg")}),
+    ]
     if "bonded" in s:
-        parts.append(table("structure.bonded", {"stiffness": quantity(s["bonded"]["stiffness"], "N/m"),
-                                               "damping": quantity(s["bonded"]["damping"], "N s/m")}))
+        parts.append(
+            table(
+                "structure.bonded",
+                {
+                    "stiffness": quantity(s["bonded"]["stiffness"], "N/m"),
+                    "damping": quantity(s["bonded"]["damping"], "N s/m"),
+                },
+            )
+        )
     if "cubic" in s:
         parts.append(table("structure.stiffening", {"cubic": quantity(s["cubic"], "N/m^3")}))
     for k, mode in enumerate(s["modes"]):
-        parts.append("[" + table("structure.mode", {"name": f'"m{k}"', "frequency": quantity(mode["frequency"], "Hz")} | {
-            key: repr(mode[key]) for key in ("damping", "slide", "base", "output")}).replace("]", "]]", 1))
+        parts.append(
+            "["
+            + table(
+                "structure.mode",
+                {"name": f'"m{k}"', "frequency": quantity(mode["frequency"], "Hz")}
+                | {key: repr(mode[key]) for key in ("damping", "slide", "base", "output")},
+            ).replace("]", "]]", 1)
+        )
     return "".join(parts) + _driven(s, signal) + _accuracy(s)
 
 
 def _masses(s: dict) -> str:
     m = s["masses"]
-    parts = [table("structure", {"masses": "[" + ", ".join(quantity(one, "kg") for one in m["mass"]) + "]"})]
+    parts = [
+        table(
+            "structure", {"masses": "[" + ", ".join(quantity(one, "kg") for one in m["mass"]) + "]"}
+        )
+    ]
     for pair, k, c in zip(([1, 0], [2, 1], [2, 0]), m["stiffness"], m["damper"]):
-        parts.append("[" + table("structure.spring", {"between": pair, "stiffness": quantity(k, "N/m")}).replace("]", "]]", 1))
-        parts.append("[" + table("structure.damper", {"between": pair, "coefficient": quantity(c, "N s/m")}).replace(
-            "]", "]]", 1))
+        parts.append(
+            "["
+            + table("structure.spring", {"between": pair, "stiffness": quantity(k, "N/m")}).replace(
+                "]", "]]", 1
+            )
+        )
+        parts.append(
+            "["
+            + table(
+                "structure.damper", {"between": pair, "coefficient": quantity(c, "N s/m")}
+            ).replace("]", "]]", 1)
+        )
     for pair, load in zip(m["pairs"], m["loads"]):
         keys = {"between": pair, "load": quantity(load, "N")} | write_law_keys(s)
         parts.append("[" + table("structure.interface", keys).replace("]", "]]", 1))
@@ -233,26 +388,64 @@ def _driven(s: dict, signal: str) -> str:
     pushed = {"mass": 1} if s["several"] else {}
     cycles = {"cycles": s["cycles"]}
     if kind == "free":
-        out = table("structure.start", {"displacement": "[" + ", ".join(quantity(x, "m") for x in s["start"]) + "]"})
+        out = table(
+            "structure.start",
+            {"displacement": "[" + ", ".join(quantity(x, "m") for x in s["start"]) + "]"},
+        )
         return out + table("drive", {"kind": '"free"'} | cycles)
     if kind == "force":
-        return table("drive", {"kind": '"force"', "frequency": quantity(s["frequency"], "Hz"), "force": quantity(force, "N")}
-                    | pushed | cycles)
+        return table(
+            "drive",
+            {
+                "kind": '"force"',
+                "frequency": quantity(s["frequency"], "Hz"),
+                "force": quantity(force, "N"),
+            }
+            | pushed
+            | cycles,
+        )
     if kind == "step":
-        return table("drive", {"kind": '"base"', "waveform": '"step"', "acceleration": quantity(size, "m/s^2")} | cycles)
+        return table(
+            "drive",
+            {"kind": '"base"', "waveform": '"step"', "acceleration": quantity(size, "m/s^2")}
+            | cycles,
+        )
     if kind == "sweep":
         w = s["sweep"]
-        return table("drive", {"kind": '"base"', "waveform": '"sweep"', "from": quantity(w["from"], "Hz"),
-                              "to": quantity(w["to"], "Hz"), "rate": quantity(w["rate"], "Hz/s"),
-                              "acceleration": quantity(size, "m/s^2")})
+        return table(
+            "drive",
+            {
+                "kind": '"base"',
+                "waveform": '"sweep"',
+                "from": quantity(w["from"], "Hz"),
+                "to": quantity(w["to"], "Hz"),
+                "rate": quantity(w["rate"], "Hz/s"),
+                "acceleration": quantity(size, "m/s^2"),
+            },
+        )
     if kind == "levels":
         rows = "[" + ", ".join(quantity(one, "m/s^2") for one in s["levels"]) + "]"
-        return table("drive", {"kind": '"base"', "waveform": '"levels"', "frequency": quantity(s["frequency"], "Hz"),
-                              "levels": rows} | cycles)
+        return table(
+            "drive",
+            {
+                "kind": '"base"',
+                "waveform": '"levels"',
+                "frequency": quantity(s["frequency"], "Hz"),
+                "levels": rows,
+            }
+            | cycles,
+        )
     if kind == "file":
         return table("drive", {"kind": '"base"', "waveform": '"file"', "file": f'"{signal}"'})
-    return table("drive", {"kind": '"base"', "frequency": quantity(s["frequency"], "Hz"),
-                          "acceleration": quantity(size, "m/s^2")} | cycles)
+    return table(
+        "drive",
+        {
+            "kind": '"base"',
+            "frequency": quantity(s["frequency"], "Hz"),
+            "acceleration": quantity(size, "m/s^2"),
+        }
+        | cycles,
+    )
 
 
 def _accuracy(s: dict) -> str:
@@ -262,7 +455,9 @@ def _accuracy(s: dict) -> str:
 
 def record(s: dict) -> str:
     """The table of a recorded drive."""
-    return "time [s],acceleration [m/s^2]\n" + "".join(f"{t!r},{a!r}\n" for t, a in zip(*s["record"]))
+    return "time [s],acceleration [m/s^2]\n" + "".join(
+        f"{t!r},{a!r}\n" for t, a in zip(*s["record"])
+    )
 
 
 def written(s: dict, folder):

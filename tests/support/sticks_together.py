@@ -1,8 +1,7 @@
-"""Rigs with several faces that stick, or could, at one instant: Coulomb, against DOP853 with events that tries every
-choice of the faces.
+"""Random rigs with several faces that stick, or could, at one instant: Coulomb's law, against DOP853 with events that
+tries every choice of the faces.
 
-    python tests/support/sticks_together.py run FILE [--count N]
-    python tests/support/sticks_together.py score FILE
+Campaign `stick-together` of `campaigns`; seeds are held out from 29 500 000 on.
 
 2 to 4 masses, 2 or 3 interfaces, kinetic over static friction from 1 down to .02. Of four kinds in turn: `mirror`:
 equal masses and couplings, so that all faces stick at once; `twins`: equal interfaces between the same two bodies,
@@ -11,29 +10,30 @@ where all faces decide at the start. Several choices can be without a contradict
 static: a motion is right where it is that of one of the orders in which the reference tries them. More faces than
 masses stand only where the two frictions are equal: else a motion is one of a continuum. Then it is unique, for its
 acceleration takes the least of a convex function, but the faces' shares of the force are not, and the reference, which
-asks the shares, may choose another motion: a march of impulses (Moreau) decides, to the error of its steps. Only the
-public names of the package are used. Seeds are held out: from 29 500 000 on.
+asks the shares, may choose another motion: a march of impulses (Moreau) decides, to the error of its steps.
 """
 
-import argparse
-import json
 import signal
-from collections import Counter
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
+from campaigns import Row
 from event_reference import march_reference, run_reference
 from scipy.interpolate import CubicHermiteSpline
 from scipy.linalg import eigh
 
 import patchfem as pf
 
-FIRST, CYCLES = 29_500_000, 6
+CYCLES = 6
 KINDS, RATIOS = ("mirror", "twins", "release", "step"), (1.0, 0.95, 0.5, 0.2, 0.05, 0.02)
 # which choice the reference takes of several: that of alike faces alike, of the fewest or of the most that slide
-ORDERS = {"mirror": ("together", "fewest", "most"), "twins": ("together",), "release": ("fewest", "most"),
-          "step": ("fewest", "most")}
+ORDERS = {
+    "mirror": ("together", "fewest", "most"),
+    "twins": ("together",),
+    "release": ("fewest", "most"),
+    "step": ("fewest", "most"),
+}
 SAME, BALANCED = 1e-6, 1e-9  # of the largest slide; of the energy
 STEPS, NEAR = 3000, 2e-3  # of the march that decides over dependent faces; its own error
 LONGEST = 20  # CPU seconds of a reference
@@ -47,11 +47,16 @@ def spec(seed: int) -> dict:
     n = int(r.integers(2 if kind == "twins" or (ratio == 1 and kind != "mirror") else faces, 5))
     alike, omega = kind == "mirror", 2 * np.pi * r.uniform(50, 200)
     mass = np.full(n, r.uniform(0.3, 2)) if alike else r.uniform(0.3, 2, n)
-    ground, between = (mass * omega**2 * r.uniform(0.5, 1.5, n), r.uniform(0.1, 0.8, (n, n)) * mass[0] * omega**2)
+    ground, between = (
+        mass * omega**2 * r.uniform(0.5, 1.5, n),
+        r.uniform(0.1, 0.8, (n, n)) * mass[0] * omega**2,
+    )
     if alike:
         ground[:], between[:] = ground[0], between[0, 0]
     links = [((k + 1, 0), ground[k]) for k in range(n)]
-    links += [((k + 1, j + 1), between[k, j]) for k in range(n) for j in range(k) if alike or j == k - 1]
+    links += [
+        ((k + 1, j + 1), between[k, j]) for k in range(n) for j in range(k) if alike or j == k - 1
+    ]
     zeta, size = r.uniform(0.002, 0.05), r.uniform(10, 80)
     pairs = [[1, 0]] * faces if kind == "twins" else [[k + 1, 0] for k in range(min(faces, n))]
     if len(pairs) < faces:
@@ -61,10 +66,20 @@ def spec(seed: int) -> dict:
         share[:] = share[0] / faces
     limit = share * size * (mass[0] if kind in ("mirror", "twins") else mass.mean())
     start = size / omega**2 * r.uniform(-4, 4, n) if kind == "release" else np.zeros(n)
-    return {"seed": seed, "kind": kind, "mass": mass.tolist(), "pairs": pairs, "size": size, "start": start.tolist(),
-            "links": [(list(pair), float(k), float(2 * zeta * np.sqrt(k * mass[0]))) for pair, k in links],
-            "load": (limit / 0.3).tolist(), "frequency": omega / (2 * np.pi) * r.uniform(0.5, 1.5),
-            "ratio": ratio}
+    return {
+        "seed": seed,
+        "kind": kind,
+        "mass": mass.tolist(),
+        "pairs": pairs,
+        "size": size,
+        "start": start.tolist(),
+        "links": [
+            (list(pair), float(k), float(2 * zeta * np.sqrt(k * mass[0]))) for pair, k in links
+        ],
+        "load": (limit / 0.3).tolist(),
+        "frequency": omega / (2 * np.pi) * r.uniform(0.5, 1.5),
+        "ratio": ratio,
+    }
 
 
 def text(s: dict) -> str:
@@ -76,12 +91,20 @@ def text(s: dict) -> str:
         out += f'[[structure.damper]]\nbetween = {pair}\ncoefficient = "{c!r} N s/m"\n'
     for pair, load in zip(s["pairs"], s["load"]):
         out += f'[[structure.interface]]\nbetween = {pair}\nlaw = "coulomb"\nload = "{load!r} N"\n'
-        out += f'static = 0.3\nkinetic = {0.3 * s["ratio"]!r}\n'
+        out += f"static = 0.3\nkinetic = {0.3 * s['ratio']!r}\n"
     if s["kind"] == "release":
         places = ", ".join(f'"{x!r} m"' for x in s["start"])
-        return out + f'[structure.start]\ndisplacement = [{places}]\n[drive]\nkind = "free"\ncycles = {CYCLES}\n'
-    wave = 'waveform = "step"\n' if s["kind"] == "step" else f'frequency = "{s["frequency"]!r} Hz"\n'
-    return out + f'[drive]\nkind = "base"\n{wave}acceleration = "{s["size"]!r} m/s^2"\ncycles = {CYCLES}\n'
+        return (
+            out
+            + f'[structure.start]\ndisplacement = [{places}]\n[drive]\nkind = "free"\ncycles = {CYCLES}\n'
+        )
+    wave = (
+        'waveform = "step"\n' if s["kind"] == "step" else f'frequency = "{s["frequency"]!r} Hz"\n'
+    )
+    return (
+        out
+        + f'[drive]\nkind = "base"\n{wave}acceleration = "{s["size"]!r} m/s^2"\ncycles = {CYCLES}\n'
+    )
 
 
 def row(pair, n: int) -> np.ndarray:
@@ -95,8 +118,10 @@ def row(pair, n: int) -> np.ndarray:
 def matrices(s: dict) -> tuple:
     """Mass, stiffness and damping (n, n), rows of the faces (i, n) of a rig."""
     n = len(s["mass"])
-    stiff, damp = (sum(link[which] * np.outer(row(link[0], n), row(link[0], n)) for link in s["links"])
-                   for which in (1, 2))
+    stiff, damp = (
+        sum(link[which] * np.outer(row(link[0], n), row(link[0], n)) for link in s["links"])
+        for which in (1, 2)
+    )
     return np.diag(s["mass"]), stiff, damp, np.array([row(pair, n) for pair in s["pairs"]])
 
 
@@ -105,12 +130,26 @@ def marched(s: dict, time, slide) -> float:
     largest slide."""
     mass, stiff, damp, faces = matrices(s)
     square, shapes = eigh(stiff, mass)
-    modes = SimpleNamespace(interfaces=faces @ shapes, mass=1.0, omega=np.sqrt(square),
-                            dampers=shapes.T @ damp @ shapes, base=shapes.T @ mass @ np.ones(len(mass)))
+    modes = SimpleNamespace(
+        interfaces=faces @ shapes,
+        mass=1.0,
+        omega=np.sqrt(square),
+        dampers=shapes.T @ damp @ shapes,
+        base=shapes.T @ mass @ np.ones(len(mass)),
+    )
     size, omega = s["size"] if s["kind"] != "release" else 0.0, 2 * np.pi * s["frequency"]
-    drive = SimpleNamespace(values=lambda t: np.full_like(t, size) if s["kind"] == "step" else size * np.sin(omega * t))
-    when, z = march_reference(modes, drive, 0.3 * np.array(s["load"]), time[-1], shapes.T @ mass @ np.array(s["start"]),
-                              np.zeros(len(mass)), STEPS)
+    drive = SimpleNamespace(
+        values=lambda t: np.full_like(t, size) if s["kind"] == "step" else size * np.sin(omega * t)
+    )
+    when, z = march_reference(
+        modes,
+        drive,
+        0.3 * np.array(s["load"]),
+        time[-1],
+        shapes.T @ mass @ np.array(s["start"]),
+        np.zeros(len(mass)),
+        STEPS,
+    )
     found = z @ shapes.T @ faces.T
     gap = max(np.abs(np.interp(time, when, one) - own).max() for one, own in zip(found.T, slide))
     return float(gap / np.abs(found).max())
@@ -130,96 +169,72 @@ def truth(s: dict, end: float, order: str) -> tuple:
         bodies = np.array([one for one in (with_face, ~with_face) if one.any()], float).T
     square, shapes = eigh(bodies.T @ stiff @ bodies, bodies.T @ mass @ bodies)
     shapes = bodies @ shapes
-    modes = SimpleNamespace(interfaces=(faces @ shapes)[np.unique(same)], mass=1.0, omega=np.sqrt(square),
-                            dampers=shapes.T @ damp @ shapes, base=shapes.T @ mass @ np.ones(n))
+    modes = SimpleNamespace(
+        interfaces=(faces @ shapes)[np.unique(same)],
+        mass=1.0,
+        omega=np.sqrt(square),
+        dampers=shapes.T @ damp @ shapes,
+        base=shapes.T @ mass @ np.ones(n),
+    )
     size, omega = s["size"] if s["kind"] != "release" else 0.0, 2 * np.pi * s["frequency"]
     constant, amplitude = (size, 0.0) if s["kind"] == "step" else (0.0, size)
-    drive = SimpleNamespace(start=0.0, constant=constant, amplitude=amplitude, phase=0.0,
-                            omega=0.0 if s["kind"] == "step" else omega)
+    drive = SimpleNamespace(
+        start=0.0,
+        constant=constant,
+        amplitude=amplitude,
+        phase=0.0,
+        omega=0.0 if s["kind"] == "step" else omega,
+    )
     static, start = 0.3 * np.bincount(same, s["load"]), shapes.T @ mass @ np.array(s["start"])
-    found = run_reference(modes, [drive], static, s["ratio"] * static, end, start, np.zeros(len(square)),
-                          most_sliding=order == "most")
+    found = run_reference(
+        modes,
+        [drive],
+        static,
+        s["ratio"] * static,
+        end,
+        start,
+        np.zeros(len(square)),
+        most_sliding=order == "most",
+    )
     time, signs, z, _ = zip(*found)
     return np.array(time), np.array(z) @ shapes.T @ faces.T, np.array(signs)[:, same]
 
 
-def compared(s: dict) -> dict:
-    """Largest distance of the slides from the reference at its events, over the largest slide, by the order of its
-    choices until one is the same; energy balance; instants at which several faces stick or
-    turn."""
-    out = {key: s[key] for key in ("seed", "kind", "ratio")} | {"faces": len(s["pairs"]), "masses": len(s["mass"])}
+def compare_rig(seed: int, folder: Path | None = None, earlier: dict | None = None) -> dict:
+    """Compare the slides of a rig with the reference at its events, for each order of its choices until one agrees;
+    see `campaigns`."""
+    s = spec(seed)
+    line = {"group": f"{s['kind']}, {s['ratio']}", "engine": "events"}
     try:
         result = pf.run(text(s), say=lambda _: None)
     except pf.PatchfemError as error:
-        return out | {"refused": str(error)}
+        return line | {"rows": [], "refused": str(error)}
     data = result.to_xarray()
-    time, slide, speed = (data[name].values for name in ("time", "relative_displacement", "relative_velocity"))
+    time, slide, speed = (
+        data[name].values for name in ("time", "relative_displacement", "relative_velocity")
+    )
     last = np.append(np.diff(time) > 0, True)
     curve = CubicHermiteSpline(time[last], slide[:, last], speed[:, last], axis=1)
-    out |= {"outcome": str(result.outcome), "balance": result.measures["energy_balance"].value, "gaps": {}}
+    gaps, failed = {}, {}
     for order in ORDERS[s["kind"]]:
         signal.setitimer(signal.ITIMER_PROF, LONGEST)
         try:
-            when, where, signs = truth(s, float(time[-1]), order)
+            when, where, _ = truth(s, float(time[-1]), order)
         except (AssertionError, TimeoutError) as error:
-            out["gaps"][order] = repr(error)
+            failed[order] = repr(error)
             continue
         finally:
             signal.setitimer(signal.ITIMER_PROF, 0)
         scale = max(np.abs(where).max(), np.abs(slide).max(), 1e-300)
-        out["gaps"][order] = float(np.abs(curve(when).T - where).max() / scale)
-        turns = (signs[1:] != signs[:-1]) & (signs[:-1] != 0)  # to stick, or to slide the other way
-        out |= {"together": int((turns.sum(axis=1) > 1).sum()), "events": len(when) - 1}
-        if out["gaps"][order] <= SAME:
+        gaps[order] = float(np.abs(curve(when).T - where).max() / scale)
+        if gaps[order] <= SAME:
             break
-    if len(s["pairs"]) > len(s["mass"]) and not right(out):
-        out["march"] = marched(s, time, slide)
-    return out
-
-
-def right(one: dict) -> bool:
-    """Whether a motion is that of the reference and keeps its energy."""
-    gaps = [gap for gap in one.get("gaps", {}).values() if not isinstance(gap, str)]
-    same = (bool(gaps) and min(gaps) <= SAME) or one.get("march", np.inf) <= NEAR
-    return same and one["balance"] <= BALANCED
-
-
-def printed(lines: list) -> None:
-    """Print what is wrong and how many are right, by kind and by ratio."""
-    for one in lines:
-        if not right(one):
-            print("not right:", json.dumps(one))
-    for key in ("kind", "ratio"):
-        every, good = Counter(one[key] for one in lines), Counter(one[key] for one in lines if right(one))
-        print(f"by {key}:", ", ".join(f"{name}: {good[name]} of {count}" for name, count in sorted(every.items())))
-    sticks = [one.get("together", 0) for one in lines]
-    worst = max((one["balance"] for one in lines if "balance" in one), default=float("nan"))
-    print(f"{sum(map(right, lines))} of {len(lines)} right; {sum(sticks)} sticks or turns of several faces at once in "
-          f"{sum(count > 0 for count in sticks)} of them; largest energy balance {worst:.1e}")
-
-
-def _late(*_) -> None:
-    raise TimeoutError
-
-
-def main() -> None:
-    """The command line."""
-    signal.signal(signal.SIGPROF, _late)
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    verbs = parser.add_subparsers(dest="verb", required=True)
-    runs, reads = verbs.add_parser("run"), verbs.add_parser("score")
-    runs.add_argument("--count", type=int, default=200)
-    for verb in (runs, reads):
-        verb.add_argument("file", type=Path)
-    asked = parser.parse_args()
-    if asked.verb == "run":
-        with asked.file.open("w", encoding="utf-8") as file:
-            for seed in range(FIRST, FIRST + asked.count):
-                file.write(json.dumps(compared(spec(seed))) + "\n")
-                file.flush()
-    else:
-        printed([json.loads(line) for line in asked.file.read_text("utf-8").splitlines()])
-
-
-if __name__ == "__main__":
-    main()
+    gap, allowed = min(gaps.values(), default=np.inf), SAME
+    if gap > SAME and len(s["pairs"]) > len(s["mass"]):
+        gap, allowed = marched(s, time, slide), NEAR
+    balance = result.measures["energy_balance"].value
+    rows = [
+        Row("slides", gap, allowed, 0.0, 0.0, 0.0),
+        Row("energy_balance", balance, BALANCED, 0.0, 0.0, 0.0),
+    ]
+    return line | {"gaps": gaps, "failed": failed, "rows": rows}

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from printed_bars import Bonds as BondsByHand
-from printed_bars import settled
+from printed_sums import Bonds as BondsByHand
+from printed_sums import settled
 from scipy.optimize import brentq
 from scipy.special import gammainc
 from varying_load_cases import modes

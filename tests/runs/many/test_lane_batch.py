@@ -1,12 +1,11 @@
 """Lumped cases in lanes beside the exact engine: their bars hold, and what they cannot tell goes to it.
 
-`python tests/support/lane_bars.py run FILE` is the whole campaign, beside single runs.
+The whole campaign, beside single runs, is `lanes` of tests/support/campaigns.py.
 """
 
 import numpy as np
 import pytest
-from lane_bars import LAWS, SCENE, drawn, rows
-from lane_bars import held as within
+from lane_cases import LAWS, SCENE, draw_points, rows
 
 from patchfem.api import base_of, build, load, run_many
 from patchfem.runs.many import many, one_by_one
@@ -19,12 +18,12 @@ EXACT = "coulomb", "weakening", "elastic-plastic", "iwan"  # beside others, with
 
 def models(law: str, seed: int, count: int) -> list:
     """Random cases of a law that lanes take."""
-    return drawn(law, seed, count)[0]
+    return draw_points(law, seed, count)
 
 
 def missed(found, ones) -> int:
     """Cases of lanes with a measure beyond the sum of both bars, or with another outcome, or of which one says more."""
-    return sum(found.outcome[case] != ones.outcome[case] or not all(map(within, some))
+    return sum(found.outcome[case] != ones.outcome[case] or not all(row.holds for row in some)
                for case, some in enumerate(rows(found, ones)))
 
 
@@ -39,7 +38,7 @@ def held(law: str, seed: int, count: int, most: int | None = None) -> None:
     ones = lumped_answers(some) if law in EXACT else one_by_one.solve(some)
     lanes_of = found.some(np.array(mine))
     assert (lanes_of.outcome == ones.outcome).all()
-    assert np.mean([within(row) for some in rows(lanes_of, ones) for row in some]) >= 0.97
+    assert np.mean([row.holds for some in rows(lanes_of, ones) for row in some]) >= 0.97
 
 
 def lumped_answers(cases):

@@ -1,12 +1,11 @@
 """Patches of elements in lanes, beside the exact batch and where they have to leave a case to it.
 
-`python tests/support/tabled_bars.py` is the whole campaign, beside single runs.
+The whole campaign, beside single runs, is `lanes` of tests/support/campaigns.py.
 """
 
 import numpy as np
 import pytest
-from lane_bars import held, rows
-from tabled_bars import PATCH, drawn
+from lane_cases import PATCH, draw_patches, rows
 
 import patchfem as pf
 from patchfem.api import base_of
@@ -17,13 +16,13 @@ from patchfem.scene.sets import assignments
 
 def missed(family: str, seed: int, count: int) -> tuple:
     """(Answers of random cases in lanes, measures beyond the sum of both bars, all that were compared)."""
-    models = meshes.meshed(drawn(family, seed, count))
+    models = meshes.meshed(draw_patches(family, seed, count))
     assert all(many.batch_of(one, 64).name == "lumped.tabled" for one in models)
     assert all(many.batch_of(one, 63).name == "lumped.sheared" for one in models)
     found, ones = tabled.solve(models), sheared.solve(models)
     assert list(found.outcome) == list(ones.outcome) and not found.messages
     pairs = [row for some in rows(found, ones) for row in some]
-    return found, [row for row in pairs if not held(row)], len(pairs)
+    return found, [row for row in pairs if not row.holds], len(pairs)
 
 
 @pytest.mark.parametrize("family", ["tilt x friction"])
@@ -35,7 +34,7 @@ def test_always_97_of_100_measures_lie_within_both_bars(family):
 
 def test_always_a_set_beyond_the_table_is_exact(monkeypatch):
     """Sets of more elements than a table has room for, as of a finer mesh, march from yield to yield."""
-    models = meshes.meshed(drawn("frequency x load", 9, 3))
+    models = meshes.meshed(draw_patches("frequency x load", 9, 3))
     monkeypatch.setattr(tabled, "load", lambda _: type("Few", (), {"YIELDS": 8}))
     found, ones = tabled.solve(models), sheared.solve(models)
     assert all(one["engine"] == "piecewise" for one in found.numerics.values())

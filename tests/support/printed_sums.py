@@ -1,7 +1,7 @@
 """Equation 2.17 behind [contact.shear] summed by hand, for random benches and rigs, and what of their bars holds.
 
-`python printed_bars.py bench 7000 24` scores 24 benches from seed 7000 on, `rig` as many rigs that begin at rest; from
-seed 8000 on the pressure may lie on the lower piece, and modes may heave and rock the patch up to lift-off.
+Campaigns `printed-benches` and `printed-rigs` of `campaigns`. Rigs begin at rest. From seed 8000 on the pressure may
+lie on the lower piece, and modes may heave and rock the patch up to lift-off.
 
 The sum is plain NumPy, written from 2.10-2.17 without the compiled lists: every node of a mesh for a tenth of the
 tolerance keeps every bond of its own path, in strips of 80 bond lengths over the steps of a cycle (0.2 at 400, which
@@ -13,11 +13,11 @@ of the step; heave and rotation press the nodes by the whole normal compliance, 
 out one set after the other.
 """
 
-import sys
-from collections import defaultdict
 from math import gamma, pi
+from pathlib import Path
 
 import numpy as np
+from campaigns import measure_rows
 
 import patchfem as pf
 from patchfem.model.model import build
@@ -25,11 +25,27 @@ from patchfem.runs import run as runs
 from patchfem.runs.patch import ladder as patches
 from patchfem.scene.scene import loads
 
-MOST, FIRST_WIDE = 25.0, 1e-6  # bond lengths: age of a bond that counts; half width of the first bonds
+MOST, FIRST_WIDE = (
+    25.0,
+    1e-6,
+)  # bond lengths: age of a bond that counts; half width of the first bonds
 FINEST, MOST_PARTS = 80.0, 60  # bond lengths of a strip times steps a cycle; parts of a step
-COMPARED = {"bench": ("loop_area", "friction_force_peak", "friction_ratio_end", "friction_work", "slip_amplitude"),
-            "rig": ("relative_displacement_amplitude", "loop_area", "friction_force_peak", "friction_work",
-                    "slip_amplitude")}
+COMPARED = {
+    "bench": (
+        "loop_area",
+        "friction_force_peak",
+        "friction_ratio_end",
+        "friction_work",
+        "slip_amplitude",
+    ),
+    "rig": (
+        "relative_displacement_amplitude",
+        "loop_area",
+        "friction_force_peak",
+        "friction_work",
+        "slip_amplitude",
+    ),
+}
 PIECES = """
 [contact]
 length = "12.7 mm"
@@ -45,16 +61,22 @@ bond_length = "1 um"
 [accuracy]
 tolerance = 1e-2
 """
-MOTION = {"bench": '[slide]\nkind = "sine"\namplitude = "1 um"\nfrequency = "100 Hz"\ncycles = 2\n',
-          "rig": '[structure]\nmoving_mass = "0.884 kg"\n[[structure.mode]]\nname = "axial"\nfrequency = "143 Hz"\n'
-                 'damping = 0.02\nslide = 1.0\n[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\n'
-                 'cycles = 3\n'}
+MOTION = {
+    "bench": '[slide]\nkind = "sine"\namplitude = "1 um"\nfrequency = "100 Hz"\ncycles = 2\n',
+    "rig": '[structure]\nmoving_mass = "0.884 kg"\n[[structure.mode]]\nname = "axial"\nfrequency = "143 Hz"\n'
+    'damping = 0.02\nslide = 1.0\n[drive]\nkind = "base"\nfrequency = "143 Hz"\nacceleration = "5 g"\n'
+    "cycles = 3\n",
+}
 
 
-HEAVE = '[[structure.mode]]\nname = "heave"\nfrequency = "{:.4g} Hz"\ndamping = 0.02\nslide = 0.0\nnormal = 1.0\n' \
-        'base = {:.3g}\n'
-ROCK = '[[structure.mode]]\nname = "rock"\nfrequency = "{:.4g} Hz"\ndamping = 0.02\nslide = 0.0\n' \
-       'pitch = "{:.3g} rad/m"\nbase = {:.3g}\n'
+HEAVE = (
+    '[[structure.mode]]\nname = "heave"\nfrequency = "{:.4g} Hz"\ndamping = 0.02\nslide = 0.0\nnormal = 1.0\n'
+    "base = {:.3g}\n"
+)
+ROCK = (
+    '[[structure.mode]]\nname = "rock"\nfrequency = "{:.4g} Hz"\ndamping = 0.02\nslide = 0.0\n'
+    'pitch = "{:.3g} rad/m"\nbase = {:.3g}\n'
+)
 
 
 def scene_of(kind: str, seed: int):
@@ -62,11 +84,16 @@ def scene_of(kind: str, seed: int):
     draw = np.random.default_rng(seed)
     length = 10 ** draw.uniform(-0.7, 0.5)  # um
     reading = draw.choice(["report", "report", "report", "stretch"])
-    sets = {"friction.static": f"{draw.uniform(0.15, 0.6):.3f}", "friction.bond_length": f"{length:.4g} um",
-            "contact.load": f"{10 ** draw.uniform(1.7, 2.7):.4g} N", "friction.reading": reading,
-            "friction.order": draw.choice(["0.0", "0.5", "1.0", "2.0"] if reading == "report" else
-                                          ["0.5", "1.5", "2.0"]),
-            "friction.initial_bonds": draw.choice(["0.0", "0.5", "1.0"])}
+    sets = {
+        "friction.static": f"{draw.uniform(0.15, 0.6):.3f}",
+        "friction.bond_length": f"{length:.4g} um",
+        "contact.load": f"{10 ** draw.uniform(1.7, 2.7):.4g} N",
+        "friction.reading": reading,
+        "friction.order": draw.choice(
+            ["0.0", "0.5", "1.0", "2.0"] if reading == "report" else ["0.5", "1.5", "2.0"]
+        ),
+        "friction.initial_bonds": draw.choice(["0.0", "0.5", "1.0"]),
+    }
     shape = draw.choice(["crown", "flat", "tilt"])
     if shape == "crown":
         sets["contact.crown.radius"] = f"{10 ** draw.uniform(0.3, 2):.3g} m"
@@ -82,19 +109,28 @@ def scene_of(kind: str, seed: int):
         speed = push * 9.80665 / (2 * pi * frequency)
     if draw.random() < 0.4:
         floor = 0.05 * speed
-        sets |= {"friction.kinetic": f"{float(sets['friction.static']) * draw.uniform(0.7, 0.95):.3f}",
-                 "friction.slip_growth": f"{length * 10 ** draw.uniform(-1, 0):.4g} um",
-                 "friction.rest_growth": f"{speed * frequency * 10 ** draw.uniform(-1, 1):.4g} m/s^2",
-                 "friction.rest_speed": f"{floor:.4g} m/s"}
+        sets |= {
+            "friction.kinetic": f"{float(sets['friction.static']) * draw.uniform(0.7, 0.95):.3f}",
+            "friction.slip_growth": f"{length * 10 ** draw.uniform(-1, 0):.4g} um",
+            "friction.rest_growth": f"{speed * frequency * 10 ** draw.uniform(-1, 1):.4g} m/s^2",
+            "friction.rest_speed": f"{floor:.4g} m/s",
+        }
     motion = MOTION[kind]
-    if seed >= 8000:  # the pressure on the lower piece, or a load that changes: heave, or rocking that lifts the ends
-        what = draw.choice(["upper", "lower", "lower"] if kind == "bench" else ["upper", "lower", "heave", "rock"])
+    if (
+        seed >= 8000
+    ):  # the pressure on the lower piece, or a load that changes: heave, or rocking that lifts the ends
+        what = draw.choice(
+            ["upper", "lower", "lower"] if kind == "bench" else ["upper", "lower", "heave", "rock"]
+        )
         if what == "lower" and shape != "flat":
             sets[f"contact.{shape}.on"] = "lower"
         if what in ("heave", "rock") and reading == "report":
             pitch = 10 ** draw.uniform(0.8, 1.8)
-            mode = HEAVE.format(draw.uniform(150, 400), draw.uniform(0.1, 0.4)) if what == "heave" else \
-                ROCK.format(draw.uniform(150, 400), pitch, draw.uniform(0.1, 0.4))
+            mode = (
+                HEAVE.format(draw.uniform(150, 400), draw.uniform(0.1, 0.4))
+                if what == "heave"
+                else ROCK.format(draw.uniform(150, 400), pitch, draw.uniform(0.1, 0.4))
+            )
             motion = motion.replace("slide = 1.0\n", "slide = 1.0\nbase = 0.9\n" + mode)
     return loads(PIECES + motion, "random.toml", [f"{key}={value}" for key, value in sets.items()])
 
@@ -104,10 +140,15 @@ class Bonds:
 
     def __init__(self, f, size: int, floor: float, steps: int = 400):
         self.f, self.floor, self.mu, self.finest = f, floor, f.static, FINEST / steps
-        self.at, self.path, self.harm, self.eps = (np.zeros(size), np.zeros(size), np.zeros(size),
-                                                   np.full(size, f.bond_length))
+        self.at, self.path, self.harm, self.eps = (
+            np.zeros(size),
+            np.zeros(size),
+            np.zeros(size),
+            np.full(size, f.bond_length),
+        )
         self.low, self.high, self.when, self.hurt, self.born, self.lag, self.dense = (
-            np.zeros((0, size)) for _ in range(7))
+            np.zeros((0, size)) for _ in range(7)
+        )
         self.first, self.forming = np.ones(size), lambda places, part: np.ones_like(places)
 
     def grown(self, moved, dt):
@@ -118,8 +159,13 @@ class Bonds:
             return self.eps, np.ones_like(moved), self.eps
         out = []
         for part in (1.0, 0.5):
-            rest, slide = f.rest_growth * part * dt / np.maximum(moved / dt, self.floor), part * moved / f.slip_growth
-            target = (rest * f.bond_length + slide * f.bond_length * f.kinetic / f.static) / (rest + slide)
+            rest, slide = (
+                f.rest_growth * part * dt / np.maximum(moved / dt, self.floor),
+                part * moved / f.slip_growth,
+            )
+            target = (rest * f.bond_length + slide * f.bond_length * f.kinetic / f.static) / (
+                rest + slide
+            )
             left = np.exp(-rest - slide)
             out += [target + (self.eps - target) * left, left]
         return out[0], out[1], out[2]
@@ -130,35 +176,59 @@ class Bonds:
         moved, norm = np.abs(s - self.at), gamma(self.f.order + 1)
         eps, left, middle = self.grown(moved, dt)
         path, harm = self.path + moved, self.harm + moved / middle
-        parts = int(np.ceil(moved.max() / (self.finest * e0 * (f.kinetic or f.static) / f.static))) or 1
+        parts = (
+            int(np.ceil(moved.max() / (self.finest * e0 * (f.kinetic or f.static) / f.static))) or 1
+        )
         parts = min(parts, MOST_PARTS)
         ends = self.at + np.arange(parts + 1)[:, None] / parts * (s - self.at)
-        back = 1 - (np.arange(parts)[:, None] + 0.5) / parts  # of the step, from its end to the middle of a part
+        back = (
+            1 - (np.arange(parts)[:, None] + 0.5) / parts
+        )  # of the step, from its end to the middle of a part
         low, high = np.vstack([self.low, ends[:-1]]), np.vstack([self.high, ends[1:]])
         size = np.abs(high - low)
         share = np.divide(s - low, high - low, out=np.full(low.shape, 0.5), where=size > 0)
-        side = np.where(high >= low, 1.0, -1.0) * (2 * np.clip(share, 0, 1) - 1)  # what lies behind less that ahead
-        when, hurt = np.vstack([self.when, path - back * moved]), np.vstack([self.hurt, harm - back * moved / middle])
+        side = np.where(high >= low, 1.0, -1.0) * (
+            2 * np.clip(share, 0, 1) - 1
+        )  # what lies behind less that ahead
+        when, hurt = (
+            np.vstack([self.when, path - back * moved]),
+            np.vstack([self.hurt, harm - back * moved / middle]),
+        )
         born = np.vstack([self.born, np.tile(middle, (parts, 1))])
         gone = np.zeros_like(moved) + left
-        lag = np.vstack([self.lag * gone, middle * gone ** back])  # how far a bond's own length is behind, 2.10 from 0
+        lag = np.vstack(
+            [self.lag * gone, middle * gone**back]
+        )  # how far a bond's own length is behind, 2.10 from 0
         dense = np.vstack([self.dense, self.forming((ends[1:] + ends[:-1]) / 2, 1 - back)])
         age = path - when
         if f.reading == "report":
             own = np.maximum(eps - lag, 1e-9 * eps) if f.rest_growth is not None else e0
             x = age / own
-            each = np.where(size > 0, x ** p * np.exp(-x), 0.0) * size / (e0 * norm)
-            first = f.initial_bonds / norm * np.where(path > 0, (path / e0) ** p, float(p == 0)) * np.exp(-path / e0)
+            each = np.where(size > 0, x**p * np.exp(-x), 0.0) * size / (e0 * norm)
+            first = (
+                f.initial_bonds
+                / norm
+                * np.where(path > 0, (path / e0) ** p, float(p == 0))
+                * np.exp(-path / e0)
+            )
             first = first * self.first * np.clip(s / (FIRST_WIDE * e0), -1, 1)
         else:
             u = np.abs(s - (low + high) / 2)
             each = (u / born) ** p * np.exp(-(harm - hurt)) * size / (e0 * norm)
-            first = f.initial_bonds / norm * (np.abs(s) / e0) ** p * np.exp(-harm) * np.sign(s) * self.first
+            first = (
+                f.initial_bonds
+                / norm
+                * (np.abs(s) / e0) ** p
+                * np.exp(-harm)
+                * np.sign(s)
+                * self.first
+            )
         each = each * dense
         if keep:
             on = (age / e0 < MOST).any(axis=1)
             self.low, self.high, self.when, self.hurt, self.born, self.lag, self.dense = (
-                one[on] for one in (low, high, when, hurt, born, lag, dense))
+                one[on] for one in (low, high, when, hurt, born, lag, dense)
+            )
             self.at, self.path, self.harm, self.eps = s, path, harm, eps
         return (each * side).sum(axis=0) + first
 
@@ -221,7 +291,11 @@ def by_hand(scene, steps: int = 500) -> dict:
     model = build(scene)
     patch = patches.solve_all(model.patch, 0.1 * model.accuracy.tolerance, False, False)[0]
     f, rig = model.friction, model.rig
-    area, sigma, lower = patch.pieces.interface.weight, patch.pressure.sigma_n, model.side == "lower"
+    area, sigma, lower = (
+        patch.pieces.interface.weight,
+        patch.pressure.sigma_n,
+        model.side == "lower",
+    )
     varies = rig is not None and rig.load_varies
     on = np.flatnonzero(sigma > 0) if not (lower or varies) else np.arange(sigma.size)
     measure = patch.pressure.load / area[sigma > 0].sum()
@@ -231,19 +305,28 @@ def by_hand(scene, steps: int = 500) -> dict:
     bonds.first = sigma[on] / under
     force_now = area * sigma
     if lower:
-        bonds.forming = lambda places, part: np.interp(x + places, patch.x, sigma / measure, left=0.0, right=0.0)
-    omega, cycles = (2 * pi * scene.slide.frequency, int(scene.slide.cycles)) if rig is None else \
-        (2 * pi * scene.drive.frequency, int(scene.drive.cycles))
+        bonds.forming = lambda places, part: np.interp(
+            x + places, patch.x, sigma / measure, left=0.0, right=0.0
+        )
+    omega, cycles = (
+        (2 * pi * scene.slide.frequency, int(scene.slide.cycles))
+        if rig is None
+        else (2 * pi * scene.drive.frequency, int(scene.drive.cycles))
+    )
     dt = 2 * pi / omega / steps
     slide, force, slip = (np.zeros(cycles * steps + 1) for _ in range(3))
     s, before, beta = np.zeros(on.size), np.zeros(on.size), 0.0
     if rig is not None:
         modes = rig.modes
         own, zeta, mass = modes.omega, modes.zeta, modes.mass
-        rows = np.stack([np.zeros(own.size) if one is None else np.asarray(one, float)
-                         for one in (modes.slide, modes.normal, modes.pitch)])
+        rows = np.stack(
+            [
+                np.zeros(own.size) if one is None else np.asarray(one, float)
+                for one in (modes.slide, modes.normal, modes.pitch)
+            ]
+        )
         stiff = own**2 + 4 / dt**2 + 4 * zeta * own / dt
-        beta, state = float((rows[0]**2 / stiff).sum() / mass), np.zeros((3, own.size))
+        beta, state = float((rows[0] ** 2 / stiff).sum() / mass), np.zeros((3, own.size))
     for k in range(1, slide.size):
         t = k * dt
         if rig is None:
@@ -251,22 +334,33 @@ def by_hand(scene, steps: int = 500) -> dict:
         else:  # average acceleration: z'' = 4 (z - z0)/dt^2 - 4 v0/dt - a0
             z, v, a = state
             push = -modes.base * scene.drive.acceleration * np.sin(omega * t)
-            free_z = (push + 4 * z / dt**2 + 4 * v / dt + a + 2 * zeta * own * (2 * z / dt + v)) / stiff
+            free_z = (
+                push + 4 * z / dt**2 + 4 * v / dt + a + 2 * zeta * own * (2 * z / dt + v)
+            ) / stiff
             old, pull = force_now, np.zeros(own.size)
             if varies:
                 force_now, pull = balanced(press, rows, free_z, stiff * mass, z)
                 bonds.forming = lambda places, part, a=old[on], b=force_now[on]: np.broadcast_to(
-                    (a + part * (b - a)) / (measure * area[on]), places.shape)
+                    (a + part * (b - a)) / (measure * area[on]), places.shape
+                )
             free_z = free_z + pull
             free = rows[0] @ free_z
         new, there = settled(bonds, limit, c + beta, free, dt, 2 * s - before)
         before, s = s, new
         bonds.weight(s, dt, keep=True)
-        here = np.interp(x + s, patch.x, sigma, left=0.0, right=0.0) * area[on] if lower else force_now[on]
+        here = (
+            np.interp(x + s, patch.x, sigma, left=0.0, right=0.0) * area[on]
+            if lower
+            else force_now[on]
+        )
         bonds.lift(here <= 0)
         force[k] = there.sum()
         slide[k] = free - beta * force[k]
-        slip[k] = (here @ s - f.bond_length / f.static * force[k]) / here.sum() if here.sum() > 0 else slide[k]
+        slip[k] = (
+            (here @ s - f.bond_length / f.static * force[k]) / here.sum()
+            if here.sum() > 0
+            else slide[k]
+        )
         if rig is not None:
             z1 = free_z - rows[0] * force[k] / (stiff * mass)
             a1 = 4 * (z1 - z) / dt**2 - 4 * v / dt - a
@@ -274,9 +368,14 @@ def by_hand(scene, steps: int = 500) -> dict:
     work = np.concatenate([[0.0], np.cumsum((force[1:] + force[:-1]) / 2 * np.diff(slide))])
     last = slice(-steps - 1, None)
     pulled = np.abs(force[last if beta else slice(None)])
-    return {"loop_area": work[-1] - work[-steps - 1], "friction_force_peak": pulled.max(), "friction_work": work[-1],
-            "friction_ratio_end": force[-1] / patch.pressure.load, "slip_amplitude": np.ptp(slip[last]) / 2,
-            "relative_displacement_amplitude": np.ptp(slide[last]) / 2}
+    return {
+        "loop_area": work[-1] - work[-steps - 1],
+        "friction_force_peak": pulled.max(),
+        "friction_work": work[-1],
+        "friction_ratio_end": force[-1] / patch.pressure.load,
+        "slip_amplitude": np.ptp(slip[last]) / 2,
+        "relative_displacement_amplitude": np.ptp(slide[last]) / 2,
+    }
 
 
 def balanced(press: Pressed, rows, free, stiff, guess) -> tuple:
@@ -295,41 +394,23 @@ def balanced(press: Pressed, rows, free, stiff, guess) -> tuple:
     return force, up.T @ pull
 
 
-def misses(kind: str, seed: int) -> tuple:
-    """(distance of each measure of a random scene from the sum by hand, extrapolated from two step lengths, over its
-    bar and what these differ by; energy balance)."""
+def compare_sum(kind: str, seed: int) -> dict:
+    """Compare a random scene with the sum by hand at two step lengths, whose difference is the doubt."""
     scene = scene_of(kind, seed)
-    found = runs.run(pf.plan(scene)).measures
+    try:
+        result = runs.run(pf.plan(scene))
+    except pf.PatchfemError as error:
+        return {"group": kind, "rows": [], "refused": str(error)}
     rough, fine = by_hand(scene, 200), by_hand(scene, 400)
-    out = {}
-    for name in COMPARED[kind]:
-        if found[name].value is None or found[name].error is None:
-            continue
-        own, bar = abs(fine[name] - rough[name]), max(found[name].error, 1e-3 * found[name].floor)
-        out[name] = (max(abs(found[name].value - fine[name]) - own, 0.0) / bar, found[name].value, found[name].error,
-                     fine[name], own)
-    return out, found["energy_balance"].value
+    doubts = {name: abs(fine[name] - rough[name]) for name in fine}
+    return {"group": kind, "rows": measure_rows(result.measures, fine, doubts, COMPARED[kind])}
 
 
-def main(kind: str, first: int, count: int) -> None:
-    every, whole = defaultdict(list), []
-    for seed in range(first, first + count):
-        try:
-            found, balance = misses(kind, seed)
-        except pf.PatchfemError as error:
-            print(seed, "ended:", error, flush=True)
-            whole.append(False)
-            continue
-        whole.append(all(one[0] <= 1 for one in found.values()))
-        for name, one in found.items():
-            every[name].append(one[0])
-        print(seed, "inside" if whole[-1] else "OUT", f"balance {balance:.1e}",
-              {name: " ".join(f"{x:.5g}" for x in one) for name, one in found.items() if one[0] > 1}, flush=True)
-    all_ = np.concatenate(list(every.values()))
-    print(f"{all_.size} bars, {np.sum(all_ <= 1)} hold, worst {all_.max():.3g}; all of them in {sum(whole)} of {count}")
-    for name, one in every.items():
-        print(f"  {name} {np.sum(np.array(one) <= 1)} of {len(one)}, median {np.median(one):.2f}")
+def compare_bench(seed: int, folder: Path, earlier: dict | None = None) -> dict:
+    """Compare the bench of a seed; see `campaigns`."""
+    return compare_sum("bench", seed)
 
 
-if __name__ == "__main__":
-    main(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))
+def compare_rig(seed: int, folder: Path, earlier: dict | None = None) -> dict:
+    """Compare the rig of a seed; see `campaigns`."""
+    return compare_sum("rig", seed)

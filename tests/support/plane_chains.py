@@ -1,19 +1,15 @@
-"""Bars of chains with interfaces that slide in planes, against an independent integration of their rate equations.
+"""Random chains of masses with interfaces that slide in planes, against an integration of their rate equations.
 
-    python tests/support/plane_bars.py FILE SEED COUNT
-    python tests/support/motion_bars.py score FILE
-
-A line for each chain in FILE, as `motion_bars.py` has it. The integration is SciPy's DOP853 on the masses and on the
-stretch s of every spring: s' = q' while |s| < m or s.q' < 0, else the part of q' across s, with each change of state as
-an event. It takes no step average and nothing of the package. Seeds below 7000 were used while this was written.
+Campaign `planes` of `campaigns`. DOP853 integrates the masses and the elongation s of every tangential spring:
+s' = q' while |s| < m or s.q' < 0, else the part of q' normal to s, with each change of state as an event. Nothing of
+the package is used. Seeds below 7000 were used while this was written.
 """
 
-import sys
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
-from motion_bars import LEFT_OUT, campaign, of_first
+from campaigns import measure_rows
 from scipy.integrate import solve_ivp
 from scipy.spatial import ConvexHull, distance
 
@@ -21,10 +17,12 @@ import patchfem as pf
 
 SAMPLES = 4000  # of a cycle, at which the integration is read
 STEPS = 400  # of a cycle at least: an event and its end between two of them would be missed
-HEAD = '[structure]\nmasses = {masses}\noutput_mass = {seen}\n'
+HEAD = "[structure]\nmasses = {masses}\noutput_mass = {seen}\n"
 LINK = '[[structure.{kind}]]\nbetween = {pair}\n{key} = "{value!r} {unit}"\n'
-RUBS = '[[structure.interface]]\nbetween = {0}\n{1}law = "elastic-plastic"\nstatic = 0.4\nstiffness = "{2!r} N/m"\n' \
-       'load = "{3!r} N"\n'
+RUBS = (
+    '[[structure.interface]]\nbetween = {0}\n{1}law = "elastic-plastic"\nstatic = 0.4\nstiffness = "{2!r} N/m"\n'
+    'load = "{3!r} N"\n'
+)
 DRIVE = '[drive]\nkind = "{drive}"\nfrequency = "{frequency!r} Hz"\n{size}\ncycles = {cycles}\n'
 
 
@@ -35,25 +33,48 @@ def chain(seed: int) -> dict:
     masses, links = r.uniform(0.5, 2, 2 * nodes), []
     for k in range(nodes):
         x, y, below = 2 * k + 1, 2 * k + 2, max(2 * k - 1, 0)
-        links += [((x, below), r.uniform(2e4, 8e4)), ((y, below and below + 1), r.uniform(2e4, 8e4)),
-                  ((x, y), r.uniform(0, 1e4))]
+        links += [
+            ((x, below), r.uniform(2e4, 8e4)),
+            ((y, below and below + 1), r.uniform(2e4, 8e4)),
+            ((x, y), r.uniform(0, 1e4)),
+        ]
     springs = [(pair, float(k)) for pair, k in links]
     K, C = matrix(springs, 2 * nodes), matrix(dampers_of(springs), 2 * nodes)
     omega = np.sqrt(np.linalg.eigvalsh(K / np.sqrt(np.outer(masses, masses))))
-    drive, frequency = str(r.choice(["base", "force"])), float(r.choice(omega[:2]) * r.uniform(0.7, 1.3))
-    push, out = float(10**r.uniform(0, 2)), []
-    limit = push * 10**r.uniform(-1.2, 0.1)
+    drive, frequency = (
+        str(r.choice(["base", "force"])),
+        float(r.choice(omega[:2]) * r.uniform(0.7, 1.3)),
+    )
+    push, out = float(10 ** r.uniform(0, 2)), []
+    limit = push * 10 ** r.uniform(-1.2, 0.1)
     at = r.choice(nodes, int(r.integers(1, nodes + 1)), replace=False)
     for k in (int(one) for one in at):
         to = 2 * k - 1 if k and r.random() < 0.5 else 0
-        stiff, load = float(10**r.uniform(4, 5.3)), float(limit / 0.4 * r.uniform(0.5, 1.5))
-        out.append(([2 * k + 1, to], [2 * k + 2, to and to + 1] if r.random() < 0.8 or not out else None, stiff, load))
+        stiff, load = float(10 ** r.uniform(4, 5.3)), float(limit / 0.4 * r.uniform(0.5, 1.5))
+        out.append(
+            (
+                [2 * k + 1, to],
+                [2 * k + 2, to and to + 1] if r.random() < 0.8 or not out else None,
+                stiff,
+                load,
+            )
+        )
     out.sort(key=lambda one: one[1] is None)
-    return {"seed": seed, "masses": masses, "springs": springs, "K": K, "C": C, "faces": out, "drive": drive,
-            "law": f"{sum(one[1] is not None for one in out)} of {len(out)} in planes",
-            "frequency": frequency / 2 / np.pi, "push": push / (1.0 if drive == "force" else float(masses.sum())),
-            "pushed": int(r.integers(1, 2 * nodes + 1)), "seen": int(r.integers(1, 2 * nodes + 1)),
-            "cycles": int(r.integers(6, 25))}
+    return {
+        "seed": seed,
+        "masses": masses,
+        "springs": springs,
+        "K": K,
+        "C": C,
+        "faces": out,
+        "drive": drive,
+        "law": f"{sum(one[1] is not None for one in out)} of {len(out)} in planes",
+        "frequency": frequency / 2 / np.pi,
+        "push": push / (1.0 if drive == "force" else float(masses.sum())),
+        "pushed": int(r.integers(1, 2 * nodes + 1)),
+        "seen": int(r.integers(1, 2 * nodes + 1)),
+        "cycles": int(r.integers(6, 25)),
+    }
 
 
 def row(pair, n: int) -> np.ndarray:
@@ -75,13 +96,21 @@ def dampers_of(springs) -> list:
 def text(s: dict) -> str:
     """The scene of a chain."""
     out = HEAD.format(masses=[f"{m!r} kg" for m in s["masses"].tolist()], seen=s["seen"])
-    for kind, links, key, unit in (("spring", s["springs"], "stiffness", "N/m"),
-                                   ("damper", dampers_of(s["springs"]), "coefficient", "N s/m")):
-        out += "".join(LINK.format(kind=kind, pair=list(pair), key=key, value=one, unit=unit) for pair, one in links)
+    for kind, links, key, unit in (
+        ("spring", s["springs"], "stiffness", "N/m"),
+        ("damper", dampers_of(s["springs"]), "coefficient", "N s/m"),
+    ):
+        out += "".join(
+            LINK.format(kind=kind, pair=list(pair), key=key, value=one, unit=unit)
+            for pair, one in links
+        )
     for pair, second, stiff, load in s["faces"]:
         out += RUBS.format(pair, f"lateral = {second}\n" if second else "", stiff, load)
-    size = f'acceleration = "{s["push"]!r} m/s^2"' if s["drive"] == "base" else \
-        f'force = "{s["push"]!r} N"\nmass = {s["pushed"]}'
+    size = (
+        f'acceleration = "{s["push"]!r} m/s^2"'
+        if s["drive"] == "base"
+        else f'force = "{s["push"]!r} N"\nmass = {s["pushed"]}'
+    )
     return out + DRIVE.format(**s | {"size": size})
 
 
@@ -96,27 +125,40 @@ class Motion:
         ends = 2 * n + np.cumsum([0, *map(len, self.rows)])
         self.at = [slice(a, b) for a, b in pairwise(ends)]
         self.size = int(ends[-1]) + 2 * len(self.rows)
-        self.push = -self.m * s["push"] if s["drive"] == "base" else s["push"] * row((s["pushed"], 0), n)
+        self.push = (
+            -self.m * s["push"] if s["drive"] == "base" else s["push"] * row((s["pushed"], 0), n)
+        )
 
     def rate(self, t, y, slips):
         """dy/dt; slips: of every interface, whether it does."""
         n, out = self.n, np.zeros_like(y)
-        out[:n] = y[n:2 * n]
-        force = self.push * np.sin(self.omega * t) - self.s["K"] @ y[:n] - self.s["C"] @ y[n:2 * n]
+        out[:n] = y[n : 2 * n]
+        force = (
+            self.push * np.sin(self.omega * t) - self.s["K"] @ y[:n] - self.s["C"] @ y[n : 2 * n]
+        )
         for i, (rows, at, k) in enumerate(zip(self.rows, self.at, self.k)):
-            stretch, speed = y[at], rows @ y[n:2 * n]
+            stretch, speed = y[at], rows @ y[n : 2 * n]
             held = speed - stretch * (stretch @ speed) / (stretch @ stretch) if slips[i] else speed
             force -= k * rows.T @ stretch
             out[at] = held
-            out[self.size - 2 * len(self.rows) + 2 * i:][:2] = k * stretch @ speed, k * stretch @ (speed - held)
-        out[n:2 * n] = force / self.m
+            out[self.size - 2 * len(self.rows) + 2 * i :][:2] = (
+                k * stretch @ speed,
+                k * stretch @ (speed - held),
+            )
+        out[n : 2 * n] = force / self.m
         return out
 
     def event(self, i: int, slips: bool):
         """What ends the state of interface i."""
+
         def gap(t, y, *_):
             stretch = y[self.at[i]]
-            return stretch @ (self.rows[i] @ y[self.n:2 * self.n]) if slips else stretch @ stretch - self.most[i]**2
+            return (
+                stretch @ (self.rows[i] @ y[self.n : 2 * self.n])
+                if slips
+                else stretch @ stretch - self.most[i] ** 2
+            )
+
         gap.terminal, gap.direction = True, -1 if slips else 1
         return gap
 
@@ -124,13 +166,33 @@ class Motion:
         """(times, y) at SAMPLES a cycle from `first` [s] to the end."""
         period = 2 * np.pi / self.omega
         times = np.linspace(first, end, round((end - first) / period * SAMPLES) + 1)
-        y, slips, t, out = np.zeros(self.size), [False] * len(self.rows), 0.0, np.zeros((times.size, self.size))
-        atol = rtol * np.concatenate([np.full(self.n, min(self.most)), np.full(self.n, min(self.most) * self.omega),
-                                      np.full(self.size - 2 * self.n, min(self.most))])
-        atol[-2 * len(self.rows):] *= max(self.k) * max(self.most)
+        y, slips, t, out = (
+            np.zeros(self.size),
+            [False] * len(self.rows),
+            0.0,
+            np.zeros((times.size, self.size)),
+        )
+        atol = rtol * np.concatenate(
+            [
+                np.full(self.n, min(self.most)),
+                np.full(self.n, min(self.most) * self.omega),
+                np.full(self.size - 2 * self.n, min(self.most)),
+            ]
+        )
+        atol[-2 * len(self.rows) :] *= max(self.k) * max(self.most)
         while t < end:
-            found = solve_ivp(self.rate, (t, end), y, "DOP853", dense_output=True, args=(slips,), rtol=rtol, atol=atol,
-                              events=[self.event(i, on) for i, on in enumerate(slips)], max_step=period / STEPS)
+            found = solve_ivp(
+                self.rate,
+                (t, end),
+                y,
+                "DOP853",
+                dense_output=True,
+                args=(slips,),
+                rtol=rtol,
+                atol=atol,
+                events=[self.event(i, on) for i, on in enumerate(slips)],
+                max_step=period / STEPS,
+            )
             assert found.success, found.message
             here = (times >= t) & (times <= found.t[-1])
             out[here] = found.sol(times[here]).T if here.any() else out[here]
@@ -163,17 +225,26 @@ def measures(motion: Motion, times, y, cycles: float) -> dict:
     s, n, seen = motion.s, motion.n, motion.s["seen"] - 1
     base = s["push"] * np.sin(motion.omega * times) if s["drive"] == "base" else 0.0
     last = -2 * len(motion.rows)
-    books, force = y[:, last:], motion.push[:, None] * np.sin(motion.omega * times) - s["K"] @ y[:, :n].T - \
-        s["C"] @ y[:, n:2 * n].T
-    out = {"relative_displacement_amplitude": np.ptp(y[:, seen]) / 2, "friction_work": books[-1, ::2].sum(),
-           "energy_dissipated": books[-1, 1::2].sum()}
+    books, force = (
+        y[:, last:],
+        motion.push[:, None] * np.sin(motion.omega * times)
+        - s["K"] @ y[:, :n].T
+        - s["C"] @ y[:, n : 2 * n].T,
+    )
+    out = {
+        "relative_displacement_amplitude": np.ptp(y[:, seen]) / 2,
+        "friction_work": books[-1, ::2].sum(),
+        "energy_dissipated": books[-1, 1::2].sum(),
+    }
     for i, (rows, at, k) in enumerate(zip(motion.rows, motion.at, motion.k)):
         tail, stretch = f"_{i + 1}" if i else "", y[:, at]
         force -= k * rows.T @ stretch.T
         slip = y[:, :n] @ rows.T - stretch
-        out |= {f"friction_force_peak{tail}": k * np.linalg.norm(stretch, axis=1).max(),
-                f"slip_amplitude{tail}": widest(slip) / 2,
-                f"loop_area{tail}": (books[-1, 2 * i] - books[0, 2 * i]) / cycles}
+        out |= {
+            f"friction_force_peak{tail}": k * np.linalg.norm(stretch, axis=1).max(),
+            f"slip_amplitude{tail}": widest(slip) / 2,
+            f"loop_area{tail}": (books[-1, 2 * i] - books[0, 2 * i]) / cycles,
+        }
     out["absolute_acceleration_peak"] = np.abs(force[seen] / motion.m[seen] + base).max()
     return {name: float(value) for name, value in out.items()}
 
@@ -181,24 +252,20 @@ def measures(motion: Motion, times, y, cycles: float) -> dict:
 def truth(s: dict, window: int, rtol: float = 1e-10) -> dict:
     """`measures` of the last `window` cycles of a chain."""
     motion, period = Motion(s), 1 / s["frequency"]
-    return measures(motion, *motion.run(s["cycles"] * period, (s["cycles"] - window) * period, rtol), window)
+    return measures(
+        motion, *motion.run(s["cycles"] * period, (s["cycles"] - window) * period, rtol), window
+    )
 
 
-def compared(s: dict, folder: Path, _=None) -> dict:
-    """A line of a chain: rows [name, value, error, floor, truth, doubt]."""
-    out = {"seed": s["seed"], "law": s["law"], "drive": s["drive"], "truth": "DOP853", "rows": []}
-    (folder / "scene.toml").write_text(text(s))
-    found = pf.run(folder / "scene.toml")
-    out["engine"] = found.extra["engine"]
-    if found.outcome == "not_converged":
-        return out | {"refused": str(found.outcome)}
-    right = truth(s, int(found.extra["window"]))
-    out["rows"] = [[name, one.value, one.error, one.floor, right[name], 1e-6 * abs(right[name])]
-                   for name, one in found.measures.items()
-                   if name in right and None not in (one.value, one.error) and of_first(name) not in LEFT_OUT]
-    return out
-
-
-if __name__ == "__main__":
-    file, first, count = sys.argv[1:]
-    campaign([chain(int(first) + k) for k in range(int(count))], file, {}, compared)
+def compare_chain(seed: int, folder: Path, earlier: dict | None = None) -> dict:
+    """Compare the chain of a seed with its integration; see `campaigns`."""
+    s = chain(seed)
+    path = folder / "scene.toml"
+    path.write_text(text(s))
+    result = pf.run(path)
+    line = {"group": f"{s['law']}, {s['drive']}", "engine": result.extra["engine"], "rows": []}
+    if result.outcome == "not_converged":
+        return line | {"refused": str(result.outcome)}
+    found = truth(s, int(result.extra["window"]))
+    doubts = {name: 1e-6 * abs(value) for name, value in found.items()}
+    return line | {"rows": measure_rows(result.measures, found, doubts)}

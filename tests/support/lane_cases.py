@@ -1,0 +1,194 @@
+"""Random cases of sweeps that are integrated together, in lanes, against single runs.
+
+Campaign `lanes` of `campaigns`: each seed is one law, or one family of rigs with a patch. The doubt of a single run is
+its own stated error, so that a row holds if the two results agree within the sum of both errors.
+"""
+
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+from campaigns import Row, strip_number
+from scene_texts import MODE
+
+import patchfem as pf
+from patchfem.api import base_of
+from patchfem.response.rows import TABLE as MOTION
+from patchfem.runs.many import meshes, one_by_one
+from patchfem.runs.many.lumped import lanes
+from patchfem.runs.results.patch_rows import TABLE as STATIC
+from patchfem.scene.sets import assignments
+
+SCENE = (
+    '[normal]\nload = "30 N"\n[friction]\n{law}\n'
+    + MODE
+    + '[drive]\nkind = "base"\nacceleration = "5 g"\nfrequency = "140 Hz"\ncycles = 60\n'
+)
+LAWS = {
+    "coulomb": 'law = "coulomb"\nstatic = 0.3',
+    "weakening": 'law = "coulomb"\nstatic = 0.3\nkinetic = 0.2',
+    "elastic-plastic": 'law = "elastic-plastic"\nstatic = 0.3\nbond_length = "10 um"',
+    "tanh": 'law = "tanh"\nstatic = 0.3\nreference_speed = "1 mm/s"',
+    "iwan": 'law = "iwan"\nstatic = 0.3\nstiffness = "1e6 N/m"\nchi = -0.5\nbeta = 0.5',
+    "nonlocal": 'law = "nonlocal"\nstatic = 0.3\nbond_length = "10 um"',
+    "bouc-wen": 'law = "bouc-wen"\nstatic = 0.3\nstiffness = "1e6 N/m"',
+    "lugre": 'law = "lugre"\nstatic = 0.3\nstiffness = "1e6 N/m"\nstribeck_speed = "1 mm/s"',
+}
+FLOORS = {name: row.floor for table in (STATIC, MOTION) for name, row in table.items()}
+PATCH = """[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6.35 mm"
+load = "26 lbf"
+substrate = "Ti-8Al-1Mo-1V"
+[contact.tilt]
+angle = "0.1 mrad"
+[contact.shear]
+[friction]
+law = "coulomb"
+static = 0.30
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "143 Hz"
+acceleration = "5 g"
+cycles = 200
+[accuracy]
+tolerance = 1e-3
+"""
+FAMILIES = {  # keys that vary in a sweep of rigs with a patch -> draw of a value in SI units
+    "tilt x friction": {
+        "contact.tilt.angle": lambda r: 10 ** r.uniform(-6, -3.3),
+        "friction.static": lambda r: r.uniform(0.1, 0.6),
+    },
+    "amplitude x friction": {
+        "drive.acceleration": lambda r: 10 ** r.uniform(0, 2.3),
+        "friction.static": lambda r: r.uniform(0.1, 0.6),
+    },
+    "frequency x load": {
+        "drive.frequency": lambda r: r.uniform(100, 200),
+        "contact.load": lambda r: 10 ** r.uniform(1.3, 2.5),
+    },
+}
+N_CASES = 400  # of a sweep of points
+N_PATCHES = 64  # of a sweep of patches, the fewest that are integrated in lanes
+N_SINGLES = 30  # cases that are computed by single runs too
+
+
+def draw_points(law: str, seed: int, count: int) -> list:
+    """Draw models of a law that lanes take: from sliding all the time to sticking, near resonance and away."""
+    r, base, out = np.random.default_rng(seed), base_of(pf.load(SCENE.format(law=LAWS[law]))), []
+    while len(out) < count:
+        push = 10 ** r.uniform(0.3, 2)
+        sets = {
+            "normal.load": push * 10 ** r.uniform(-1, 0.5),
+            "drive.frequency": r.uniform(50, 400),
+            "structure.mode.axial.damping": 10 ** r.uniform(-2.5, -0.5),
+            "drive.acceleration": push,
+            "structure.mode.axial.slide": float(r.choice([1, -0.7])),
+            "structure.mode.axial.output": float(r.choice([1, -1.3])),
+        }
+        sets |= of_law(law, r, sets["normal.load"], push / (2 * np.pi * sets["drive.frequency"]))
+        model = pf.build(base.changed(assignments(sets)))
+        if not lanes.refuses(model):
+            out.append(model)
+    return out
+
+
+def draw_patches(family: str, seed: int, count: int) -> list:
+    """Draw models of a family of rigs with a patch."""
+    r, base = np.random.default_rng(seed), base_of(pf.load(PATCH))
+    sets = [{key: float(draw(r)) for key, draw in FAMILIES[family].items()} for _ in range(count)]
+    return [pf.build(base.changed(assignments(one))) for one in sets]
+
+
+def of_law(law: str, r, load: float, speed: float) -> dict:
+    """Keys of a law drawn for a load [N] and a scale of the speeds [m/s]."""
+    if law == "iwan":
+        return {
+            "friction.stiffness": 0.3 * load * 10 ** r.uniform(4.3, 5.5),
+            "friction.chi": r.uniform(-0.9, 0),
+            "friction.beta": float(r.choice([0, 0.3, 3])),
+        }
+    length = 10 ** r.uniform(-5.5, -4.3)
+    if law in ("elastic-plastic", "nonlocal"):
+        return {"friction.bond_length": length}
+    if law == "tanh":
+        return {"friction.reference_speed": speed * 10 ** r.uniform(-2.3, 0)}
+    if law == "bouc-wen":
+        return {
+            "friction.stiffness": 0.3 * load / length,
+            "friction.exponent": float(r.choice([1, 1.5, 2, 4])),
+            "friction.shape": r.uniform(0.5, 1),
+        }
+    if law == "lugre":
+        stribeck = speed * 10 ** r.uniform(-1.5, 0)
+        return {
+            "friction.stiffness": 0.3 * load / length,
+            "friction.stribeck_speed": stribeck,
+            "friction.kinetic": r.uniform(0.15, 0.3),
+            "friction.micro_damping": float(r.choice([0, 1])) * 0.1 * load / speed,
+            "friction.viscous": float(r.choice([0, 1])) * 0.02 * load / speed,
+        }
+    return {}
+
+
+def rows(found, ones) -> list[list]:
+    """List the rows of each case of two Answers: values and errors of the first beside those of the second.
+
+    A value that one of them lacks is NaN and does not hold. A decay that the second lacks is left out: a run with so
+    many cells of the law that yields outnumber its samples has none.
+    """
+    out = []
+    for case in range(len(found)):
+        names = {name for name in found.values if found.has(name, case)}
+        names |= {name for name in ones.values if ones.has(name, case)}
+        some = []
+        for name in sorted(names):
+            value, truth = (
+                float(one.values[name][case]) if name in one.values else np.nan
+                for one in (found, ones)
+            )
+            error, doubt = (
+                float(one.errors[name][case]) if name in one.errors else np.nan
+                for one in (found, ones)
+            )
+            if np.isnan(truth) and (np.isnan(value) or name in lanes.RING):
+                continue
+            error, doubt = np.nan_to_num([error, doubt]).tolist()
+            some.append(Row(name, value, error, FLOORS[strip_number(name)], truth, doubt))
+        out.append(some)
+    return out
+
+
+def compare_cases(seed: int, folder: Path, earlier: dict | None = None) -> dict:
+    """Compare the sweep of a seed with single runs of its first cases; see `campaigns`."""
+    groups = [*LAWS, *FAMILIES]
+    group = groups[seed % len(groups)]
+    models = (
+        draw_points(group, seed, N_CASES) if group in LAWS else draw_patches(group, seed, N_PATCHES)
+    )
+    begin = process_time()
+    found = pf.run_many(models)
+    seconds = process_time() - begin
+    singles = models if group in LAWS else meshes.meshed(models)
+    mine = [
+        case for case in range(N_SINGLES) if found.numerics.get(case, {}).get("engine") == "lanes"
+    ]
+    ones = one_by_one.solve([singles[case] for case in mine])
+    same = [found.outcome[case] == outcome for case, outcome in zip(mine, ones.outcome)]
+    pairs = rows(found.some(np.array(mine)), ones)
+    return {
+        "group": group,
+        "engine": "lanes",
+        "seconds": seconds,
+        "cases": len(models),
+        "other_outcomes": same.count(False),
+        "rows": [row for some in pairs for row in some],
+    }

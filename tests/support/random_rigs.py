@@ -1,0 +1,232 @@
+"""Random rigs of every law, drive and structure, against an independent program or the same one with finer settings.
+
+Campaigns `rigs` and `harmonic` of `campaigns`. `motion_reference` is the independent program. Where it lacks the
+equations of a rig, the reference is the exact engine of patchfem, more cells of the law, more harmonics, or many more
+steps. Only the public names of the package are used.
+"""
+
+import json
+from pathlib import Path
+from time import process_time
+from typing import NamedTuple
+
+import numpy as np
+from campaigns import Row, measure_rows, strip_number
+from motion_read import measures, works
+from motion_reference import Motion, TooLong
+from motion_scenes import spec, written
+from motion_steady import periodic
+
+import patchfem as pf
+
+FINER = 16  # times the steps of the run, in the run that is the reference
+HALVING_FACTOR = (
+    5.0  # times the change at the last halving of the steps is the doubt of the finer run
+)
+MAX_STEPS = 12000  # of DOP853, about six seconds
+ROUGH = (0.04, 1e-10)  # longest step over the shortest period, and relative error of a step
+FINE = (0.025, 1e-12)  # the same, of the second integration
+PATCH_MEASURES = {  # of the pressed patch at rest: their reference would be the same program
+    "contact_fraction", "contact_half_width", "pressure_peak", "pressure_centre", "approach", "rotation", "moment",
+    "normal_stiffness", "tangential_stiffness",
+}  # fmt: skip
+LEFT_OUT = PATCH_MEASURES | {
+    "energy_balance", "work_check", "normal_load", "energy_created", "jump_level", "level_hysteresis",
+    "relative_displacement_amplitude_steady",
+}  # fmt: skip
+
+
+class Truth(NamedTuple):
+    """Reference values and their own uncertainties by name, and the kind of reference."""
+
+    values: dict
+    doubts: dict
+    kind: str
+
+
+def has_reference(s: dict) -> bool:
+    """Whether the independent program has the equations of a rig."""
+    if s["law"] == "order" or "load_amplitude" in s or (s["patch"] or {}).get("shear"):
+        return False
+    return not ((s["law"] == "convolution" and s["patch"]) or (s["several"] and s["law"] == "iwan"))
+
+
+def compute_truth(s: dict, path: Path, run: dict) -> Truth:
+    """Compute the reference of a rig, whose scene is a file; `run` is what `run_rig` returned."""
+    if has_reference(s):
+        try:
+            if s.get("method") == "harmonic":
+                return steady_truth(s, run["period"], run["kept"])
+            return motion_truth(s, run)
+        except TooLong:
+            pass
+    return finer_truth(s, path, run)
+
+
+def motion_truth(s: dict, run: dict) -> Truth:
+    """Integrate a rig by the independent program; a second, more careful integration shows the doubt of the first."""
+    runs = []
+    for step, rtol in (ROUGH,) if run["engine"] == "march" else (ROUGH, FINE):
+        motion = Motion(s, step)
+        stretches = motion.run(run["cycles"] * run["period"], rtol, most=MAX_STEPS)
+        runs.append(measures(motion, stretches, run["period"], run["cycles"], run["window"]))
+    return Truth(runs[-1], estimate_doubts(*runs), "reference")
+
+
+def steady_truth(s: dict, period: float, kept: int) -> Truth:
+    """Compute a steady motion by the independent program: its periodic state, or a long run that has settled.
+
+    `period` in seconds; `kept` is the number of cycles over which works are summed.
+    """
+    motion = Motion(s)
+    start = periodic(motion, period)
+    if start is not None:
+        stretches = motion.run(kept * period, 1e-11, start)
+        found = measures(motion, stretches, period, kept, 1) | works(
+            motion, stretches, 0.0, kept * period
+        )
+        return Truth(found, {}, "reference")
+    motion = Motion(s)
+    steps_per_cycle = 25 * max(1.0, motion.plant.fastest / s["frequency"])
+    cycles = next((k for k in (320, 160, 80) if k * steps_per_cycle < MAX_STEPS), 40)
+    stretches = motion.run(cycles * period, 1e-10, most=MAX_STEPS)
+    runs = []
+    for count in (cycles // 4, cycles // 2, cycles - 3, cycles - 2, cycles - 1, cycles):
+        end = count * period
+        runs.append(
+            measures(motion, stretches, period, count, 1)
+            | works(motion, stretches, end - kept * period, end)
+        )
+    last = runs[-1]
+    changes = [remaining_decay(*runs[:2], last), *(difference(last, one) for one in runs[2:-1])]
+    doubts = {name: max(one.get(name, 0.0) for one in changes) for name in last}
+    return Truth(last, estimate_doubts(last) | doubts, "reference")
+
+
+def remaining_decay(quarter: dict, half: dict, whole: dict) -> dict:
+    """Estimate what is left of a decay, from the values after a quarter, half and all of a run.
+
+    If the decay over a quarter is r, the ratio of the two changes is r (1 + r), and r^2/(1 - r^2) of the last one is
+    left.
+    """
+    out, early = difference(whole, half), difference(half, quarter)
+    for name, last in out.items():
+        rate = min((np.sqrt(1 + 4 * last / max(early.get(name, last), 1e-300)) - 1) / 2, 0.99)
+        out[name] = last * max(1.0, 2 * rate**2 / (1 - rate**2))
+    return out
+
+
+def finer_truth(s: dict, path: Path, run: dict) -> Truth:
+    """Compute a rig by patchfem itself: exactly where it marched, else with many more steps, cells or harmonics."""
+    tight = {"accuracy.tolerance": f"{s['tolerance'] / 10:g}"}
+    if run["map"] == "yields":
+        return Truth(run_values(path, tight), {}, "cells")
+    if s.get("method") == "harmonic":
+        found = pf.run(path, **tight, **{"accuracy.harmonics": "129"}).measures
+        known = {name: one for name, one in found.items() if one.value is not None}
+        values = {name: one.value for name, one in known.items()}
+        return Truth(values, {name: one.error or 0.0 for name, one in known.items()}, "harmonics")
+    if run["engine"] == "march":
+        try:
+            return Truth(run_values(path, tight | {"accuracy.method": "exact"}), {}, "pieces")
+        except pf.PatchfemError:  # no exact engine has the equations
+            pass
+    steps = run["steps"] or 400
+    coarse, fine = (
+        run_values(
+            path,
+            tight | {"accuracy.method": "march", "accuracy.steps_per_cycle": f"{factor * steps}"},
+        )
+        for factor in (FINER // 2, FINER)
+    )
+    return Truth(
+        fine,
+        {name: HALVING_FACTOR * gap for name, gap in difference(fine, coarse).items()},
+        "finer",
+    )
+
+
+def estimate_doubts(rough: dict, fine: dict | None = None) -> dict:
+    """Estimate the uncertainties of the independent program from one run, or from two of which one is more careful.
+
+    A drift is a difference of means of the motion, so that its uncertainty is a fraction of the amplitude.
+    """
+    out = {} if fine is None else difference(fine, rough)
+    relative = 1e-9 if fine is None else 1e-14
+    drift = out.get("drift_per_cycle", 0.0) + relative * rough["relative_displacement_amplitude"]
+    return out | {"drift_per_cycle": drift}
+
+
+def run_values(path: Path, sets: dict) -> dict:
+    """Run a scene with some keys set and return the values of its measures."""
+    return {
+        name: one.value
+        for name, one in pf.run(path, **sets).measures.items()
+        if one.value is not None
+    }
+
+
+def difference(fine: dict, coarse: dict) -> dict:
+    """Return the size of the difference for each measure that both runs have."""
+    return {
+        name: Row(name, fine[name], 0.0, 0.0, coarse[name], 0.0).true_error
+        for name in fine.keys() & coarse.keys()
+    }
+
+
+def run_rig(path: Path) -> dict:
+    """Run a scene by the program; return the numbers of the run, and its measures under "measures"."""
+    begin = process_time()
+    try:
+        result = pf.run(path)
+    except pf.PatchfemError as error:
+        return {"refused": str(error)}
+    seconds, rig = process_time() - begin, pf.build(path).rig
+    summary = json.loads((result.save(path.with_suffix("")) / "summary.json").read_text("utf-8"))
+    numerics, time = summary["numerics"], result.to_xarray().time
+    return {
+        "outcome": summary["outcome"],
+        "engine": numerics["engine"],
+        "map": numerics.get("map"),
+        "steps": numerics.get("steps_per_cycle"),
+        "seconds": seconds,
+        "warnings": summary["warnings"],
+        "period": rig.drive.period,
+        "cycles": rig.cycles,
+        "window": numerics["window_cycles"],
+        "kept": round(
+            float(time[-1] - time[0]) / rig.drive.period
+        ),  # cycles in the result of a steady motion
+        "measures": result.measures,
+    }
+
+
+def compare_spec(s: dict, folder: Path, earlier: dict | None = None) -> dict:
+    """Compare a rig with its reference; the reference of an earlier line is used if the cycles are the same."""
+    path = written(s, folder)
+    line = {"group": f"{s['law']}, {s['drive']}", "rows": []} | run_rig(path)
+    found = line.pop("measures", None)
+    if found is None or line["outcome"] in ("grows", "not_converged"):
+        return line
+    if (
+        earlier
+        and "true" in earlier
+        and all(earlier[key] == line[key] for key in ("cycles", "window", "kept"))
+    ):
+        truth = Truth(earlier["true"], earlier["doubt"], earlier["truth"])
+    else:
+        truth = compute_truth(s, path, line)
+    names = {name for name in truth.values if strip_number(name) not in LEFT_OUT}
+    rows = measure_rows(found, truth.values, truth.doubts, names)
+    return line | {"true": truth.values, "doubt": truth.doubts, "truth": truth.kind, "rows": rows}
+
+
+def compare_rig(seed: int, folder: Path, earlier: dict | None = None) -> dict:
+    """Compare the rig of a seed with its reference; see `campaigns`."""
+    return compare_spec(spec(seed), folder, earlier)
+
+
+def compare_harmonic_rig(seed: int, folder: Path, earlier: dict | None = None) -> dict | None:
+    """Compare the rig of a seed if its scene names the harmonic balance, else return None; see `campaigns`."""
+    s = spec(seed)
+    return compare_spec(s, folder, earlier) if s.get("method") == "harmonic" else None

@@ -1,0 +1,137 @@
+"""Random chains of masses reduced to two boundary coordinates and a few modes, against runs of all of their matrices.
+
+Campaign `reduced` of `campaigns`. The stated error of the run of all matrices is the doubt of the reference. Seeds
+below 7000 were used while this was written.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from campaigns import measure_rows, strip_number
+from random_rigs import LEFT_OUT
+
+import patchfem as pf
+
+LAWS = {
+    "elastic-plastic": 'bond_length = "{length!r} m"',
+    "coulomb": "",
+    "iwan": 'stiffness = "{stiffness!r} N/m"\nchi = -0.4\nbeta = 0.5',
+    "tanh": 'reference_speed = "{speed!r} m/s"',
+    "bouc-wen": 'stiffness = "{stiffness!r} N/m"\nexponent = 1.5',
+}
+SMOOTH = ("iwan", "tanh", "bouc-wen")  # by harmonic balance, the others from event to event
+REDUCED = """\
+[structure.reduced]
+stiffness = "whole.npz"
+mass = "whole.npz"
+damping = "whole.npz"
+boundary = {boundary}
+modes = {modes}
+method = "{method}"
+"""
+REST = """\
+[[structure.interface]]
+between = [{rubs}, 0]
+law = "{law}"
+static = 0.3
+load = "{load!r} N"
+{keys}
+[drive]
+kind = "{drive}"
+frequency = "{frequency!r} Hz"
+{size}
+cycles = 60
+"""
+
+
+def chain(seed: int) -> dict:
+    """Matrices and numbers of a random chain of 16 to 60 masses that rubs at one and is watched at another."""
+    r = np.random.default_rng(seed)
+    n = int(r.integers(16, 61))
+    k, m = 1e7 * 10 ** r.uniform(-0.3, 0.3, n), 0.02 * 10 ** r.uniform(-0.3, 0.3, n)
+    K = np.diag(k + np.append(k[1:], 0)) - np.diag(k[1:], 1) - np.diag(k[1:], -1)
+    M = np.diag(m)
+    omega, shapes = np.linalg.eigh(K / np.sqrt(np.outer(m, m)))
+    omega, mode = np.sqrt(omega), int(r.integers(0, 2))
+    rubs, seen = (int(one) for one in r.choice(np.arange(n // 4, n), 2, replace=False))
+    alpha = 2 * r.uniform(0.003, 0.03) * omega[0]
+    frequency = omega[mode] * r.uniform(0.85, 1.15)
+    force, stiff = 10 ** r.uniform(0, 2), 1 / np.linalg.inv(K)[rubs, rubs]
+    shape = shapes[:, mode] / np.sqrt(
+        m
+    )  # a modal force gives a slide of F shape^2/(2 zeta omega^2) at resonance
+    reach = float(
+        force * abs(shape[seen] * shape[rubs]) / (max(alpha / omega[mode], 0.05) * omega[mode] ** 2)
+    )
+    load = stiff * reach * 10 ** r.uniform(-1.5, 0.3) / 0.3
+    law, drive = str(r.choice(list(LAWS))), str(r.choice(["base", "force"]))
+    sizes = {"length": float(reach * 10 ** r.uniform(-2, -0.5))}
+    sizes["speed"] = float(reach * frequency * 10 ** r.uniform(-2, -1))
+    sizes["stiffness"] = float(0.3 * load / sizes["length"])
+    return {
+        "seed": seed,
+        "M": M,
+        "K": K,
+        "C": alpha * M + 1e-7 * K,
+        "rubs": rubs,
+        "seen": seen,
+        "law": law,
+        "drive": drive,
+        "load": float(load),
+        "keys": LAWS[law].format(**sizes),
+        "frequency": float(frequency / (2 * np.pi)),
+        "force": float(force),
+        "acceleration": float(force * abs(shape[seen] / (shape @ m))),
+        "modes": int(r.integers(2, 9)),
+        "method": str(r.choice(["craig-bampton", "free-interface"])),
+    }
+
+
+def texts(s: dict) -> tuple:
+    """Scenes of the reduced chain and of all of it, in this order."""
+    out, exact = [], "" if s["law"] not in SMOOTH else '[accuracy]\nmethod = "harmonic"\n'
+    for whole in (False, True):
+        rubs, seen = (s["rubs"] + 1, s["seen"] + 1) if whole else (1, 2)
+        size = (
+            f'acceleration = "{s["acceleration"]!r} m/s^2"'
+            if s["drive"] == "base"
+            else f'force = "{s["force"]!r} N"\nmass = {seen}'
+        )
+        head = (
+            '[structure]\nfile = "whole.npz"\n'
+            if whole
+            else "[structure]\noutput_mass = 2\n"
+            + REDUCED.format(
+                boundary=[s["rubs"] + 1, s["seen"] + 1], modes=s["modes"], method=s["method"]
+            )
+        )
+        out.append(head + REST.format(**s | {"rubs": rubs, "size": size}) + exact)
+    return tuple(out)
+
+
+def compare_chain(seed: int, folder: Path, earlier: dict | None = None) -> dict:
+    """Compare the reduced chain of a seed with the whole one; see `campaigns`."""
+    s = chain(seed)
+    line = {"group": f"{s['law']}, {s['drive']}", "engine": s["method"], "rows": []}
+    np.savez(
+        folder / "whole.npz", M=s["M"], K=s["K"], C=s["C"], output=np.eye(len(s["M"]))[s["seen"]]
+    )
+    results = []
+    for text in texts(s):
+        path = folder / "scene.toml"
+        path.write_text(text)
+        try:
+            results.append(pf.run(path))
+        except pf.PatchfemError as error:
+            return line | {"refused": str(error)}
+    reduced, whole = results
+    if whole.outcome != reduced.outcome or whole.outcome in ("grows", "not_converged"):
+        return line | {"refused": f"reduced {reduced.outcome}, whole {whole.outcome}"}
+    known = {
+        name: one
+        for name, one in whole.measures.items()
+        if None not in (one.value, one.error) and strip_number(name) not in LEFT_OUT
+    }
+    values = {name: one.value for name, one in known.items()}
+    doubts = {name: one.error for name, one in known.items()}
+    return line | {"rows": measure_rows(reduced.measures, values, doubts)}

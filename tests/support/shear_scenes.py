@@ -1,0 +1,185 @@
+"""Random joints, rigs and chains of two masses with [contact.shear], against runs with a far smaller tolerance.
+
+Campaigns `shear-joints`, `shear-rigs` and `shear-chains` of `campaigns`. The finer settings are a tolerance, because
+its mesh is graded to the corners: a uniform mesh of 1600 nodes errs by more in the stiffness than many stated errors.
+"""
+
+import re
+from pathlib import Path
+from time import process_time
+
+import numpy as np
+from campaigns import measure_rows
+
+import patchfem as pf
+from patchfem.response.rows import OF_EACH
+from patchfem.scene.scene import Scene, loads
+
+JOINT_TOLERANCE = 1e-6  # of the reference of a joint
+RIG_TOLERANCE = 1e-5  # of the reference of a rig or a chain
+BENCH = (
+    "loop_area",
+    "friction_force_peak",
+    "secant_stiffness",
+    "energy_stored",
+    "slip_amplitude",
+    "energy_dissipated",
+    "equivalent_stiffness",
+)
+MOTION = (
+    "relative_displacement_amplitude",
+    "absolute_acceleration_peak",
+    *BENCH,
+    "equivalent_damping",
+)
+RIG = """
+[contact]
+length = "12.7 mm"
+width = "12.7 mm"
+height = "6.35 mm"
+load = "115 N"
+substrate = "Ti-8Al-1Mo-1V"
+[contact.coating]
+material = "WC-Co"
+thickness = "152 um"
+[contact.shear]
+[friction]
+law = "coulomb"
+static = 0.3
+kinetic = 0.3
+[structure]
+moving_mass = "0.884 kg"
+[[structure.mode]]
+name = "axial"
+frequency = "143 Hz"
+damping = 0.003
+slide = 1.0
+[drive]
+kind = "base"
+frequency = "143 Hz"
+acceleration = "5 g"
+cycles = 150
+[accuracy]
+tolerance = 1e-2
+"""
+
+
+def _shaped(draw, crowns: tuple, tilts: tuple) -> dict:
+    """A crown, a tilt or neither: sets of a scene; both ranges are powers of ten, of metres and of radians."""
+    kind = draw.choice(["crown", "flat", "tilt"])
+    if kind == "crown":
+        return {"contact.crown.radius": f"{10 ** draw.uniform(*crowns):.3g} m"}
+    return {"contact.tilt.angle": f"{10 ** draw.uniform(*tilts):.3g} rad"} if kind == "tilt" else {}
+
+
+def _scene(text: str, sets: dict) -> Scene:
+    return loads(text, "random.toml", [f"{key}={value}" for key, value in sets.items()])
+
+
+def joint(seed: int) -> tuple:
+    """(text, sets) of a bolted joint slid to and fro, by .02 to 2.5 of the slide at which a stiff one would yield."""
+    draw = np.random.default_rng(seed)
+    mu = f"{draw.uniform(0.1, 0.6):.3f}"
+    sets = {
+        "contact.length": f"{draw.uniform(10, 60):.2f} mm",
+        "contact.load": f"{10 ** draw.uniform(1.5, 4):.3g} N",
+        "friction.static": mu,
+        "friction.kinetic": mu,
+    } | _shaped(draw, (1, 3.5), (-6, -4.3))
+    if draw.random() < 0.3:
+        sets |= {
+            "contact.coating.material": "WC-Co",
+            "contact.coating.thickness": f"{draw.uniform(50, 400):.0f} um",
+        }
+    text = re.sub(r"\[contact.crown\]\nradius.*\n(\s+#.*\n)*", "", pf.new("joint"))
+    first = pf.run(_scene(text, sets | {"slide.amplitude": "0.01 um"})).measures
+    yields = float(mu) * first["normal_load"].value / first["tangential_stiffness"].value
+    return text, sets | {"slide.amplitude": f"{10 ** draw.uniform(-1.7, 0.4) * yields!r} m"}
+
+
+def rig(seed: int) -> tuple:
+    """(text, sets) of the coated pieces on one mode, below and far above its frequency, at .1 to 30 g."""
+    draw = np.random.default_rng(seed)
+    mu = f"{draw.uniform(0.1, 0.6):.3f}"
+    sets = {
+        "contact.load": f"{10 ** draw.uniform(1.5, 3):.3g} N",
+        "friction.static": mu,
+        "friction.kinetic": mu,
+    }
+    sets |= _shaped(draw, (0.5, 3), (-5.5, -3.5))
+    return RIG, sets | {
+        "drive.frequency": f"{draw.uniform(100, 600):.1f} Hz",
+        "drive.acceleration": f"{10 ** draw.uniform(-1, 1.5):.3g} g",
+    }
+
+
+FACE = """
+[[structure.interface]]
+between = [{pair}]
+law = "coulomb"
+static = {static:.3f}
+"""
+CHAIN = """
+[structure]
+masses = ["0.3 kg", "0.5 kg"]
+[[structure.spring]]
+between = [1, 0]
+stiffness = "{one:.4g} N/m"
+[[structure.spring]]
+between = [2, 1]
+stiffness = "{two:.4g} N/m"
+[[structure.damper]]
+between = [1, 0]
+coefficient = "5 N s/m"
+[[structure.damper]]
+between = [2, 1]
+coefficient = "5 N s/m"
+"""
+
+
+def chain(seed: int) -> tuple:
+    """(text, sets) of two masses in a row, each behind a patch of its own, at frequencies about those of both."""
+    draw = np.random.default_rng(seed)
+    one, two = 10 ** draw.uniform(5, 7, 2)
+    pieces, rest = RIG.split("[friction]")
+    text, sets = CHAIN.format(one=one, two=two), {}
+    for k, pair in enumerate(("1, 0", "2, 1")):
+        text += FACE.format(pair=pair, static=draw.uniform(0.1, 0.6)) + pieces.replace(
+            "[contact", "[structure.interface.contact"
+        )
+        own = {"contact.load": f"{10 ** draw.uniform(1, 3):.3g} N"} | _shaped(
+            draw, (0.5, 3), (-5.5, -3.5)
+        )
+        sets |= {f"structure.interface.{k}.{key}": value for key, value in own.items()}
+    frequency = 10 ** draw.uniform(1.8, 3)
+    return text + "[drive]" + rest.partition("[drive]")[2], sets | {
+        "drive.frequency": f"{frequency:.1f} Hz",
+        "drive.acceleration": f"{10 ** draw.uniform(-1, 1.5):.3g} g",
+    }
+
+
+def compare_scene(text: str, sets: dict, tolerance: float, names) -> dict:
+    """Compare a scene with the same one at a smaller tolerance; see `campaigns`."""
+    begin = process_time()
+    result = pf.run(_scene(text, sets))
+    line = {"seconds": process_time() - begin, "warnings": list(result.warnings)}
+    finer = pf.run(_scene(text, sets | {"accuracy.tolerance": tolerance})).measures
+    truths = {
+        name: finer[name].value for name in names if name in finer and finer[name].value is not None
+    }
+    return line | {"rows": measure_rows(result.measures, truths, {})}
+
+
+def compare_joint(seed: int, folder: Path, earlier: dict | None = None) -> dict:
+    """Compare the joint of a seed; see `campaigns`."""
+    return compare_scene(*joint(seed), JOINT_TOLERANCE, BENCH)
+
+
+def compare_rig(seed: int, folder: Path, earlier: dict | None = None) -> dict:
+    """Compare the rig of a seed; see `campaigns`."""
+    return compare_scene(*rig(seed), RIG_TOLERANCE, MOTION)
+
+
+def compare_chain(seed: int, folder: Path, earlier: dict | None = None) -> dict:
+    """Compare the chain of a seed; see `campaigns`."""
+    return compare_scene(*chain(seed), RIG_TOLERANCE, (*MOTION, *(f"{name}_2" for name in OF_EACH)))
