@@ -1,0 +1,98 @@
+"""Claims about the check of a scene that planted faults showed to be unchecked."""
+
+import re
+
+import pytest
+from scene_texts import (
+    BLOCK,
+    COULOMB,
+    DRIVE,
+    FORCED,
+    MODE,
+    PAIR,
+    PLASTIC,
+    POINT,
+    TRIANGLE,
+    mistakes,
+)
+
+from patchfem.scene.scene import SceneError, load, loads
+
+WORN_FRICTION = """\
+[wear]
+coefficient = "1e-14 1/Pa"
+cycles = 1e4
+[wear.friction]
+depth = ["0 um", "1 um"]
+coefficient_factor = [1.0, 1.2]
+"""
+SHAKEN = POINT + COULOMB + MODE + DRIVE
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (
+            POINT + PLASTIC + 'stiffness = "1e7 N/m"\n' + TRIANGLE,
+            [r"a\.toml:7: friction\.stiffness: .*either this key or bond_length, not both"],
+        ),
+        (
+            POINT + COULOMB + TRIANGLE + WORN_FRICTION,
+            [r"a\.toml:14: wear\.friction: a \[normal\] contact has no area.*use \[contact\]"],
+        ),
+        (
+            BLOCK + COULOMB + TRIANGLE + '[contact.upper]\nend_radius = "100 nm"\n',
+            [r"a\.toml:16: contact\.upper\.end_radius: 1e-07 m is less than .* leave this key out"],
+        ),
+        (
+            SHAKEN + 'waveform = "sweep"\n',
+            [
+                r"a\.toml:13: drive\.from: missing; .*waveform 'sweep' needs this key",
+                r"a\.toml:13: drive\.to: missing; .*waveform 'sweep' needs this key",
+                r"a\.toml:13: drive\.rate: missing; .*drive\.log_rate instead",
+            ],
+        ),
+    ],
+)
+def test_refuses_with_the_line_the_key_and_the_remedy(text, says):
+    found = mistakes(text)
+    assert len(found) == len(says)
+    assert all(re.match(pattern, mistake) for pattern, mistake in zip(says, found))
+
+
+@pytest.mark.parametrize(
+    ("text", "key"),
+    [
+        (SHAKEN + 'waveform = "sine"\nrate = "80 Hz/s"\n', "drive.rate"),
+        (
+            PAIR.replace("[structure]\n", '[structure]\nmoving_mass = "1 kg"\n') + FORCED,
+            "structure.moving_mass",
+        ),
+    ],
+)
+def test_exact_a_key_without_meaning_is_remarked(text, key):
+    (remark,) = loads(text).remarks
+    assert remark.startswith(f"{key} has no meaning ") and remark.endswith("is not used")
+
+
+def test_refuses_a_change_of_a_scene_that_names_an_absent_file(tmp_path):
+    path = tmp_path / "a.toml"
+    scene = loads(POINT + COULOMB + TRIANGLE, path)
+    with pytest.raises(SceneError) as refusal:
+        scene.with_(**{"measured.file": "no.csv"})
+    (mistake,) = refusal.value.mistakes
+    assert mistake.startswith(f"--set: measured.file: there is no file {tmp_path / 'no.csv'}")
+
+
+def test_refuses_a_scene_that_names_an_absent_file_with_its_line(tmp_path):
+    path = tmp_path / "a.toml"
+    path.write_text(POINT + COULOMB + '[slide]\nkind = "file"\nfile = "no.csv"\n')
+    with pytest.raises(SceneError) as refusal:
+        load(path)
+    (mistake,) = refusal.value.mistakes
+    assert f"a.toml:8: slide.file: there is no file {tmp_path / 'no.csv'}" in mistake
+
+
+def test_exact_an_end_radius_above_its_smallest_size_is_accepted():
+    scene = loads(BLOCK + COULOMB + TRIANGLE + '[contact.upper]\nend_radius = "0.13 um"\n')
+    assert scene.contact.upper.end_radius == pytest.approx(1.3e-7, rel=1e-12)
