@@ -17,7 +17,7 @@ from patchfem.surface.scans import change, search
 from patchfem.surface.scans.model import rotation
 from patchfem.surface.scans.search import transform_scan
 
-STEP, COUNT, COARSE, FULL = 1e-6, 200, 112, search.SIZE
+STEP, COUNT, COARSE = 1e-6, 200, 112
 SIDE = STEP * (COUNT - 1)
 
 
@@ -59,7 +59,7 @@ def common(angle, shift, worn):
 
 @pytest.fixture(scope="module", autouse=True)
 def coarser():
-    """Half the pixels a side in the search, a quarter of its work; pairs of the independent program have all."""
+    """Half the pixels a side in the search, a quarter of its work."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(search, "SIZE", COARSE)
         yield
@@ -232,9 +232,8 @@ def test_always_a_refused_place_names_the_likeness_that_it_wants(grooved, worn, 
 
 @pytest.mark.share(1)
 @pytest.mark.parametrize("seed, tolerance", [(66, 0.006), (63, 0.006), (67, 0.03), (72, 0.006), (75, 0.006)])
-def test_always_an_independent_pair_has_its_place_and_volume(monkeypatch, seed, tolerance):
+def test_always_an_independent_pair_has_its_place_and_volume(seed, tolerance):
     """A track with pile-up, a crater, deposits, exchanged files and worn asperities on machined surfaces."""
-    monkeypatch.setattr(search, "SIZE", FULL)
     pair = scan_pairs.make(seed)
     before, after = (Areal(*(pair.spacing * np.arange(n) for n in z.shape[::-1]), z, "a scan")
                      for z in (pair.before, pair.after))
