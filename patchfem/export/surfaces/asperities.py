@@ -13,9 +13,7 @@ from ...surface.roughness.peaks import (
     persson_stiffness,
 )
 
-PRESSURE_FRACTION = (
-    1e-5  # pressure / combined modulus at which stiffnesses are stated: 1.2 MPa on steel
-)
+PRESSURE_FRACTION = 1e-5  # pressure / combined modulus of stated stiffnesses; 1.2 MPa on steel
 
 
 def data_of(moments: TraceMoments | None, cutoff: float | None) -> dict | None:

@@ -62,7 +62,7 @@ WORDS = {
 }
 TABLE_HEADS = ("quantity", "value", "95 %", "unit")
 SIDES = ("before", "after")
-MAX_DRAWN = 1_000_000  # heights of a histogram and of an Abbott curve; a larger scan is thinned
+MAX_DRAWN = 1_000_000  # heights of a histogram or Abbott curve; larger scans are thinned
 NOTE = (
     "All intervals are 95 % intervals. The intervals of shift, depth and area hold for the "
     "measured place and come from the noise of the unworn heights. A track or worn part begins "
@@ -193,7 +193,10 @@ def _part_data(part: Comparison) -> dict:
     if _averaged_part(part) is not None:
         out["worn_depth_mean"]["over"] = _averaged_part(part)
     if isinstance(part.before, Profile):
-        out["registration"] = {"shift": quantity_data(part.motion.shift), "mirrored": part.is_mirrored}
+        out["registration"] = {
+            "shift": quantity_data(part.motion.shift),
+            "mirrored": part.is_mirrored,
+        }
         sizes, *others = (_values_data(found) for found in (part.tracks.sizes, *part.tracks.others))
         out |= {
             "track": sizes or None,

@@ -200,7 +200,9 @@ def page(rows: list, name: str) -> str:
     sections = []
     for number, (group, count, averages) in enumerate(pairs.average_pairs(rows)):
         if averages:
-            own = [row for row in rows if row["outcome"] == "done" and pairs.find_group(row) == group]
+            own = [
+                row for row in rows if row["outcome"] == "done" and pairs.find_group(row) == group
+            ]
             sections.append(
                 Section(
                     f"means{number}", _heading(group, count), _means_html(number, own, averages)

@@ -12,18 +12,14 @@ from ...surface.roughness.spectrum import Spectrum
 from ..drawing.charts import axis, chart, line, mark
 from ..drawing.pictures import BLUE, draw, drawing, styled
 
-MAX_POINTS = 2400  # points of a drawn line: eight for each pixel column of the page
-MAX_SPECTRUM_POINTS = (
-    400  # points of a drawn spectrum, evenly spread over the logarithm of the frequency
-)
+MAX_POINTS = 2400  # points of a drawn line, which the width of a page can show
+MAX_SPECTRUM_POINTS = 400  # points of a drawn spectrum, even on the logarithmic axis
 N_BINS = 120  # classes of a histogram
-MAX_PIXELS = 400  # heights of a drawn map along each axis
+MAX_PIXELS = 400  # heights of a drawn map along each axis, which the width of a page can show
 MIN_DETAIL_SAMPLES = 400  # samples of the enlarged part of two traces
-MAX_SECTION_RULES = (
-    60  # more sections of a roughness profile are drawn without the lines between them
-)
-OUTLIERS = (0.002, 0.998)  # quantiles of the heights that the colours of a map span
-UM3 = 1e18  # cubic micrometres in a cubic metre
+MAX_SECTION_RULES = 60  # sections of a roughness profile; lines between more of them cover it
+COLOUR_QUANTILES = (0.002, 0.998)  # quantiles of the heights at the ends of the colour scale
+UM3_PER_M3 = 1e18  # cubic micrometres in a cubic metre
 GREY = "#4d4d4d"
 SIDES = (("soft", "before"), ("accent", "after"))
 
@@ -86,7 +82,7 @@ def draw_roughness(roughness, ends: tuple, cutoff: float) -> str:
 def abbott_core_chart(heights: Heights, names: tuple = ("Mr1", "Mr2")) -> dict:
     """Chart an Abbott curve with the straight line of its core.
 
-    Names: of the material ratios where the core ends.
+    names: names of the two material ratios at the ends of the core.
     """
     ratio, height = abbott(heights)
     core = heights.core
@@ -153,7 +149,7 @@ def draw_statistics(heights: Heights, spectrum: Spectrum, band: tuple, cutoff: f
 
 
 def _full_axis(label: str, unit: str, x) -> dict:
-    """Return an axis whose range is that of the places x."""
+    """Return an axis from the first to the last of the places x."""
     return axis(label, unit) | {"range": [x[0], x[-1]]}
 
 
@@ -179,8 +175,10 @@ def _density_marks(
     pick = pick[spectrum.density[pick] > 0]
     waves = scale / spectrum.frequency[pick]
     return [
-        mark("band", colour, band, x=waves, low=low[pick] * UM3, high=high[pick] * UM3),
-        line(waves, spectrum.density[pick] * UM3, colour, name, width=1.0),
+        mark(
+            "band", colour, band, x=waves, low=low[pick] * UM3_PER_M3, high=high[pick] * UM3_PER_M3
+        ),
+        line(waves, spectrum.density[pick] * UM3_PER_M3, colour, name, width=1.0),
     ]
 
 
@@ -199,7 +197,7 @@ def draw_scan(x, y, z):
     """
     figure, (left, right) = drawing(2, 3.8, width_ratios=(1.2, 1))
     known = z[~np.isnan(z)]
-    _draw_map(figure, left, (x, y, z), np.quantile(known, OUTLIERS), "viridis")
+    _draw_map(figure, left, (x, y, z), np.quantile(known, COLOUR_QUANTILES), "viridis")
     left.set(title="Heights")
     up, um = axis_unit(z, "m")
     right.hist(known * um, bins=N_BINS, color=BLUE, weights=np.full(known.size, 100 / known.size))
@@ -226,10 +224,10 @@ def draw_maps(x, y, heights: tuple):
     """
     figure, panels = drawing(3, float(np.clip(0.8 + 2.6 * np.ptp(y) / np.ptp(x), 1.6, 6.0)))
     before, after, depth = heights
-    ends = np.quantile(before[~np.isnan(before)], OUTLIERS)
+    ends = np.quantile(before[~np.isnan(before)], COLOUR_QUANTILES)
     _draw_map(figure, panels[0], (x, y, before), ends, "viridis")
     _draw_map(figure, panels[1], (x, y, after), ends, "viridis")
-    reach = np.nanquantile(np.abs(depth), OUTLIERS[1])
+    reach = np.nanquantile(np.abs(depth), COLOUR_QUANTILES[1])
     _draw_map(figure, panels[2], (x, y, depth), (-reach, reach), "RdBu_r", name="depth")
     for panel, title in zip(panels, ("before", "after", "worn depth")):
         panel.set(title=title)
@@ -478,7 +476,7 @@ class PairsPanel(NamedTuple):
 
 
 def draw_pairs(panels: list) -> str:
-    """Draw quantities of pairs with their intervals and the mean of them; panels: of PairsPanel."""
+    """Draw the quantities of all pairs with intervals and means; panels: list of PairsPanel."""
     charts = []
     for panel in panels:
         mean = panel.mean
@@ -517,7 +515,7 @@ class PressedSide(NamedTuple):
 
 
 def draw_pressures(sides: list) -> str:
-    """Draw the normal stress of the patch with each surface; sides: of PressedSide."""
+    """Draw the normal stress of the patch with each surface; sides: list of PressedSide."""
     along, mm = axis_unit(sides[0].x, "m")
     unit, scale = axis_unit(np.concatenate([side.stress for side in sides]), "Pa")
     top = 1.05 * max(float(side.stress.max()) for side in sides) * scale

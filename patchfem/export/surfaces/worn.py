@@ -35,10 +35,10 @@ MEASURES = (
     "friction_force_peak",
 )
 HEADLINE_MEASURES = ("contact_fraction", "pressure_peak", "loop_area")
-WHOLE_PATCH = 0.999  # fraction of the area that is worn, from which the headline names no part
-MIN_HIDDEN = 0.01  # hidden wear as a fraction of the mean depth, from which the headline states it
-EVEN_RATIO = 0.8  # ratio of the hidden depths at both ends above which the wear is uniform
-WEDGE_RATIO = 0.2  # the same ratio, below which it is a wedge
+WHOLE_PATCH = 0.999  # worn fraction of the area above which the headline names no part
+MIN_HIDDEN = 0.01  # hidden wear / mean depth above which the headline states it
+EVEN_RATIO = 0.8  # smallest / largest hidden depth above which the wear is called uniform
+WEDGE_RATIO = 0.2  # smallest / largest hidden depth below which the wear is called a wedge
 RUN_WORDS = WORDS | {
     "from": "worn part from",
     "to": "worn part to",
@@ -104,9 +104,9 @@ def describe_hidden_wear(ends: tuple) -> str:
 
 
 def data_of(wear: Wear, found: tuple) -> dict:
-    """Return the comparison as plain data in SI, by the names that traces have.
+    """Return the comparison as plain data in SI, with the names of a comparison of traces.
 
-    Found: the `verdict`.
+    found: result of `verdict`.
     """
     zero = Quantity(
         0.0, 0.0, 0.0, "m", "positions are known, because both runs are of the same patch"
@@ -175,7 +175,7 @@ def _measure_rows(wear: Wear) -> list:
 
 
 def lines_of(wear: Wear, found: tuple) -> list:
-    """Return the comparison as lines of text; found: the `verdict`."""
+    """Return the comparison as lines of text; found: result of `verdict`."""
     out = [
         found[0],
         *(f"  {text}" for text in found[1]),
@@ -193,7 +193,7 @@ def write_page(path: Path, wear: Wear, found: tuple) -> None:
     path : Path
     wear : Wear
     found : tuple
-        The `verdict`.
+        Result of `verdict`.
     """
     both = (wear.before, wear.after)
     body = [figure(number, *picture) for number, picture in enumerate(_pictures(wear))]

@@ -14,12 +14,12 @@ from ...surface.quantity import Quantity, refused
 from ..pages import beside
 from ..readback import numeric, readable, variables, wanted
 
-REQUIRED = {
+REQUIRED = {  # variable: possible numbers of dimensions
     "x": (1,),
     "weight": (1,),
     "unloaded_gap": (1, 2),
     "normal_stress": (2,),
-}  # variables -> their dimensions
+}
 OPTIONAL = (
     "strip_offset",
     "worn_depth",
@@ -29,12 +29,10 @@ OPTIONAL = (
     "friction_force",
     "wear_cycle",
 )
-FLOOR_PARTS = 5  # the floor of a worn part is its deepest fifth, as for measured tracks
-FLOOR_POINTS = 100  # points of a fifth; more change the floor by less than the run's own error
-MIN_WORN_FRACTION = 1e-3  # nodes that wore less / largest depth count as unworn
-MIN_ROUGHNESS = (
-    1e-12  # [m] standard deviation below which an unworn surface is flat and has no waves
-)
+FLOOR_PARTS = 5  # worn part / its floor, the deepest fifth, as for measured tracks
+FLOOR_POINTS = 100  # points of the floor; more change it by less than the error of the run
+MIN_WORN_FRACTION = 1e-3  # depth / largest depth below which a node counts as unworn
+MIN_ROUGHNESS = 1e-12  # [m] standard deviation below which an unworn surface counts as flat
 TEXTS = {
     "worn_volume": ("m3", "material lost over the whole patch, both pieces together"),
     "worn_depth_max": ("m", "largest worn depth"),
@@ -200,30 +198,23 @@ def _last_loop(run, fields: dict) -> tuple | None:
 def _require_same_patch(first: PatchRun, second: PatchRun) -> None:
     """Raise PatchfemError unless the runs are two states of one patch, the less worn one first."""
     both = f"{first.path} and {second.path}: these are two different patches"
+    x = second.surface.x
     tables = []
+    unworn = []
+    volumes = []
     for run in (first, second):
-        tables.append(
-            {key: value for key, value in run.run.resolved["contact"].items() if key not in LOADING}
-        )
-    unlike = [
-        f"contact.{key}"
-        for key in {**tables[0], **tables[1]}
-        if tables[0].get(key) != tables[1].get(key)
-    ]
+        contact = run.run.resolved["contact"]
+        tables.append({key: value for key, value in contact.items() if key not in LOADING})
+        unworn.append(_interpolate(x, run.surface.x, run.surface.gap - run.surface.depth))
+        volume = run.measure("worn_volume")
+        volumes.append(volume["value"] if volume else 0.0)
+    keys = {**tables[0], **tables[1]}
+    unlike = [f"contact.{key}" for key in keys if tables[0].get(key) != tables[1].get(key)]
     if unlike:
         raise PatchfemError(f"{both}: {', '.join(unlike)} differ")
-    x = second.surface.x
-    unworn = [
-        _interpolate(x, run.surface.x, run.surface.gap - run.surface.depth)
-        for run in (first, second)
-    ]
     difference = float(np.abs(unworn[0] - unworn[1]).max())
     if difference > SAME * float(np.ptp(unworn[1])) + MIN_ROUGHNESS:
         raise PatchfemError(f"{both}: their unworn surfaces differ by {say(difference, 3)}")
-    volumes = [
-        measure["value"] if (measure := run.measure("worn_volume")) else 0.0
-        for run in (first, second)
-    ]
     if volumes[1] < volumes[0]:
         raise PatchfemError(
             f"{first.path} is worn more than {second.path}; give the less worn run as the first "
@@ -368,10 +359,7 @@ def hidden_plane(x, y, depth) -> tuple:
 
 
 def _wave_ratios(x, gaps: tuple) -> dict:
-    """Compute the ratios of amplitude and slope of the surfaces, after over before.
-
-    Without value if it has a reason.
-    """
+    """Compute the ratios of amplitude and slope of the surfaces, after over before."""
     texts = {"amplitude": AMPLITUDE, "slope": SLOPE}
     reason = ""
     if gaps[0].ndim == 2:
@@ -394,17 +382,17 @@ def _profile_ratios(before: Profile, after: Profile, texts: dict) -> dict:
     first, width = ratios.resample(before, step)
     second, _ = ratios.resample(after, step)
     out = {}
-    for (part, text), correlation in zip(texts.items(), ratios.correlate_traces(first, second, width)):
-        out[f"{part}_ratio"] = ratios.divide_sizes(
-            part, text, size_after, size_before, correlation
-        )
+    for (part, text), correlation in zip(
+        texts.items(), ratios.correlate_traces(first, second, width)
+    ):
+        out[f"{part}_ratio"] = ratios.divide_sizes(part, text, size_after, size_before, correlation)
     return out
 
 
 def _measure_track(x, depth, error: float, area: float) -> dict:
-    """Measure the part that wore by more than its error [m].
+    """Measure the part that wore by more than the error [m] of its depth.
 
-    Area [m2]: lost over the width of the section.
+    area: lost area [m2] of the section.
     """
     deep = np.flatnonzero(depth > max(error, MIN_WORN_FRACTION * float(depth.max())))
     if not deep.size or depth.max() <= 0:
