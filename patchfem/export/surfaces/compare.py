@@ -244,7 +244,7 @@ def surfaces(comparison: Comparison) -> tuple:
     if found is None:
         traces = (comparison.before, comparison.after)
     else:
-        second = found.first - found.depth
+        second = found.first - found.worn_depth
         traces = (
             Profile(found.x, found.first, comparison.before.source),
             Profile(found.x, second, comparison.after.source),
@@ -399,13 +399,13 @@ def _aligned_heights(part: Comparison) -> tuple:
     """Return both aligned traces (n,) [m] about the least-squares line of the first."""
     found = part.alignment
     line = np.polyval(np.polyfit(found.x, found.first, 1), found.x)
-    return found.first - line, found.first - found.depth - line
+    return found.first - line, found.first - found.worn_depth - line
 
 
 def _aligned_pictures(part: Comparison) -> list:
     """Draw two aligned traces and the depth between them."""
     found = part.alignment
-    worn = np.where(found.depth > 3 * found.noise, found.depth, 0.0)
+    worn = np.where(found.worn_depth > 3 * found.noise, found.worn_depth, 0.0)
     both = Picture(
         pictures.draw_aligned(found.x, *_aligned_heights(part), worn),
         "The trace measured after wear, moved by shift, tilt and offset, is drawn over the trace "
@@ -413,7 +413,7 @@ def _aligned_pictures(part: Comparison) -> list:
         f"Both traces after alignment: mean worn depth {format_quantity(part.worn.mean).short}",
     )
     depth = Picture(
-        pictures.draw_depth(found.x, found.depth, used=found.unworn),
+        pictures.draw_depth(found.x, found.worn_depth, used=found.unworn),
         "The curve is the depth of the second trace (after wear) below the first trace (before "
         "wear). Blue: the unworn heights to which shift, tilt and offset were fitted.",
         f"Worn depth along the trace: largest {format_quantity(part.worn.largest).short}",

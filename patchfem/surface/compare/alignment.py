@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core import PatchfemError, frozen_array
 from ..profile import Profile, runs_of
-from .boxes import make_boxes, part_means, split_edges
+from .boxes import N_PARTS, make_boxes, part_means, split_edges
 from .errors import DrawnErrors, correlation_length, draw_errors, noise_along
 from .model import BENT, DATUM, MIN_HEIGHTS, RIGID, STRAIGHT, Parameter, TraceModel
 from .robust import MIN_UNWORN, REACH, find_floors, fit_biweight, solve_weighted
@@ -18,7 +18,6 @@ BEND_GAIN = 0.8  # scale with / without a bend, below which the bend is subtract
 MIN_FILLED = 0.7  # fraction of unworn heights in an unworn end
 LONG_END = 0.05  # fraction of the length of a flank that tells a scar from a bent datum
 SHORT_END = 0.02  # fraction of the length of a flank that makes a scar possible
-N_PARTS = 60  # parts of a trace whose means show shallow wear and slow errors
 FLANK_PARTS = 6  # parts of the trace on either side of a shallow track
 MIN_PARTS = 3  # parts of a shallow track
 DATUM_DEGREE = 3  # degree of the polynomial that a datum may add to shallow depths
@@ -27,7 +26,7 @@ MAX_COUNTED = 4.0  # standard deviations beyond which a height counts no further
 N_THINNED = 2000  # samples that the starts of a fit are refined on
 NEIGHBOURS = (4, 16)  # samples of the means that show wear below the noise of a height
 MIN_FOOT = 64  # samples of a worn run whose flanks may leave the floor slowly
-MARGIN = 0.1  # width left out beside a worn run / width of the run, to see how far slight wear moves the floor
+MARGIN = 0.2  # width beside a worn run, in which slight wear may be taken for a drift / width of the run
 MAX_ROUNDS = 4  # fits in which the worn parts settle
 MARGIN_SAMPLES = 8  # samples of that margin, at least
 
@@ -53,8 +52,8 @@ class Alignment:
         they are zero.
     noise, least : float
         Standard deviation [m] of the unworn depths, and rounding.
-    doubt : (k,) array
-        Change of the parameters where heights beside the worn ones are left out too.
+    clear : (n,) bool array
+        Unworn heights away from the worn ones, which show the drift of the datum.
     rival : Alignment or None
         Another floor that the traces lie on as well.
     is_straight : bool
@@ -72,7 +71,7 @@ class Alignment:
     middle: float
     noise: float
     least: float
-    doubt: np.ndarray
+    clear: np.ndarray
     rival: "Alignment | None" = field(default=None, repr=False)
     is_straight: bool = False
 
@@ -107,8 +106,14 @@ class Alignment:
 
     @cached_property
     def errors(self) -> DrawnErrors:
-        """Drawn errors of the depth and of the parameters."""
-        return draw_errors(self.depth, self.noise_at, self.unworn, self.jacobian, self.doubt)
+        """Drift of the datum, and drawn errors of the depth without it and of the parameters."""
+        degree = 2 if Parameter.BEND in self.free else 1
+        return draw_errors(self.depth, self.noise_at, self.unworn, self.clear, self.jacobian, degree)
+
+    @property
+    def worn_depth(self) -> np.ndarray:
+        """Depth (n,) [m] without the drift of the datum."""
+        return self.depth - self.errors.drift
 
     @property
     def agreed(self) -> float:
@@ -219,17 +224,15 @@ def _complete(model, state, free) -> Alignment:
 
 
 def _record(model, state, free, scale: float, worn) -> Alignment:
-    """Record the alignment that a state stands for, with what wear beside the worn heights may change."""
+    """Record the alignment that a state stands for, with the heights that show the drift of the datum."""
     depth, jacobian = model.linearize(state)
     unworn = (np.abs(depth) <= REACH * scale) & ~worn
-    wide = worn.copy()
+    clear = unworn.copy()
     for first, last in runs_of(worn):
         margin = max(MARGIN_SAMPLES, int(MARGIN * (last - first)))
-        wide[max(first - margin, 0) : last + margin + 1] = True
-    doubt = np.zeros(len(free))
-    if wide.any() and (unworn & ~wide).sum() > unworn.sum() / 2:
-        other = fit_biweight(model, np.array(state), list(free), wide, rounds=10)
-        doubt = (other.state - state)[list(free)]
+        clear[max(first - margin, 0) : last + margin + 1] = False
+    if clear.sum() < unworn.sum() / 2:
+        clear = unworn
     return Alignment(
         x=frozen_array(model.x),
         first=frozen_array(model.spline(model.places(state))),
@@ -242,7 +245,7 @@ def _record(model, state, free, scale: float, worn) -> Alignment:
         middle=model.middle,
         noise=scale,
         least=model.least,
-        doubt=frozen_array(doubt),
+        clear=clear,
     )
 
 

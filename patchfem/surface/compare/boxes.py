@@ -5,6 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+N_PARTS = 60  # parts of a trace whose means show shallow wear and slow errors
+
 
 class Boxes(NamedTuple):
     """Boxes over the parts of a trace, less their projection on polynomials.

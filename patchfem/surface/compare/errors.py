@@ -1,9 +1,10 @@
-"""Errors of a depth: noise of each height, its correlation, and a block bootstrap of all that follows from it.
+"""Errors of a depth: noise of each height, its correlation, drift of the datum, and draws of all of them.
 
-The standardized depths of the unworn heights are drawn in blocks (Kuensch, Annals of Statistics 17
-(1989) 1217), whose length follows their correlation. Each draw moves the fitted floor by the
-influence function of the biweight and adds its own noise, so that a single set of draws gives the
-interval of every mean, area, floor and largest depth.
+The standardized depths of the unworn heights, without the drift of the datum (`drift`), are drawn in
+blocks (Kuensch, Annals of Statistics 17 (1989) 1217), whose length follows their correlation, and drawn
+drifts are added. Each draw moves the fitted floor by the influence function of the biweight, and its own
+drift is taken out as that of the traces is, so that a single set of draws gives the interval of every
+mean, area, floor and largest depth.
 """
 
 from typing import NamedTuple
@@ -11,21 +12,22 @@ from typing import NamedTuple
 import numpy as np
 
 from ..quantity import LEVEL, SIDE
+from .drift import model_drift
 from .robust import BIWEIGHT, REACH
 
 N_DRAWS = 200  # draws of the bootstrap: a standard deviation is known to 5 %
 TRUNCATED_VARIANCE = 0.911  # variance of normal noise that is cut off at REACH
-MAX_BLOCKS = 8  # blocks of a trace: fewer, longer ones would show slower errors, but their number is too small
-N_DATUM = 2  # offset and tilt, which the fit takes from the slow errors of the unworn heights
 SEED = 1989
 
 
 class DrawnErrors(NamedTuple):
-    """Drawn errors of the depth (draws, n) [m] and of the fitted parameters (draws, k), and correlation of the noise.
+    """Drift of the datum, and drawn errors.
 
-    correlation: number of neighbouring heights that err alike.
+    drift: (n,) array [m]; depth: (draws, n) array [m] of errors of the depth without the drift; parameters:
+    (draws, k) array of errors of the fit; correlation: number of neighbouring heights that err alike.
     """
 
+    drift: np.ndarray
     depth: np.ndarray
     parameters: np.ndarray
     correlation: float
@@ -110,13 +112,12 @@ def draw_blocks(values, length: int, count: int) -> np.ndarray:
 
 
 def block_length(correlation: float, count: int) -> int:
-    """Return the block length, of order count^(1/3), but an eighth of the values at least.
+    """Return the block length, of order count^(1/3).
 
     It is twice the length of least mean square error, as intervals suffer more from blocks that are
-    too short (variance too small) than from few blocks (`student_factor`). An instrument drifts by
-    less than the noise of a height over lengths as that of a scar; blocks of an eighth show it.
+    too short (variance too small) than from few blocks (`student_factor`).
     """
-    return max(int(np.ceil(2 * correlation ** (2 / 3) * count ** (1 / 3))), count // MAX_BLOCKS)
+    return int(np.ceil(2 * correlation ** (2 / 3) * count ** (1 / 3)))
 
 
 def student_factor(blocks: float) -> float:
@@ -126,29 +127,43 @@ def student_factor(blocks: float) -> float:
     return float(stdtrit(max(blocks - 1, 1.0), (1 + LEVEL) / 2)) / SIDE
 
 
-def draw_errors(depth, noise, unworn, jacobian, doubt) -> DrawnErrors:
-    """Draw errors of the depth: own noise, and the floor that moves with the noise of the fit.
+def draw_errors(depth, noise, unworn, clear, jacobian, degree: int) -> DrawnErrors:
+    """Estimate the drift of the datum, and draw errors of the depth without it.
 
     Parameters
     ----------
     depth, noise : (n,) array [m]
     unworn : (n,) bool array
+        Heights that the floor was fitted to.
+    clear : (n,) bool array
+        Unworn heights away from the worn ones, which show the drift.
     jacobian : (n, k) array
         Of the depth by the parameters of the fit.
-    doubt : (k,) array
-        Standard deviation of the parameters by wear that hides beside the worn heights.
+    degree : int
+        Degree of the datum, a polynomial.
     """
-    relative = depth / noise
+    random = np.random.default_rng(SEED + 1)
+    model = model_drift(depth, clear, degree, N_DRAWS, random)
+    left = depth if model is None else model.remove(depth)
+    relative = left / noise
     values = relative[unworn]
     values = values - values.mean()
     values = values / max(float(values.std()), 1e-300)
     correlation = correlation_length(np.where(unworn, relative, 0.0), unworn)
     length = block_length(correlation, values.size)
-    n_blocks = values.size / max(length, correlation)
-    freedom = max(n_blocks - N_DATUM, 1.0)  # the datum was fitted to the same blocks
-    widening = student_factor(freedom + 1) * np.sqrt(n_blocks / freedom)
-    own = draw_blocks(values, length, depth.size) * widening
-    off = own[:, unworn] / BIWEIGHT
+    errors = draw_blocks(values, length, depth.size) * noise * student_factor(values.size / length)
+    if model is not None:
+        errors += model.parts.spread(model.draws)
+    steps = _move_floor(errors, noise, unworn, jacobian)
+    errors += steps @ jacobian.T
+    if model is not None:
+        errors = model.remove(errors)
+    return DrawnErrors(depth - left, errors, steps, correlation)
+
+
+def _move_floor(errors, noise, unworn, jacobian) -> np.ndarray:
+    """Return the steps (draws, k) of the fitted parameters that drawn errors (draws, n) [m] of the depth cause."""
+    off = errors[:, unworn] / noise[unworn] / BIWEIGHT
     inside = np.clip(1 - off**2, 0, None)
     influence = BIWEIGHT * off * inside**2
     sensitivity = float((inside * (1 - 5 * off**2)).mean())
@@ -156,7 +171,4 @@ def draw_errors(depth, noise, unworn, jacobian, doubt) -> DrawnErrors:
     size = np.sqrt((part**2).sum(axis=0))
     size = np.where(size > 0, size, 1.0)
     inverse = np.linalg.pinv((part / size).T @ (part / size), rcond=1e-12, hermitian=True)
-    steps = -(influence @ (part / size)) @ inverse / size / sensitivity
-    random = np.random.default_rng(SEED + 1)
-    steps = steps + np.outer(random.standard_normal(len(steps)), doubt)
-    return DrawnErrors(own * noise + steps @ jacobian.T, steps, correlation)
+    return -(influence @ (part / size)) @ inverse / size / sensitivity

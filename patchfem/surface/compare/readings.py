@@ -11,8 +11,8 @@ import numpy as np
 from ...core import say
 from ...scales import plain
 from ..profile import Profile
-from .alignment import N_PARTS, SHORT_END, Alignment
-from .boxes import part_means, split_edges, subtract_line
+from .alignment import SHORT_END, Alignment
+from .boxes import N_PARTS, part_means, split_edges, subtract_line
 from .errors import correlation_length
 from .flanks import Flanks
 from .section import median_of_five

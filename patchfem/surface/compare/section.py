@@ -23,12 +23,14 @@ MIN_REACH = 12  # samples of a flank to either side
 MAX_PLACES = 160  # places of an end that are tried
 MAX_OFF = 16.0  # squared standard deviations that an unworn height counts with at most: a speck is no wear
 ABOVE = 3.0  # standard deviations above the first trace from which a height is pile-up
-OFFSETS = (
-    1 / 3,
-    2 / 3,
-    1.0,
-)  # samples before the first worn depth at which a smooth flank leaves zero
+FLANKS = (  # first power of a smooth flank, and samples before its first worn depth at which it leaves zero
+    (1, 1 / 3),
+    (1, 2 / 3),
+    (1, 1.0),
+    (2, 1.0),
+)
 STEP_GAIN = 12.0  # fall of twice the log-likelihood from which a flank begins with a step
+N_BLOCKS = 8  # blocks of a section of a scan at most, so that they show its slow errors
 N_FIFTHS = 5  # parts of a track, the deepest of which is its floor
 MIN_SHARE = 0.01  # lost area of a run / whole lost area, from which the run may be an end of the worn part
 CUT = 5  # samples from the end of the common part within which a track may go on outside
@@ -100,7 +102,7 @@ def section_of_depths(x, depth, outside) -> Section:
         np.where(outside, np.clip(depth, -4 * noise, 4 * noise), 0.0), outside
     )
     values = np.clip(left / noise, -4.0, 4.0)
-    length = block_length(correlation, values.size)
+    length = max(block_length(correlation, values.size), values.size // N_BLOCKS)
     draws = noise * draw_blocks(values, length, depth.size) * student_factor(values.size / length)
     return Section(x, depth, np.full(depth.size, noise), draws, correlation)
 
@@ -153,8 +155,9 @@ def find_end(depth, noise, correlation: float, worn: int) -> FlankEnd:
     """Find where a flank begins in depths that run from outside into a track.
 
     Before the end, depths are noise about zero, or pile-up above the first surface. Behind it they
-    rise as b t + c t^2, or from a step a + b t + c t^2 where that fits clearly better, with a
-    scatter of their own.
+    rise as b t + c t^2 or, where the flank runs out flat, as b t^2 + c t^3, or from a step
+    a + b t + c t^2 where that fits clearly better, with a scatter of their own. The range of the end
+    is that of the profile likelihood over all smooth flanks.
 
     Parameters
     ----------
@@ -176,14 +179,14 @@ def find_end(depth, noise, correlation: float, worn: int) -> FlankEnd:
     sure = np.flatnonzero(part[worn - low :] > sure_of(depth.size) * sigma[worn - low :])
     last = max(min(part.size - 4, worn - low + (int(sure[0]) if sure.size else reach // 2)), 0)
     places = np.unique(np.linspace(0, last, min(last + 1, MAX_PLACES)).astype(int))
-    costs = np.empty((len(OFFSETS) + 1, places.size))
+    costs = np.empty((len(FLANKS) + 1, places.size))
     for at, k in enumerate(places):
         costs[:, at] = outside[k] + beside[k] + _flank_costs(part[k:], sigma[k:])
     costs /= max(correlation, 1.0)
     shape = int(np.argmin(costs[:-1].min(axis=1)))
     is_step = bool(costs[-1].min() < costs[shape].min() - STEP_GAIN)
-    offset = 0.5 if is_step else OFFSETS[shape]
-    costs = costs[-1 if is_step else shape]
+    offset = 0.5 if is_step else FLANKS[shape][1]
+    costs = costs[-1] if is_step else costs[:-1].min(axis=0)
     near = places[costs <= costs.min() + LIKELY]
     best = int(places[int(np.argmin(costs))])
     gap = int(places[1] - places[0]) if places.size > 1 else 1
@@ -192,19 +195,19 @@ def find_end(depth, noise, correlation: float, worn: int) -> FlankEnd:
 
 
 def _flank_costs(flank, sigma) -> np.ndarray:
-    """Return twice the negative log-likelihood of flanks that leave zero at each of OFFSETS, and of one with a step."""
+    """Return twice the negative log-likelihood of each of FLANKS, and of one with a step."""
     weighted = flank / sigma
     places = np.arange(flank.size)
     left = []
-    for offset in OFFSETS:
+    for power, offset in FLANKS:
         t = (places + offset) / flank.size
-        base = np.column_stack([t, t * t]) / sigma[:, None]
+        base = np.column_stack([t**power, t ** (power + 1)]) / sigma[:, None]
         shape = np.linalg.solve(base.T @ base, base.T @ weighted)
         if shape[0] < 0:  # the flank would rise out of the surface first
             curved = base[:, 1]
             shape = np.array([0.0, max(float(curved @ weighted) / float(curved @ curved), 0.0)])
         left.append(float(((weighted - base @ shape) ** 2).sum()))
-    base = np.column_stack([1 / sigma, base])
+    base = np.column_stack([np.ones(flank.size), t, t * t]) / sigma[:, None]
     shape = np.linalg.lstsq(base, weighted, rcond=None)[0]
     is_down = shape[0] >= 0  # a step up is pile-up, where no track begins
     left.append(float(((weighted - base @ shape) ** 2).sum()) if is_down else left[-1])
@@ -286,7 +289,9 @@ def measure_track(section: Section, span: tuple, free: tuple) -> dict:
         section.total((x >= one.low) & (x <= one.high))[0] / (2 * SIDE) for one in (start, end)
     ]
     error = float(np.sqrt(error**2 + beside[0] ** 2 + beside[1] ** 2))
-    width_error = float(np.hypot(start.high - start.low, end.high - end.low)) / (2 * SIDE)
+    shorter = float(np.hypot(start.high - start.value, end.value - end.low))
+    longer = float(np.hypot(start.value - start.low, end.high - end.value))
+    width_error = max(shorter, longer) / SIDE
     depth = area / width
     third = np.abs(x - (start.value + end.value) / 2) <= width / 6
     step, step_error = section.total(third)
@@ -302,7 +307,7 @@ def measure_track(section: Section, span: tuple, free: tuple) -> dict:
     values = {
         "from": start,
         "to": end,
-        "width": around(width, width_error, "m", TEXTS["width"], 0.0),
+        "width": Quantity(width, max(width - shorter, 0.0), width + longer, "m", TEXTS["width"]),
         "depth_mean": around(depth, mean_error, "m", TEXTS["depth_mean"], 0.0),
         "depth_floor": _measure_floor(section, start.value, width),
         "step": around(step / third_length, step_error / third_length, "m", TEXTS["step"], 0.0),

@@ -43,8 +43,6 @@ END_TEXTS = ("x of the first worn place", "x of the last worn place")
 MIN_DEPOSIT = (
     4.0  # standard deviations above the first trace from which a height is a deposit, not noise
 )
-SLIGHT_NOISE = 0.5  # standard deviations of depth that may hide beside worn heights
-NORMAL_TAIL = 0.006  # fraction of normal noise between REACH and twice REACH above zero
 FORM_WAVES = (
     2.5  # longest waves of the band, above which a wave of the depth is the form of a track
 )
@@ -117,8 +115,8 @@ NO_TRACKS = Tracks(())
 def make_section(alignment: Alignment) -> Section:
     """Make the section that an aligned trace is."""
     errors = alignment.errors
-    depth = np.asarray(alignment.depth)
-    return Section(alignment.x, depth, alignment.noise_at, errors.depth, errors.correlation)
+    noise = alignment.noise_at
+    return Section(alignment.x, alignment.worn_depth, noise, errors.depth, errors.correlation)
 
 
 def measure_worn(alignment: Alignment, section: Section, tracks: Tracks) -> Worn:
@@ -140,7 +138,7 @@ def measure_worn(alignment: Alignment, section: Section, tracks: Tracks) -> Worn
     length = float(width.sum())
     # the error is not smaller than the last digits where no height is worn
     rounding = 0.1 * alignment.noise * float(np.sqrt((width**2).sum()))
-    error = float(np.hypot(max(error, rounding), _limit_slight_wear(alignment, section, length)))
+    error = max(error, rounding)
     area = area if abs(area) > 1e-6 * alignment.noise * length else 0.0
     mean_error = float(np.hypot(error, area / section.x.size / SIDE)) / length
     mean = around(area / length, mean_error, "m", MEAN_TEXT, 0.0)
@@ -155,15 +153,6 @@ def measure_worn(alignment: Alignment, section: Section, tracks: Tracks) -> Worn
     deposited = float(-(width[is_deposit] @ section.depth[is_deposit]))
     worn_area = around(area, error, "m2", AREA_TEXT, 0.0)
     return Worn(largest, mean, worn_area, deposited, extent, within)
-
-
-def _limit_slight_wear(alignment: Alignment, section: Section, length: float) -> float:
-    """Return the standard deviation [m2] of the area of wear that the noise beside worn heights may hide."""
-    relative = section.depth / section.noise
-    n_slight = ((relative > 2.5) & (relative < 5.0)).sum()
-    fraction = float(n_slight) / max(alignment.unworn.sum(), 1)
-    excess = max(fraction - NORMAL_TAIL * float(alignment.unworn.mean()), 0.0)
-    return SLIGHT_NOISE * excess * alignment.noise * length
 
 
 def _measure_within(section: Section, start: Quantity, end: Quantity) -> Quantity | None:

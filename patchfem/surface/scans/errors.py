@@ -18,6 +18,7 @@ from .model import PLACE, Parameter, ScanModel
 N_TILES = 40  # tiles along the shorter side of the depth map
 MIN_TILE_SIDE = 4  # heights along the side of a tile; smaller maps have fewer tiles
 MIN_UNWORN_FRACTION = 0.3  # fraction of unworn heights that a tile needs to enter the bootstrap
+MIN_BLOCK_FRACTION = 1 / 8  # same ratio: shorter blocks would not show slow errors
 MAX_BLOCK_FRACTION = 1 / 3  # side of a block / shorter side of the map: leaves nine blocks
 N_PARTS = 6  # parts along each side whose summed scores give the covariance of the alignment
 N_LINES = 200  # lines of the map from which the correlation of neighbouring heights is estimated
@@ -90,7 +91,8 @@ def scan_errors(depth, unworn, plane_error) -> ScanErrors:
     means = np.where(valid, means - (fit @ means.ravel() @ plane).reshape(means.shape), 0.0)
     length = (_correlation_along(means, valid) + _correlation_along(means.T, valid.T)) / 2
     side = min(means.shape)
-    block = max(min(block_length(length, side), int(MAX_BLOCK_FRACTION * side)), 1)
+    block = max(block_length(length, side), int(MIN_BLOCK_FRACTION * side))
+    block = max(min(block, int(MAX_BLOCK_FRACTION * side)), 1)
     fields = _draw_fields(means, valid, block)
     steps = np.tensordot(fields.reshape(len(fields), -1), fit, ([1], [1]))
     random = np.random.default_rng(1991)
