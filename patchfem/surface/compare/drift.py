@@ -153,7 +153,7 @@ def _fit_covariances(centres, means, noise, degree: int) -> list:
     """Fit the variance of each covariance of the grid to the means (k,) of parts by restricted likelihood.
 
     noise: (k,) variance of each mean over their mean. The logarithms of the weights are less that of the
-    largest. No drift at all has the prior weight of all covariances of a ratio together.
+    largest. No drift at all counts once for each smoothness and range, as every other ratio does.
     """
     forms = _datum(centres, degree)
     scale = 1 / np.sqrt(noise)

@@ -10,6 +10,7 @@ from ..profile import runs_of
 from ..quantity import SIDE, Quantity, refused
 from .alignment import LONG_END, MIN_FILLED, SHORT_END, Alignment
 from .boxes import subtract_line
+from .errors import correlation_length
 from .model import Parameter
 from .robust import REACH
 from .section import Section, median_of_five
@@ -138,7 +139,8 @@ def _is_flank(alignment: Alignment, first: int, last: int) -> bool:
     base = np.linalg.qr(np.vander(along, 3, True))[0]
     power = float(((base[:, 1:].T @ depth) ** 2).sum())
     scatter = float(np.std(depth - base @ (base.T @ depth)))
-    is_clear = power > MAX_BOW_CHI2 * alignment.errors.correlation * scatter**2
+    correlation = correlation_length(np.asarray(alignment.depth), alignment.unworn)
+    is_clear = power > MAX_BOW_CHI2 * correlation * scatter**2
     is_large = float(np.sqrt(power / depth.size)) > MAX_BOW_NOISE * alignment.noise
     return not (is_clear and is_large)
 

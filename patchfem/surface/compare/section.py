@@ -23,12 +23,11 @@ MIN_REACH = 12  # samples of a flank to either side
 MAX_PLACES = 160  # places of an end that are tried
 MAX_OFF = 16.0  # squared standard deviations that an unworn height counts with at most: a speck is no wear
 ABOVE = 3.0  # standard deviations above the first trace from which a height is pile-up
-FLANKS = (  # first power of a smooth flank, and samples before its first worn depth at which it leaves zero
-    (1, 1 / 3),
-    (1, 2 / 3),
-    (1, 1.0),
-    (2, 1.0),
-)
+OFFSETS = (
+    1 / 3,
+    2 / 3,
+    1.0,
+)  # samples before the first worn depth at which a smooth flank leaves zero
 STEP_GAIN = 12.0  # fall of twice the log-likelihood from which a flank begins with a step
 N_BLOCKS = 8  # blocks of a section of a scan at most, so that they show its slow errors
 N_FIFTHS = 5  # parts of a track, the deepest of which is its floor
@@ -155,9 +154,9 @@ def find_end(depth, noise, correlation: float, worn: int) -> FlankEnd:
     """Find where a flank begins in depths that run from outside into a track.
 
     Before the end, depths are noise about zero, or pile-up above the first surface. Behind it they
-    rise as b t + c t^2 or, where the flank runs out flat, as b t^2 + c t^3, or from a step
-    a + b t + c t^2 where that fits clearly better, with a scatter of their own. The range of the end
-    is that of the profile likelihood over all smooth flanks.
+    rise as b t + c t^2, or from a step a + b t + c t^2 where that fits clearly better, with a
+    scatter of their own. The range of the end is that of the profile likelihood over all smooth
+    flanks, one of which runs out flat as b t^2 + c t^3.
 
     Parameters
     ----------
@@ -179,27 +178,30 @@ def find_end(depth, noise, correlation: float, worn: int) -> FlankEnd:
     sure = np.flatnonzero(part[worn - low :] > sure_of(depth.size) * sigma[worn - low :])
     last = max(min(part.size - 4, worn - low + (int(sure[0]) if sure.size else reach // 2)), 0)
     places = np.unique(np.linspace(0, last, min(last + 1, MAX_PLACES)).astype(int))
-    costs = np.empty((len(FLANKS) + 1, places.size))
+    costs = np.empty((len(OFFSETS) + 2, places.size))
     for at, k in enumerate(places):
         costs[:, at] = outside[k] + beside[k] + _flank_costs(part[k:], sigma[k:])
     costs /= max(correlation, 1.0)
-    shape = int(np.argmin(costs[:-1].min(axis=1)))
+    shape = int(np.argmin(costs[: len(OFFSETS)].min(axis=1)))
     is_step = bool(costs[-1].min() < costs[shape].min() - STEP_GAIN)
-    offset = 0.5 if is_step else FLANKS[shape][1]
+    offset = 0.5 if is_step else OFFSETS[shape]
+    best = int(places[int(np.argmin(costs[-1 if is_step else shape]))])
     costs = costs[-1] if is_step else costs[:-1].min(axis=0)
-    near = places[costs <= costs.min() + LIKELY]
-    best = int(places[int(np.argmin(costs))])
+    near = np.append(places[costs <= costs.min() + LIKELY], best)
     gap = int(places[1] - places[0]) if places.size > 1 else 1
-    last = min(low + int(near[-1]) + gap, depth.size - 1)
-    return FlankEnd(low + best, max(low + int(near[0]) - gap, 0), last, offset)
+    last = min(low + int(near.max()) + gap, depth.size - 1)
+    return FlankEnd(low + best, max(low + int(near.min()) - gap, 0), last, offset)
 
 
 def _flank_costs(flank, sigma) -> np.ndarray:
-    """Return twice the negative log-likelihood of each of FLANKS, and of one with a step."""
+    """Return twice the negative log-likelihood of smooth flanks, a flat one and one with a step.
+
+    The smooth flanks leave zero at each of OFFSETS.
+    """
     weighted = flank / sigma
     places = np.arange(flank.size)
     left = []
-    for power, offset in FLANKS:
+    for power, offset in (*((1, offset) for offset in OFFSETS), (2, OFFSETS[-1])):
         t = (places + offset) / flank.size
         base = np.column_stack([t**power, t ** (power + 1)]) / sigma[:, None]
         shape = np.linalg.solve(base.T @ base, base.T @ weighted)
@@ -210,7 +212,7 @@ def _flank_costs(flank, sigma) -> np.ndarray:
     base = np.column_stack([np.ones(flank.size), t, t * t]) / sigma[:, None]
     shape = np.linalg.lstsq(base, weighted, rcond=None)[0]
     is_down = shape[0] >= 0  # a step up is pile-up, where no track begins
-    left.append(float(((weighted - base @ shape) ** 2).sum()) if is_down else left[-1])
+    left.append(float(((weighted - base @ shape) ** 2).sum()) if is_down else np.inf)
     left = np.array(left)
     mean = left / flank.size
     scatter = np.where(mean <= 1, left, flank.size * (1 + np.log(np.maximum(mean, 1.0))))
