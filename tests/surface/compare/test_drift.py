@@ -1,4 +1,4 @@
-"""Drift of a datum: what is taken out of the depth, and whether the drawn errors of a gap are as large as the real ones."""
+"""Drift of a datum: what is taken out of the depth, and whether the drawn errors of a gap are large enough."""
 
 import numpy as np
 import pytest
