@@ -23,8 +23,9 @@ random order, so that the first of them are a fair sample if not all can be run:
     python tests/support/mutations.py draw FAULTS.json --seed 53 --count 400 --root CHECKOUT
     python tests/support/mutations.py run FAULTS.json RESULTS --without studies torture --seconds 60
 
-A compiled kernel is compiled anew for each fault in it, which takes 10 to 60 s. Its lines cannot be traced; the tests
-that reach its folder or a module that names the kernel's module are run.
+A compiled kernel is compiled anew for each fault in it, which takes 10 to 60 s of CPU time. Its lines cannot be traced;
+the tests that reach its folder or a module that names the kernel's module are run. Tests hang if they take several
+times their CPU time without a fault, so a busy machine changes no outcome.
 """
 
 import argparse
@@ -53,10 +54,13 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = "patchfem"
 # Most faults are caught by tests that take this long together without a fault [s]; they are run first.
 FIRST_SECONDS = 15.0
-# Tests hang if they take this many times their duration without a fault; a busy machine takes less.
+# Tests hang if a process takes this many times their duration without a fault in CPU time.
 HANG_FACTOR = 4.0
-# This time is added for imports and for kernels that are compiled anew [s].
-HANG_SECONDS = 60.0
+# This CPU time is added for imports [s], and the second one for kernels that are compiled anew.
+HANG_SECONDS = 30.0
+COMPILE_SECONDS = 120.0
+# Processes that wait for something without end are ended after this many times the CPU time.
+WAIT_FACTOR = 8.0
 # Address space of a process under test, so that a fault cannot exhaust the machine [bytes].
 MAX_BYTES = 8 << 30
 NOT_COPIED = (".git", ".venv", "__pycache__", ".pytest_cache", ".hypothesis", ".ruff_cache")
@@ -508,7 +512,7 @@ class Plugin:
     def pytest_runtest_logstart(self, nodeid, location):
         """Begin to record a test."""
         self.failed = False
-        self.began = time.monotonic()
+        self.began = sum(os.times()[:4])
         if self.reached:
             self.reached.clear()
 
@@ -519,7 +523,7 @@ class Plugin:
     def pytest_runtest_logfinish(self, nodeid, location):
         """Record a test."""
         if self.reached:
-            seconds = round(time.monotonic() - self.began, 3)
+            seconds = round(sum(os.times()[:4]) - self.began, 3)  # CPU time, with child processes
             numbers = sorted(self.reached.clear())
             row = {
                 "test": nodeid,
@@ -546,6 +550,8 @@ def pytest_configure(config):
 
     order = json.loads(Path(os.environ["PATCHFEM_FAULT_ORDER"]).read_text())
     resource.setrlimit(resource.RLIMIT_AS, (MAX_BYTES, MAX_BYTES))
+    if "cpu_seconds" in order:
+        resource.setrlimit(resource.RLIMIT_CPU, (order["cpu_seconds"], order["cpu_seconds"] + 5))
     pytest.hookimpl(trylast=True)(
         Plugin.pytest_collection_modifyitems
     )  # after the conftest has sorted the tests
@@ -670,9 +676,12 @@ class Copy:
             self.write(fault.file, text)
             for stage in stages:
                 limit = HANG_SECONDS + HANG_FACTOR * sum(seconds[test] for test in stage)
+                if fault.file.endswith("kernels.py"):
+                    limit += COMPILE_SECONDS
+                order = {"tests": stage, "cpu_seconds": int(limit)}
                 files = list(dict.fromkeys(test.partition("::")[0] for test in stage))
-                status = self.pytest(["-x", *files], {"tests": stage}, limit, cache_folder)
-                if status is None:
+                status = self.pytest(["-x", *files], order, WAIT_FACTOR * limit, cache_folder)
+                if status in (None, -signal.SIGXCPU):
                     return "hangs"
                 if status != 0:
                     return "caught"
@@ -928,7 +937,10 @@ def main() -> None:
     words.add_argument("--tests", nargs="+", default=["tests"])
     words.add_argument("--without", nargs="*", default=[], help="folders of tests to leave out")
     words.add_argument(
-        "--seconds", type=float, default=120.0, help="of tests without fault that a fault may cost"
+        "--seconds",
+        type=float,
+        default=120.0,
+        help="CPU time of tests without fault that a fault may cost",
     )
     words.add_argument("--jobs", type=int, default=1)
     words.add_argument("--root", type=Path, default=ROOT)
