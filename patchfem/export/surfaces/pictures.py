@@ -12,7 +12,7 @@ from ...surface.roughness.spectrum import Spectrum
 from ..drawing.charts import axis, chart, line, mark
 from ..drawing.pictures import BLUE, draw, drawing, styled
 
-MAX_POINTS = 2400  # points of a drawn line, which the width of a page can show
+MAX_POINTS = 2400  # points of a drawn line, eight for each pixel column of the page
 MAX_SPECTRUM_POINTS = 400  # points of a drawn spectrum, even on the logarithmic axis
 N_BINS = 120  # classes of a histogram
 MAX_PIXELS = 400  # heights of a drawn map along each axis, which the width of a page can show

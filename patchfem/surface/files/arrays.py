@@ -20,7 +20,7 @@ from .raw import MAX_POINTS, Raw, shorten
 from .units import GIVE, LISTED, PIXEL, length_unit, pixel_size
 
 MAX_HEADER = 10_000  # bytes of the header of an .npy file; usual ones have fewer than 200
-MIN_ROWS = 8  # rows of an unnamed table; smaller matrices hold settings
+MIN_ROWS = 8  # rows of an unnamed matrix that may be a table of columns
 EXAMPLE = 'np.save("scan.npy", np.column_stack([x, z]))'
 HEIGHT_NAMES = ("z", "gap", "height", "heights")
 _HEADER_READERS = {

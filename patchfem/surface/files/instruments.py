@@ -24,8 +24,8 @@ from .raw import MAX_POINTS, UNPACK_ERRORS, Raw, shorten, shorten_reason
 from .units import IGNORED
 
 PYTHON = sys.executable
-MAX_CPU_SECONDS = 60.0  # CPU time for a file; large scans take a few seconds
-MAX_SECONDS = 600.0  # elapsed time for a file; a process that takes longer is waiting for something
+MAX_CPU_SECONDS = 60.0  # CPU time for a file, independent of the load of the machine
+MAX_SECONDS = 600.0  # elapsed time for a file; ten times the CPU time allows for other processes
 NO_LIBRARY = 3  # exit code of the script if SurfaceTopography is not installed
 CPU_LIMIT_SIGNAL = -24  # exit code of a process that exceeded its CPU time (SIGXCPU)
 

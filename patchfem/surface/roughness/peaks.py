@@ -22,7 +22,7 @@ from .parameters import MIN_SAMPLES, ROUND_OFF
 SUMMIT_FACTOR = 0.8968  # coefficient of 1/alpha in the variance of summit heights (Bush 1976)
 MIN_ALPHA = 1.5  # alpha of an isotropic surface whose waves all have the same length
 PERSSON = (0.4, 0.5)  # u_0 / rms height by Persson 2007, and by simulation (Pastewka 2013)
-SHARPEST_FRACTION = 0.005  # fraction of the heights; they hold 5 % of a Gaussian curvature
+SHARPEST_FRACTION = 0.005  # fraction of the heights; in a Gaussian trace it has 5 % of m_4
 MAX_SHARPEST_POWER = 0.5  # fraction of the mean square curvature; more may be due to dust
 MAX_SPIKE_FRACTION = 0.1  # fraction of the samples; more apparent spikes belong to the surface
 MAX_SKEWNESS = 0.5  # skewness above this changes the stiffness by more than the theory is uncertain

@@ -35,7 +35,7 @@ MAX_SCALE_RATIO = 1.5  # scatter of a plane / that of the quietest one; rougher 
 MIN_RIVAL = 0.5  # score of a second plane / fraction on the first, above which both may be unworn
 MIN_DISTANCE = 3.0  # standard deviations between two planes that count as different
 MARGIN = 0.1  # fraction of the shorter side within which wear may run out undetected
-MAX_ROUNDS = 4  # rounds of fit and detection of wear; the worn part hardly changes after two
+MAX_ROUNDS = 4  # rounds of fit and detection of wear, unless the worn part stays before
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,7 +23,7 @@ MAX_BLOCK_FRACTION = 1 / 3  # side of a block / shorter side of the map: leaves 
 N_PARTS = 6  # parts along each side whose summed scores give the covariance of the alignment
 N_LINES = 200  # lines of the map from which the correlation of neighbouring heights is estimated
 MIN_EIGENVALUE = 1e-5  # relative to the largest; below it the surface does not fix that direction
-MAX_CORRELATION_AREA = 100.0  # heights; longer correlations are those of the drawn fields
+MAX_CORRELATION_AREA = 100.0  # heights; upper limit of the estimated area
 
 
 class ScanErrors(NamedTuple):
