@@ -231,9 +231,9 @@ def test_always_a_refused_place_names_the_likeness_that_it_wants(grooved, worn, 
 
 
 @pytest.mark.share(1)
-@pytest.mark.parametrize("seed, tolerance", [(66, 0.006), (63, 0.006), (67, 0.03), (72, 0.006), (75, 0.006)])
+@pytest.mark.parametrize("seed, tolerance", [(18, 0.006), (21, 0.006), (67, 0.03), (72, 0.006), (75, 0.006)])
 def test_always_an_independent_pair_has_its_place_and_volume(seed, tolerance):
-    """A track with pile-up, a crater, deposits, exchanged files and worn asperities on machined surfaces."""
+    """A crater, a track with pile-up, deposits, exchanged files and worn asperities; the first three are rotated."""
     pair = scan_pairs.make(seed)
     before, after = (Areal(*(pair.spacing * np.arange(n) for n in z.shape[::-1]), z, "a scan")
                      for z in (pair.before, pair.after))
