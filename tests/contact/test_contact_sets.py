@@ -71,16 +71,6 @@ def test_exact_forces_are_those_of_the_solver(room):
     assert room or kept.names.size == kept.meta[0] == 16
 
 
-def test_exact_one_node_is_a_spring():
-    sets = ContactSets([[1e-9]], [0.0], [-1e-7], [True])
-    assert sets.load == pytest.approx(100)
-    kept, slot = compiled_sets(sets)
-    force = np.zeros(1)
-    for d, want in ((5e-8, 150.0), (-1e-7, 0.0), (-2e-7, 0.0)):
-        slot = PRESS.locate(kept, slot, d, 0.0)
-        assert PRESS.press_state(kept, slot, d, 0.0, force)[0] == pytest.approx(want, abs=1e-12)
-
-
 def test_exact_many_pivots_do_not_wear_the_tableau():
     """After 3000 pivots to and fro the forces are those of a fresh solve."""
     sets, state = crowned()
