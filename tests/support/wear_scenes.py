@@ -34,10 +34,8 @@ MEASURES = (
     "tangential_stiffness",
     "rotational_stiffness",
 )
-CELLS = (
-    48,
-    120,
-)  # cells along the part that is in contact before or after wear; the second mesh gives the truth
+# Cells along the part that is in contact before or after wear; the second mesh gives the truth.
+CELLS = (30, 75)
 STEPS = (30, 60, 120)  # implicit Euler steps, each a halving of the one before
 FIRST_STEP = 1e-4  # first of the coarsest steps as a fraction of the path: pressure at a corner wears off at once
 
