@@ -7,6 +7,7 @@ import re
 import h5py
 import numpy as np
 import pytest
+import wear_scenes
 import xarray as xr
 from command_line import cli
 from pieces import bare, refined_middle
@@ -332,3 +333,17 @@ def test_refuses_to_go_on_where_nothing_is_kept(tmp_path):
     assert answer.code == 2 and "cannot be read" in answer.err and "Traceback" not in answer.err
     scene.write_text(TILTED + COULOMB + SINE)
     assert cli("run", scene, "-o", tmp_path / "out", "--resume").code == 2
+
+
+def test_exact_wear_beside_a_step_is_that_of_an_independent_program():
+    """Truth: `wear_scenes.answer`, a finite-element program of its own that integrates Archard's law."""
+    measures = ran(wear_scenes.text_of(wear_scenes.draw(522015))).measures
+    for name, truth, uncertainty in (
+        ("approach", 1.1330e-6, 3.3e-10),
+        ("normal_stiffness", 2.90147e9, 2e5),
+        ("tangential_stiffness", 4.60476e8, 1e4),
+        ("rotational_stiffness", 47219.2, 1.2),
+    ):
+        measure = measures[name]
+        assert abs(measure.value - truth) <= measure.error + uncertainty, name
+        assert measure.error < 1e-3 * measure.value, name

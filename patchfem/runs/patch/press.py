@@ -123,8 +123,27 @@ def pressed(asked, pair: Pair, worn=None) -> Patch:
     node = int(np.argmax(rim))
     bare = 1.0 if out.skin_share is None else 1 - float(out.skin_share[node])
     lean = bare * edges.behind(1.0 if pair.row is None else pair.row / float(np.diff(x[node - 1:node + 2]).min()))
-    return replace(out, either=tuple((0.5 - side * lean, _on(asked, pair, gap + side * rim, notes, seconds))
-                                     for side in (-1, 1)))
+    shifts = _shifts_at_step(node, gap if worn is None else gap - worn, rim, worn)
+    return replace(out, either=tuple((0.5 - side * lean, _on(asked, pair, gap + shift, notes, seconds))
+                                     for side, shift in zip((-1, 1), shifts)))
+
+
+def _shifts_at_step(node: int, gap, rim, worn) -> tuple:
+    """Return what is added to the gap (m,) [m] where the node at a step bears, and where it does not.
+
+    The worn depth of the node belongs to a gap in the middle of the step. A node that bears has worn as its neighbour
+    on the higher side of the step, a node that does not bear as its neighbour on the lower side.
+    """
+    if worn is None:
+        return -rim, rim
+    higher, lower = (node - 1, node + 1) if np.mean(gap[..., node - 1]) < np.mean(gap[..., node + 1]) else (
+        node + 1, node - 1)
+    shifts = []
+    for side, neighbour in ((-1, higher), (1, lower)):
+        shift = np.broadcast_to(side * rim, worn.shape).copy()
+        shift[..., node] += worn[..., neighbour] - worn[..., node]
+        shifts.append(shift)
+    return tuple(shifts)
 
 
 def zigzags(x, sigma) -> float:
