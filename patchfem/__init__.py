@@ -2,10 +2,10 @@
 
 Read the package in this order. A module imports its own entry of the list and the entries before it, nothing after:
 
-1. `later`        modules that are loaded at their first use
-2. `faults`       named failures: a sentence for a person, the exit code
-3. `scales`       numbers as people read them: the unit by the size, the digits by the error
-4. `rates`        what work takes: one table of CPU seconds, and how fast this machine is
+1. `lazy_imports`        modules that are loaded at their first use
+2. `exceptions`       named failures: a sentence for a person, the exit code
+3. `formatting`       numbers as people read them: the unit by the size, the digits by the error
+4. `cost_model`        what work takes: one table of CPU seconds, and how fast this machine is
 5. `core`         the nouns that travel: interface, compliance, pressure, modal basis, response, measure, outcome
 6. `effects`      which key of a scene needs which module and equation
 7. `disk`         files written whole, folders with one writer
@@ -32,14 +32,14 @@ Read the package in this order. A module imports its own entry of the list and t
 28. `commands`    the verbs of the command line
 
 From Python: `import patchfem as pf`, then `pf.run("scene.toml")`. Nothing is imported before a name is used,
-and a module that is taken as a whole, as in `from .contact import unilateral`, is loaded at its first use (`later`).
+and a module that is taken as a whole, as in `from .contact import unilateral`, is loaded at its first use (`lazy_imports`).
 """
 
 import sys
 from importlib import import_module
 from types import ModuleType
 
-from .later import modules_of
+from .lazy_imports import modules_of
 
 TYPE_CHECKING = False  # a type checker takes it for true; typing itself would be loaded before an interrupt is answered
 if TYPE_CHECKING:

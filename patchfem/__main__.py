@@ -66,10 +66,10 @@ from typing import Annotated, Literal
 from cyclopts import App, CycloptsError, Parameter
 
 from . import __version__
-from .commands import compare, lab, look, profile, run, scene, start, study, sweep
+from .commands import compare, import_, profile, run, scene, start, study, sweep, view_export
 from .commands.shared import Ended, Refused, say
 from .commands.streams import plain, ready
-from .scales import tidied
+from .formatting import tidied
 
 # group -> verb -> (the module of its function, loaded where the verb is asked for; what it does; words of an example)
 SCREEN = {
@@ -85,10 +85,10 @@ SCREEN = {
               "cost": (study, "error against CPU seconds", "rig.toml")},
     "Surfaces": {"profile": (profile, "roughness of a trace or a scan", "before.csv"),
                  "compare": (compare, "wear between two scans", "before.csv after.csv")},
-    "Files": {"report": (look, "several runs on one page", "out/a out/b -o both.html"),
-              "view": (look, "a picture or a film of the pieces", "out/joint -o joint.png"),
-              "export": (look, "fields for ParaView; histories", "out/joint -o play.py"),
-              "import": (lab, "records of a laboratory", "shaker.uff -o record.csv"),
+    "Files": {"report": (view_export, "several runs on one page", "out/a out/b -o both.html"),
+              "view": (view_export, "a picture or a film of the pieces", "out/joint -o joint.png"),
+              "export": (view_export, "fields for ParaView; histories", "out/joint -o play.py"),
+              "import": (import_, "records of a laboratory", "shaker.uff -o record.csv"),
               "mesh": (scene, "the mesh of the pieces", "joint.toml -o pieces.vtu")},
     "About": {"doctor": (start, "what is installed", ""),
               "schema": (start, "JSON schema for editors", "-o scene.json"),
@@ -188,7 +188,7 @@ def _watched() -> bool:
 
 
 def _guarded(words: list, before=lambda: None) -> int:
-    if there := sys.modules.get(f"{__package__}.disk.whole"):
+    if there := sys.modules.get(f"{__package__}.disk.atomic_write"):
         there.begun()
     if words[:1] == ["help"]:
         say("patchfem: `help` is not a verb; `patchfem --help` lists the verbs, `patchfem run --help` explains the "
@@ -273,7 +273,7 @@ def _place_of_fault(error: Exception) -> str:
 
 def _interrupted() -> str:
     """What an interrupted command leaves."""
-    there = sys.modules.get(f"{__package__}.disk.whole")
+    there = sys.modules.get(f"{__package__}.disk.atomic_write")
     placed = there.replaced() if there else []
     kept = [one for one in dict.fromkeys(there.KEPT) if one.is_dir()] if there else []
     text = "interrupted; no file was replaced"

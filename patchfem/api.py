@@ -21,11 +21,11 @@ from typing import TYPE_CHECKING, Any
 
 from .campaigns import cost as cost_curves
 from .campaigns.backbone import curves as backbones
-from .campaigns.sweeps import ask, executors
-from .campaigns.sweeps import asked as case_models
+from .campaigns.sweeps import case_models as case_models
+from .campaigns.sweeps import executors, parse_request
 from .core import Measure, Missing, NotConverged, Outcome, PatchfemError
 from .export import backbone as backbone_files
-from .export import chosen, histories
+from .export import convert, histories
 from .export import cost as cost_files
 from .export import folder as results_folder
 from .export import report as run_page
@@ -33,7 +33,7 @@ from .export import reports as page_of_several
 from .export import summary as summaries
 from .export.drawing import pictures, swept
 from .export.fits import request as fits
-from .export.pages import lead, released, words
+from .export.pages import headline, released, sentences
 from .export.surfaces import compare as compared_data
 from .export.surfaces import pairs as pairs_data
 from .export.surfaces import roughness, worn, worn_runs
@@ -43,16 +43,16 @@ from .mesh import files as mesh_files
 from .model.model import Model, build_unswept
 from .model.model import build as build_model
 from .runs import joint
-from .runs.many import many, meshes
+from .runs.batch import batches, meshes
 from .runs.patch import result as patch_result
 from .runs.plan import Plan
 from .runs.plan import plan as plan_model
 from .runs.results import result as run_result
 from .runs.run import run as run_plan
 from .scene import axes, starting
-from .scene.changed import Base
 from .scene.keys import removed
 from .scene.keys.quantities import parse
+from .scene.overrides import Base
 from .scene.scene import Scene, SceneError, loads, text_of, with_files
 from .scene.scene import load as load_file
 from .scene.sets import assignments, oversized, sized, texts
@@ -66,7 +66,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from xarray import Dataset
 
-    from .runs.many.answers import Answers
+    from .runs.batch.case_results import CaseResults
 
 __all__ = ["Measure", "Missing", "Model", "NotConverged", "Outcome", "PatchfemError", "Plan", "Result", "Scene",
            "SceneError", "backbone", "build", "compare", "cost", "demo", "export", "fit", "import_", "load", "mesh",
@@ -254,14 +254,14 @@ def sweep(scene: str | Path | Scene, over: Mapping[str, Any] | None = None, /, *
         raise SceneError([f"{key}: the sweep has no value for this key" for key in empty])
     asked = case_models.Asked(*_text_of(scene), of=of)
     lines = [one if isinstance(one, str) else ",".join(texts(key, one)) for key, one in (over or {}).items()]
-    request = ask.Request([f"{key}={line}" for key, line in zip(over or {}, lines)], None, draw, sobol, seed, of)
-    cases, by = ask.cases_of(asked, request), executors.of(executor, jobs)
+    request = parse_request.Request([f"{key}={line}" for key, line in zip(over or {}, lines)], None, draw, sobol, seed, of)
+    cases, by = parse_request.cases_of(asked, request), executors.of(executor, jobs)
     place = None if out is None else sweep_run.Place(Path(out), resume)
     found = sweep_run.swept(asked, cases, by, _on_stderr) if out is None else \
         sweep_run.sweep_into(asked, cases, place, by, _on_stderr)
     named = [] if out is None or place.kept(len(cases)) == "none" else cases.names(asked)
     keys = [folder.key_of(name) for name in named]
-    answer = lead.lead_of(page.table_of(asked, cases, found, (), Path(out or ""))).answer()
+    answer = headline.lead_of(page.table_of(asked, cases, found, (), Path(out or ""))).answer()
     return tables.contents(asked, cases, found, keys, answer).to_xarray()
 
 
@@ -302,7 +302,7 @@ class SweepPlots:
 plot = SweepPlots()
 
 
-def run_many(models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[str], None] | None = None) -> Answers:
+def run_many(models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[str], None] | None = None) -> CaseResults:
     """Run many models, or scenes as for `load`: the result has a column per measure and a row per model.
 
     Models that share work are computed together, with the same results as single runs. Patches of equal geometry share
@@ -311,7 +311,7 @@ def run_many(models: Iterable[str | Path | Scene | Model], /, *, say: Callable[[
     """
     if isinstance(models, str | Path | Scene | Model | Mapping) or not isinstance(models, Iterable):
         models = [models]
-    return many.answers(meshes.meshed([build(one) for one in models]), say=_on_stderr if say is None else say)
+    return batches.answers(meshes.meshed([build(one) for one in models]), say=_on_stderr if say is None else say)
 
 
 def fit(scene: str | Path | Scene, /, *, to: str | Path = "", free: Mapping[str, Any] | None = None,
@@ -411,7 +411,7 @@ def export(folder: str | Path, out: str | Path, /, *, frame: int | None = None, 
     """
     folder, out = _path(folder, "export"), _path(out, "export: out")
     if folder.suffix != ".toml":
-        chosen.export(folder, out, frame, histories, of)
+        convert.export(folder, out, frame, histories, of)
     elif frame is not None or histories or of:
         raise PatchfemError("the options `frame`, `histories` and `of` can be used only with a results folder; from a "
                             "scene only the "
@@ -429,7 +429,7 @@ def view(folder: str | Path, out: str | Path | None = None, /, *, frame: int | N
 
     `out` is a picture, or the last cycle as .gif, .mp4 or .html. The arguments are those of `patchfem view`.
     """
-    chosen.view(_path(folder, "view"), None if out is None else _path(out, "view: out"), frame, magnify)
+    convert.view(_path(folder, "view"), None if out is None else _path(out, "view: out"), frame, magnify)
 
 
 def import_(file: str | Path, out: str | Path, /, *, map: str | Iterable[str] = (), zero: bool = False,
@@ -585,7 +585,7 @@ class Measures(Mapping):
         return list(self._measures)
 
     def __repr__(self) -> str:
-        return "\n".join(words.table_of({name: summaries.measure_object(one) for name, one in self._measures.items()}))
+        return "\n".join(sentences.table_of({name: summaries.measure_object(one) for name, one in self._measures.items()}))
 
 
 class Plots:
@@ -659,7 +659,7 @@ class Result(run_result.Result):
     def _repr_html_(self) -> str:
         """The answer as a notebook shows it: outcome, headline, every measure in its group, warnings."""
         summary = summaries.summary_of(self)
-        return words.fragment(summary, words.verdict(summary), summaries.cycles_of(self), released.released(self))
+        return sentences.fragment(summary, sentences.verdict(summary), summaries.cycles_of(self), released.released(self))
 
     @property
     def notes(self) -> list[str]:

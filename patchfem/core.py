@@ -13,8 +13,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .faults import Missing, NotConverged, PatchfemError
-from .scales import told
+from .exceptions import Missing, NotConverged, PatchfemError
+from .formatting import told
 
 __all__ = ["G_N", "STICK", "BaseSine", "Compliance", "Integrated", "Interface", "InterfaceLoop", "Measure",
            "Missing", "ModalBasis", "NotConverged", "Outcome", "PatchfemError", "Pressure", "Response", "Row",

@@ -3,7 +3,7 @@
 An effect is a table of a scene or the value of its selector key. `plan` imports only the modules of the effects that a
 scene names. A law of friction is such an effect with the keys that it has besides `static` and with what can run it.
 Two places serve some laws alone and name them: loads that change in the contact (`runs.rig.varying_load`) and the lanes
-of a study (`runs.many.lumped.lanes`).
+of a study (`runs.batch.lumped.lanes`).
 
 A law is carried by the bench, by a rig of one interface under a constant load (it can run there), and by what its
 record names: "shear" of pieces that give way, "joints" (several interfaces, springs that bend, strips that yaw),
@@ -348,7 +348,7 @@ MEANWHILE = {  # what serves where two effects cannot stand together yet
 }
 
 
-def unbuilt(what: str, meanwhile: str) -> str:
+def not_supported_message(what: str, meanwhile: str) -> str:
     """The sentence for what cannot stand together yet: `what`, and a word of MEANWHILE or what to do in words."""
     bare = what.startswith(("beside ", "with ", "in "))
     said = f"not supported yet {what}" if bare else f"{what} is not supported yet"

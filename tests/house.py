@@ -287,7 +287,7 @@ def count_tokens(tree, text: str) -> int:
 
 
 def folder_of_file(path: Path, root: Path) -> str:
-    """Return the folder in which a file is counted: patchfem/export for patchfem/export/pages/lead.py."""
+    """Return the folder in which a file is counted: patchfem/export for patchfem/export/pages/headline.py."""
     return "/".join(path.relative_to(root).parts[:-1][:2])
 
 

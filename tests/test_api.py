@@ -14,7 +14,7 @@ from scene_texts import BENCH, COULOMB, LINEAR, POINT, SHORT, SMALL_PATCH, STRUC
 import patchfem as pf
 from patchfem import api
 from patchfem.core import Measure
-from patchfem.export.pages.words import pair
+from patchfem.export.pages.sentences import pair
 from patchfem.export.summary import measure_object
 from patchfem.response.rows import TABLE
 from patchfem.runs.results.result import meaning
@@ -60,7 +60,7 @@ def runs() -> dict:
 def test_exact_importing_imports_nothing_of_weight():
     modules = loaded(f"import patchfem as pf; dir(pf), pf.__version__\n{MODULES}")
     assert not {"numpy", "pydantic", "scipy", "xarray", "matplotlib"} & modules
-    assert {name for name in modules if name.startswith("patchfem")} == {"patchfem", "patchfem.later"}
+    assert {name for name in modules if name.startswith("patchfem")} == {"patchfem", "patchfem.lazy_imports"}
 
 
 def test_exact_the_names_are_all_there():

@@ -19,8 +19,8 @@ from scene_texts import PLASTIC, POINT, TRIANGLE
 
 import patchfem
 from patchfem import compiled
-from patchfem.compiled import hook, kept, prebuilt
-from patchfem.disk import own
+from patchfem.compiled import cache_files, hook, prebuilt
+from patchfem.disk import user_cache
 
 SCENE = POINT + PLASTIC + TRIANGLE  # a slide that is given: the smallest loop with a law in it to compile
 BENCH = """\
@@ -275,7 +275,7 @@ def test_exact_only_a_folder_of_the_user_s_own_serves(tmp_path, monkeypatch, obs
         if obstacle == "others may write":
             (base / "patchfem").chmod(0o777)
         else:
-            monkeypatch.setattr(own, "_of_others", lambda folder: "" if not folder.is_relative_to(base) else
+            monkeypatch.setattr(user_cache, "_of_others", lambda folder: "" if not folder.is_relative_to(base) else
                                 f"{folder} belongs to another user")
     monkeypatch.setattr(tempfile, "tempdir", str(temporary))
     monkeypatch.setenv("PATCHFEM_CACHE", str(base))
@@ -284,19 +284,19 @@ def test_exact_only_a_folder_of_the_user_s_own_serves(tmp_path, monkeypatch, obs
     assert found == tmp_path / "session" / "patchfem" / compiled.kernel_key() and found.is_dir()
     assert str(base) in compiled.why_elsewhere()
     monkeypatch.delenv("XDG_RUNTIME_DIR")
-    own.private.cache_clear()
+    user_cache.private.cache_clear()
     try:
         first = compiled.cache_folder()
         assert first.is_relative_to(temporary) and first.is_dir() and not (temporary / "patchfem").exists()
-        assert os.stat(own.private()).st_mode & 0o77 == 0
+        assert os.stat(user_cache.private()).st_mode & 0o77 == 0
         assert compiled.cache_folder() == first  # the same in one process
-        own.private.cache_clear()
+        user_cache.private.cache_clear()
         assert compiled.cache_folder() != first  # another in the next
         monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "nowhere"))
-        own.private.cache_clear()
+        user_cache.private.cache_clear()
         assert not compiled.cache_folder().exists()  # nothing is kept, nothing fails
     finally:
-        own.private.cache_clear()
+        user_cache.private.cache_clear()
 
 
 def test_exact_a_folder_is_made_the_user_s_own(tmp_path, monkeypatch):
@@ -309,7 +309,7 @@ def test_exact_a_folder_is_made_the_user_s_own(tmp_path, monkeypatch):
     monkeypatch.delenv("PATCHFEM_CACHE")
     monkeypatch.delenv("XDG_CACHE_HOME", raising=False)
     monkeypatch.setattr(Path, "home", lambda: (_ for _ in ()).throw(RuntimeError("no home")))
-    assert own.cache_base() == own.private()  # a number without a name
+    assert user_cache.cache_base() == user_cache.private()  # a number without a name
 
 
 def toy(tmp_path, monkeypatch):
@@ -320,7 +320,7 @@ def toy(tmp_path, monkeypatch):
     if not source.exists():
         source.write_text("def toy(x):\n    return 2 * x + 1\n", "utf-8")
     exec(compile(source.read_text("utf-8"), str(source), "exec"), space)
-    return kept.kept_on_disk(numba.njit(space["toy"]))
+    return cache_files.kept_on_disk(numba.njit(space["toy"]))
 
 
 def missed(found) -> tuple:
@@ -366,12 +366,12 @@ def test_always_a_cache_that_cannot_be_written_is_no_fault(tmp_path, monkeypatch
 
 
 def test_always_a_made_module_lives_without_a_file_and_a_damaged_file_is_made_again(tmp_path, monkeypatch):
-    text = "WIDE = 3\nfrom . import inner as part\n\n\ndef wide(x):\n    return WIDE * x\n"
+    text = "WIDE = 3\nfrom . import jit as part\n\n\ndef wide(x):\n    return WIDE * x\n"
     monkeypatch.setattr(compiled, "_folder", lambda: tmp_path)
     with limited(0):
         found = compiled.written("compiled.without_file", text)
         assert found.WIDE == 3 and found.module().wide(2) == 6
-        assert found.module().part.__name__ == "patchfem.compiled.inner"
+        assert found.module().part.__name__ == "patchfem.compiled.jit"
     assert not [one for one in tmp_path.rglob("*") if one.is_file()]
     for harm in ("", text[:20], "mine = 1"):
         (tmp_path / "instances").mkdir(exist_ok=True)

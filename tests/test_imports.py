@@ -71,7 +71,7 @@ def scene(tmp_path):
 
 PHYSICS = set(
     "closed_forms contact dynamics elasticity friction identify inputs mesh response slip structure surface wear "
-    "runs.bench runs.many runs.patch runs.rig runs.wear".split()
+    "runs.bench runs.batch runs.patch runs.rig runs.wear".split()
 )
 PIECES = "contact elasticity mesh runs.patch "  # folders that press a patch
 MOTION = "dynamics response runs.rig structure "  # folders that move a rig
@@ -128,7 +128,7 @@ MODULES_OF_SCENES = {  # what is run from Python -> text, modules that it loads,
             ("harmonic", '[accuracy]\nmethod = "harmonic"\n', "dynamics.events.stick_steady"),
         )
     },
-    "bench": (BENCH, "runs.bench.bench", "campaigns export.sweeps scene.axes runs.many"),
+    "bench": (BENCH, "runs.bench.bench", "campaigns export.sweeps scene.axes runs.batch"),
 }
 
 
@@ -170,7 +170,7 @@ COMMANDS = {  # what a command does -> scene, words, modules of ours and package
         "pyvista vtkmodules numba meshio skfem scipy matplotlib pandas xarray",
     ),
     "check": (without_files(), ("check", "SCENE"), "", HEAVY),
-    "check of a bench": (BENCH, ("check", "SCENE"), "campaigns export.sweeps scene.axes runs.many", "email socket"),
+    "check of a bench": (BENCH, ("check", "SCENE"), "campaigns export.sweeps scene.axes runs.batch", "email socket"),
     "check of measured rows": ("", ("check", str(RIG)), "", HEAVY),
     "help": ("", ("--help",), "", HEAVY),
     "help of a verb": ("", ("check", "--help"), "", HEAVY),
@@ -230,7 +230,7 @@ def test_exact_a_short_history_compiles_nothing(scene, tmp_path, monkeypatch, te
     monkeypatch.delenv("PATCHFEM_CACHE", raising=False)  # it would win over XDG_CACHE_HOME
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     modules = loaded(FROM_PYTHON, scene(text))
-    absent(modules, "compiled.inner", "compiled.kept", "dynamics.events.march_kernels")
+    absent(modules, "compiled.jit", "compiled.cache_files", "dynamics.events.march_kernels")
     assert "llvmlite" not in modules
     assert not [*tmp_path.rglob("*.code"), *tmp_path.rglob("*.nbi")]
     assert text != RINGING or pf.run(text).measures["ring_frequency"].value

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 from numba.core.registry import CPUDispatcher
 
-from patchfem.compiled import inner
-from patchfem.compiled.inner import Inner, njit
+from patchfem.compiled import jit
+from patchfem.compiled.jit import Inner, njit
 
 KERNELS = """\
 import numpy as np
-from patchfem.compiled.inner import njit
+from patchfem.compiled.jit import njit
 
 
 @njit(error_model="numpy", _nrt=False)
@@ -92,7 +92,7 @@ def test_always_this_numba_has_what_inner_functions_need():
 
 
 def test_exact_without_its_hooks_it_is_numba_s(monkeypatch):
-    monkeypatch.setattr("patchfem.compiled.inner.HOOKS", ("something_else",))
+    monkeypatch.setattr("patchfem.compiled.jit.HOOKS", ("something_else",))
     called, total = made(njit(**ALIKE))
     assert type(called) is type(total) is CPUDispatcher
     assert total(np.arange(3.0), np.array([0.5, 1.75])) == 0 + 0.5 / 1.5 + 2 + 0.25 / 2.75
@@ -100,7 +100,7 @@ def test_exact_without_its_hooks_it_is_numba_s(monkeypatch):
 
 def test_always_kernels_are_compiled_by_it():
     """numba's own `njit` would compile a function for itself, inside each that calls it, and again per constant."""
-    kernels = list(Path(inner.__file__).parents[1].rglob("*kernels.py"))
+    kernels = list(Path(jit.__file__).parents[1].rglob("*kernels.py"))
     assert len(kernels) > 50
     own = re.compile(r"(?m)^(from numba import .*\bn?jit\b|@numba\b)")
     assert not [str(path) for path in kernels if own.search(path.read_text("utf-8"))]

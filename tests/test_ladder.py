@@ -20,7 +20,7 @@ HERE = Path(__file__).parents[1]
 SCENE = ("", "__main__", "api", "commands.*", "scene", "scene.*", "model", "model.*")  # may know a Scene
 SCENE_ALSO = ("campaigns.fits.*",  # and so may these: values of keys of a scene, a scene whose patch is replaced
               "export.fits.request", "export.fits.wear", "export.fits.patch",  # the fitted scene, which they write
-              "campaigns.sweeps.asked", "campaigns.rows.asked")  # one scene asked again with other values of its keys
+              "campaigns.sweeps.case_models", "campaigns.rows.asked")  # one scene asked again with other values of its keys
 OUTSIDE = {"numba": ("*kernels", "compiled", "compiled.*"), "pyvista": ("export.drawing.view",),
            "meshio": ("mesh.files", "export.*")}
 PHYSICS = ["core", "mesh", "surface", "elasticity", "contact", "slip", "dynamics", "runs"]  # must be read in this order

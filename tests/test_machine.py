@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from patchfem.compiled import Kernels, inner, load, machine
+from patchfem.compiled import Kernels, jit, load, machine
 
 
 class Inner(NamedTuple):
@@ -100,14 +100,14 @@ def test_exact_tuples_are_taken_by_their_address(weighing, tmp_path):
     """Numbers, arrays of each layout and a tuple inside are read where they lie, those of each call; a function inside
     is given the address as well."""
     _, (first, outer, step, _), answer, _, made = weighing
-    within = inner.njit(error_model="numpy", _nrt=False)(weighed)
+    within = jit.njit(error_model="numpy", _nrt=False)(weighed)
 
-    @inner.njit(error_model="numpy", _nrt=False)
+    @jit.njit(error_model="numpy", _nrt=False)
     def called(first, outer, step, out):
         return within(first, outer, step, out)
 
     for function in (within, called):
-        code = machine.make(tmp_path / "a.code", function, (first, outer, step, np.zeros(5)), inner.optimised)
+        code = machine.make(tmp_path / "a.code", function, (first, outer, step, np.zeros(5)), jit.optimised)
         mine = np.zeros(5)
         assert code(words_of(first, outer, step, mine)) == (8, (mine[-1], 7))
         assert mine[-1] == pytest.approx(answer[1][0], rel=1e-14)

@@ -5,19 +5,19 @@ from __future__ import annotations
 import pytest
 from scene_texts import BENCH
 
-from patchfem import rates
+from patchfem import cost_model
 from patchfem.runs.plan import plan
 from patchfem.scene.scene import loads
 
 
 def test_exact_a_machine_of_half_the_pace_takes_twice_as_long(monkeypatch):
     ticks = iter(range(0, 1000))
-    monkeypatch.setattr(rates, "process_time", lambda: rates.REFERENCE_SPEED_WORK * 2 * next(ticks))
-    assert rates.speed() == pytest.approx(2.0, rel=1e-12)
+    monkeypatch.setattr(cost_model, "process_time", lambda: cost_model.REFERENCE_SPEED_WORK * 2 * next(ticks))
+    assert cost_model.speed() == pytest.approx(2.0, rel=1e-12)
 
 
 def test_always_a_plan_counts_by_the_table(monkeypatch):
     scene = loads(BENCH, "a.toml")
     before = plan(scene)
-    monkeypatch.setattr(rates, "START", rates.START + 3.0)
+    monkeypatch.setattr(cost_model, "START", cost_model.START + 3.0)
     assert plan(scene).seconds == pytest.approx(before.seconds + 3.0, abs=0.02)

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from patchfem.scales import LADDERS, MOST, plain, rounded, short, tidied, told
+from patchfem.formatting import LADDERS, MOST, plain, rounded, short, tidied, told
 
 SCALE = {name: 1 / scale for ladder in LADDERS.values() for name, scale in ladder}
 UGLY = re.compile(r"± 0(?![.\d])|(?<![\d.])-0(?![.\d])|\de[-+]?0|nan|inf|\d\.\d{11}")

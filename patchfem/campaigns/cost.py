@@ -15,14 +15,14 @@ from typing import NamedTuple
 
 from ..compiled import cache_folder
 from ..core import NotConverged, PatchfemError, allowed
+from ..formatting import plain
 from ..model.model import Model
 from ..model.source import placed
 from ..runs.patch.ladder import solve_split
 from ..runs.patch.measures import measures
 from ..runs.plan import plan
 from ..runs.run import run
-from ..scales import plain
-from .knobs import KNOBS, Setting, knobs_of, settings, with_setting, with_tolerance
+from .numerical_settings import KNOBS, Setting, knobs_of, settings, with_setting, with_tolerance
 
 __all__ = ["KNOBS", "TOLERANCE", "Cost", "cheapest", "curve", "knobs_of", "quickest", "sentence", "tolerance_curve",
            "turned_by"]

@@ -5,9 +5,9 @@ import shlex
 import sys
 from pathlib import Path
 
-from ..disk import whole
+from ..disk import atomic_write
 from ..export import folder, summary
-from ..export.pages import driven, released, words
+from ..export.pages import driven, released, sentences
 from ..runs import plan
 from .shared import (
     Ended,
@@ -79,8 +79,8 @@ def _draw(written, target: Path) -> None:
     """Draw the page last: whatever stops it, the results are in place and their place is said."""
     try:
         folder.write_page(written, target)
-    except (OSError, MemoryError, whole.Unwritten) as error:
-        why = str(error) if isinstance(error, whole.Unwritten) else \
+    except (OSError, MemoryError, atomic_write.Unwritten) as error:
+        why = str(error) if isinstance(error, atomic_write.Unwritten) else \
             f"{target / 'report.html'}: {getattr(error, 'strerror', None) or 'out of memory'}"
         say(f"{why}; the results are complete except for the page")
         raise Ended(4) from None
@@ -92,15 +92,15 @@ def _print_answer(written, target: Path, verbose: bool, page: str) -> None:
     if answer["title"]:
         sets = written.result.plan.model.source.sets
         print(f"{answer['title']}{f'; changed: {driven.changed(sets)}' if sets else ''}")
-    print(f"{answer['outcome']}: {words.verdict(answer)}")
-    if text := words.headline(answer, summary.cycles_of(written.result), released=released.released(written.result)):
+    print(f"{answer['outcome']}: {sentences.verdict(answer)}")
+    if text := sentences.headline(answer, summary.cycles_of(written.result), released=released.released(written.result)):
         print(text)
     sys.stdout.flush()
-    if text := words.tolerance_sentence(written.result):
+    if text := sentences.tolerance_sentence(written.result):
         print(text, flush=True)
     for text in answer["warnings"]:
         say(f"warning: {text}")
-    print("\n".join(words.table_of(answer["measures"], answer["numerics"].get("engine", ""))), flush=True)
+    print("\n".join(sentences.table_of(answer["measures"], answer["numerics"].get("engine", ""))), flush=True)
     for text in answer["notes"]:
         note(text)
     if verbose:

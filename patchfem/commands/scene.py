@@ -6,16 +6,16 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from .. import rates
-from ..campaigns.sweeps import ask, estimate
+from .. import cost_model
+from ..campaigns.sweeps import estimate, parse_request
 from ..effects import has, shown_absent
 from ..export.written import brief
+from ..formatting import short, tidied
 from ..mesh import files as mesh_files
 from ..model import files as model_files
 from ..response import rows
 from ..runs import plan as plans
 from ..runs.patch import faces, result
-from ..scales import short, tidied
 from ..scene import scene as scenes
 from .shared import Json, Refused, Sets, flag, model_of, note, say, scene_of
 from .sweep import Over
@@ -44,7 +44,7 @@ def check(scene: Path, /, *, set_: Sets = (), json_: Json = False):
 
 def _swept(scene: Path, sets, what: Over) -> tuple:
     """(what all cases share, the cases) of a sweep."""
-    return ask.asked_of(scene, sets, what.request())
+    return parse_request.asked_of(scene, sets, what.request())
 
 
 def _faults(tables, folder: Path, whole: bool, notes: list) -> list:
@@ -74,7 +74,7 @@ def plan(scene: Path, /, *, set_: Sets = (), what: Over | None = None, json_: Js
     found = plans.plan(read)
     answer = found.as_json()
     if probe:
-        answer["seconds"] = round(answer["seconds"] * rates.speed(), 2)
+        answer["seconds"] = round(answer["seconds"] * cost_model.speed(), 2)
     if probe and (solved := faces.probed(found.model)):
         chain = answer["stiffness_chain"]
         chain |= {name: solved[name.replace("pieces_shear", "tangential_stiffness")] for name, link in chain.items()
@@ -90,7 +90,7 @@ def _plan_sweep(scene: Path, sets, what: Over, json_: bool, verbose: bool) -> No
     """The plan of a sweep."""
     asked, cases = _swept(scene, sets, what)
     answer = estimate.estimate(asked, cases)
-    if wrong := ask.contradictions(asked, cases):
+    if wrong := parse_request.contradictions(asked, cases):
         note(wrong)
     if json_:
         print(json.dumps(answer))

@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from ..disk import whole
+from ..disk import atomic_write
 from ..scene import scene as scenes
 from ..scene import schema as schemas
 from ..scene import starting
@@ -28,7 +28,7 @@ def new(kind: str = "", /, *, out: out_in("file to write, such as mine.toml; def
     if out.exists():
         raise Refused(f"{out}: already exists; choose another file with -o, or remove it")
 
-    whole.write_text(out, text)
+    atomic_write.write_text(out, text)
     print(f"{out}: {starting.KINDS[kind]}\nnext: patchfem {starting.NEXT.get(kind, 'run')} {out}")
 
 
@@ -53,7 +53,7 @@ def schema(*, out: out_in("file to write, such as scene.json; default: the scree
     if out is None:
         print(text, end="")
         return
-    whole.write_text(out, text)
+    atomic_write.write_text(out, text)
     print(f"{out}: for completion in an editor, begin a scene with the line #:schema {out}")
 
 

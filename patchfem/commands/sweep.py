@@ -12,9 +12,9 @@ from typing import Annotated, Literal, NamedTuple
 from cyclopts import Parameter
 
 from .. import core
-from ..campaigns.sweeps import ask, executors
+from ..campaigns.sweeps import executors, parse_request
 from ..campaigns.sweeps import sweep as sweeping
-from ..export.sweeps import receipt, run
+from ..export.sweeps import manifest, run
 from ..scene import axes
 from .shared import Ended, Json, NoPage, NotReached, Out, Quiet, Refused, Sets, flag, note, placed, say, texts, word
 
@@ -58,7 +58,7 @@ class Over:
             raise Refused("--random, --sobol and --seed must be whole numbers >= 0")
         if (self.random or self.sobol) and not self.over:
             raise Refused("--random and --sobol draw values from ranges; give each range by --over table.key=low..high")
-        return ask.Request(self.over, self.cases, self.random or self.sobol, bool(self.sobol), self.seed,
+        return parse_request.Request(self.over, self.cases, self.random or self.sobol, bool(self.sobol), self.seed,
                            self.of)
 
 
@@ -104,18 +104,18 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
     begin, part = perf_counter(), by.part()
     target, tells = placed(out, f"{scene.stem}-sweep"), "json" if json_ else "faults" if quiet else "words"
     told = Told(target, not no_page, tells, begin)
-    signed = "" if by.collect or part or keep not in (None, "none") else receipt.sign(
+    signed = "" if by.collect or part or keep not in (None, "none") else manifest.sign(
         scene, (what or Over()).words(*set_, f"page={not no_page}"), what and what.cases)
-    if resume and (written := receipt.read(target, signed)):  # all of it is there
+    if resume and (written := manifest.read(target, signed)):  # all of it is there
         _answer(written["cases"]["count"], {}, written, told)
         return
-    asked, cases = ask.asked_of(scene, set_, (what or Over()).request())
+    asked, cases = parse_request.asked_of(scene, set_, (what or Over()).request())
     if by.collect:
         _answered(run.collect(asked, cases, target, not no_page), told)
         return
     for text in () if quiet else axes.drawn_from(what.over if what else ()):
         note(text)
-    if not quiet and (wrong := ask.contradictions(asked, cases)):
+    if not quiet and (wrong := parse_request.contradictions(asked, cases)):
         note(wrong)
     line = Progress(quiet)
     try:
@@ -137,7 +137,7 @@ def sweep(scene: Path, /, *, what: Over | None = None, by: By | None = None, out
                   "--collect")
         return
     if signed and not found.messages and place.kept(len(cases)) == "none":
-        receipt.write(target, signed)
+        manifest.write(target, signed)
     _answered(found, told)
 
 

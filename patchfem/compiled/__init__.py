@@ -10,12 +10,12 @@ or a measure of coverage sees each line), NUMBA_BOUNDSCHECK=1 compiles all anew 
 Numba's level of optimisation stays its own, 3. Compile CPU s of the rig, Iwan, Bouc-Wen, tanh, LuGre and bonds at the
 levels 3, 2 and 1: 6.4 5.0 5.1, 23.0 24.3 21.8, 8.9 9.7 9.2, 7.8 8.5 7.8, 8.4 8.0 7.8, 8.8 8.9 9.0, in all 63, 64 and 61
 on a busy machine, for most of it was numba's own Python. Iwan's loop then takes 7.9, 10.1 and 10.0 ms, others up to a
-sixth more. Since tuples are taken by their address (`held`) and only the passes run that are needed (`inner`), the loop
+sixth more. Since tuples are taken by their address (`pass_by_reference`) and only the passes run that are needed (`jit`), the loop
 from event to event compiles in three fifths of the time: the first sweep of a Coulomb rig 13.5 CPU s, 21.9 before.
 
-`inner` has the `njit` of all kernels. `load` and `instance` give `Kernels`, which import the module of compiled code,
+`jit` has the `njit` of all kernels. `load` and `instance` give `Kernels`, which import the module of compiled code,
 and with it numba, only where a function of it is called whose machine code is not kept yet (`machine`). A function
-whose caller says what its work would cost as Python (`Entry.expect`) runs as Python (`plain`) while that is little: a
+whose caller says what its work would cost as Python (`Entry.expect`) runs as Python (`no_jit`) while that is little: a
 short history is over long before its loop would be compiled.
 """
 
@@ -38,16 +38,16 @@ from time import monotonic, sleep
 
 import numpy as np
 
-from ..disk import own
+from ..disk import user_cache
+from ..disk.atomic_write import short
 from ..disk.installed import version
-from ..disk.whole import short
 from . import cache_limit, machine, prebuilt
-from .plain import plain
+from .no_jit import plain
 
 HERE = Path(__file__).parents[1]  # the package
 # tuples that kernels take: numba's cache would not notice two of their fields that change places
-TUPLES = ("contact/many/arrays.py", "dynamics/contacts/arrays.py", "dynamics/smooth/arrays.py",
-          "dynamics/events/plant.py", "dynamics/events/elements.py")
+TUPLES = ("contact/batch/arrays.py", "dynamics/interfaces/arrays.py", "dynamics/smooth/arrays.py",
+          "dynamics/events/modal_system.py", "dynamics/events/elements.py")
 PLAIN = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")  # numba's own switch: all runs as the Python it is
 LEAST = 1 << 21  # bytes of the machine code of a run
 PATIENCE = 2.0  # CPU seconds of a function as Python in a process, from which on it is compiled: a tenth of that
@@ -62,7 +62,7 @@ def sources():
     """Hash, as an object, of every *kernels.py of the package, of the tuples that they take and how they are
     compiled."""
     digest = hashlib.sha256()
-    for source in (*(HERE / "compiled" / name for name in ("inner.py", "held.py")), *sorted(HERE.rglob("*kernels.py")),
+    for source in (*(HERE / "compiled" / name for name in ("jit.py", "pass_by_reference.py")), *sorted(HERE.rglob("*kernels.py")),
                    *(HERE / name for name in TUPLES)):
         digest.update(str(source.relative_to(HERE)).encode() + b"\0" + source.read_bytes())
     return digest
@@ -106,13 +106,13 @@ def _placed() -> tuple[Path, str]:
 
 def _place() -> tuple[Path, str]:
     session, name = os.environ.get("XDG_RUNTIME_DIR"), Path("patchfem") / kernel_key()
-    first = own.refused(own.cache_base() / name)
+    first = user_cache.refused(user_cache.cache_base() / name)
     if not first:
-        return own.cache_base() / name, ""
-    if session and not own.refused(Path(session) / name):
+        return user_cache.cache_base() / name, ""
+    if session and not user_cache.refused(Path(session) / name):
         return Path(session) / name, first
-    own.refused(own.private() / name)  # makes it where it can
-    return own.private() / name, first
+    user_cache.refused(user_cache.private() / name)  # makes it where it can
+    return user_cache.private() / name, first
 
 
 class Kernels:
@@ -217,7 +217,7 @@ class Entry:
         return any((folder / "code" / f"{self.kept}{digest(kinds)}.code").is_file() for folder in _kept())
 
     def held(self, *arguments) -> tuple:
-        """(kinds, words, arguments) of last arguments that stay the same objects from call to call, for `held_call`:
+        """(kinds, words, arguments) of last arguments that stay the same objects from call to call, for `call_with_bound_args`:
         their words are made once. What is in their arrays may change."""
         if PLAIN:
             return None, b"", arguments
@@ -227,8 +227,8 @@ class Entry:
             return None, b"", arguments
         return kinds, b"".join(words), arguments
 
-    def held_call(self, held: tuple, *first):
-        """The function of some first arguments and those of `held`."""
+    def call_with_bound_args(self, held: tuple, *first):
+        """The function of some first arguments and those of `pass_by_reference`."""
         kinds, words, last = held
         if kinds is None:
             return self(*first, *last)
@@ -279,7 +279,7 @@ class Entry:
             if code is None:
                 _tell()
                 with tidied_later():
-                    optimised = import_module(f"{__name__}.inner").optimised  # brings numba
+                    optimised = import_module(f"{__name__}.jit").optimised  # brings numba
                     code = machine.make(path, self.function(), arguments, optimised)
         return code
 
@@ -376,7 +376,7 @@ def written(module: str, text: str, say=None, parts=()):
     """
     name = f"patchfem.{module}"
     path, data = _prepared(say) / "instances" / f"{module}.py", text.encode()
-    kept = _bytes_of(path) == data or own.put(path, data)
+    kept = _bytes_of(path) == data or user_cache.put(path, data)
 
     def bring():
         if name not in sys.modules:
@@ -396,7 +396,7 @@ def written(module: str, text: str, say=None, parts=()):
 def ran(kind: str) -> None:
     """Note that a run of this kind came to its end: its compiled code is kept."""
     if not PLAIN:
-        own.put(_folder() / "kinds" / digest(kind), kind.encode())
+        user_cache.put(_folder() / "kinds" / digest(kind), kind.encode())
 
 
 def has_run(kind: str) -> bool:

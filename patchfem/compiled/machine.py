@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ..disk import own
+from ..disk import user_cache
 
 FINE = (0, -2)  # numba's status of a function that returned something, or nothing
 NUMBERS = {float: "d", int: "q", np.float64: "d", np.int64: "q"}
@@ -161,7 +161,7 @@ def keep(path: Path, function, arguments: tuple) -> bool:
     """
     try:
         made = function.overloads[tuple(map(function.typeof_pyval, arguments))]
-        return own.put(path, _content(path.name, function.targetctx, made, function.targetoptions))
+        return user_cache.put(path, _content(path.name, function.targetctx, made, function.targetoptions))
     except Exception:  # of numba's and llvmlite's insides: whatever they refuse, the run has its function already
         return False
 
@@ -178,7 +178,7 @@ def make(path: Path, function, arguments: tuple, optimised) -> Code | None:
         content = _content(path.name, *optimised(function, arguments), function.targetoptions)
     except Exception:  # of their insides: what they refuse is told by the call itself
         return None
-    own.put(path, content)
+    user_cache.put(path, content)
     return loaded(content)
 
 
@@ -217,7 +217,7 @@ def _code(target, made, name: str, results: int) -> tuple:
     """
     from llvmlite import binding, ir
 
-    from .held import Held, words
+    from .pass_by_reference import Held, words
 
     whole = made.library._get_module_for_linking().clone()
     inner, word = target.call_conv.get_function_type(made.signature.return_type, made.signature.args), ir.IntType(64)

@@ -82,7 +82,7 @@ class Operator:
         return self.c[:, span] @ force[span]
 
 
-class Ask(NamedTuple):
+class ContactProblem(NamedTuple):
     """A contact problem: what presses two pieces of a given gap.
 
     x: (m,) nodes [m]; gap: (m,) [m] from first touch on, below zero where the pieces overlap under a given approach;
@@ -124,7 +124,7 @@ class _Motion:
     The moment is taken about `centre`, which makes lift and lean independent of each other.
     """
 
-    def __init__(self, operator: Operator, ask: Ask, active, index):
+    def __init__(self, operator: Operator, ask: ContactProblem, active, index):
         x, gap = ask.x[index], ask.gap[index]
         given = (ask.load is not None) + (ask.moment is not None)
         self.solve, self.centre = operator.solver(active), 0.0
@@ -163,7 +163,7 @@ class _Motion:
         return self.forces(lack, self.solve(opening[:, None])[:, 0])
 
 
-def on_set(operator: Operator, ask: Ask, active: np.ndarray, polish: int = 0) -> Found:
+def on_set(operator: Operator, ask: ContactProblem, active: np.ndarray, polish: int = 0) -> Found:
     """Forces and motion with the nodes `active` (m,) in contact, whatever the signs.
 
     polish: steps of iterative refinement. LinAlgError where the set does not determine the motion.
@@ -192,7 +192,7 @@ def on_set(operator: Operator, ask: Ask, active: np.ndarray, polish: int = 0) ->
     return Found(force, opening, scale, float(lift - lean * system.centre), -float(lean), stiffness)
 
 
-def settle(operator: Operator, ask: Ask, active: np.ndarray, limit: int = 100) -> tuple:
+def settle(operator: Operator, ask: ContactProblem, active: np.ndarray, limit: int = 100) -> tuple:
     """Primal-dual active set from `active` (m,) on: (Found or None, last set, iterations).
 
     None where a set came back, where a set was singular or after `limit` iterations. Nodes that pull leave the set,
@@ -216,7 +216,7 @@ def settle(operator: Operator, ask: Ask, active: np.ndarray, limit: int = 100) -
     return None, active, limit
 
 
-def supported(ask: Ask, active: np.ndarray) -> np.ndarray:
+def supported(ask: ContactProblem, active: np.ndarray) -> np.ndarray:
     """The set, completed so that it can carry the load.
 
     Where it does not reach to both sides of the load line, the lowest node of each side is added.
@@ -280,7 +280,7 @@ def rest(x, gap, load: float, moment: float, spring: float) -> float:
     return float((load * x[a] - moment) / spring)
 
 
-def first_set(operator: Operator, ask: Ask) -> np.ndarray:
+def first_set(operator: Operator, ask: ContactProblem) -> np.ndarray:
     """First guess of the contact set: the nodes that the load is likely to reach from the rest position.
 
     The load sinks the piece by the geometric mean of what a point load and an even load would. Under a given approach

@@ -10,10 +10,10 @@ falls at each step.
 import numpy as np
 
 from ..core import NotConverged
-from .active_set import ROUND, Ask, Operator, on_set, polished, supported
+from .active_set import ROUND, ContactProblem, Operator, on_set, polished, supported
 
 
-def _program(operator: Operator, ask: Ask) -> tuple:
+def _program(operator: Operator, ask: ContactProblem) -> tuple:
     """The contact problem as a convex program: (bent, gap, rigid, sums) of min f.bent(f)/2 + gap.f, f >= 0, rigid^T f =
     sums.
 
@@ -72,7 +72,7 @@ def _top(start, step, rise: float) -> float:
     return (rise - level[piece]) / slope[piece] if slope[piece] > 0 else 0.0
 
 
-def gradients(operator, ask: Ask, tolerance: float = 1e-11, limit: int = 1000, start=None) -> tuple:
+def gradients(operator, ask: ContactProblem, tolerance: float = 1e-11, limit: int = 1000, start=None) -> tuple:
     """Conjugate gradients: forces (m,) [N] near the answer, nonnegative and with the right sums, and the iterations.
 
     operator: an Operator, or what has its `product`, `own` and `longest`; start: (m,) forces [N] to begin with. The
@@ -130,7 +130,7 @@ def _fit(rigid, values) -> np.ndarray:
     return np.linalg.lstsq(rigid, values, rcond=1e-13)[0] if rigid.shape[1] else np.zeros(0)
 
 
-def descend(operator: Operator, ask: Ask, force: np.ndarray, limit: int | None = None) -> tuple:
+def descend(operator: Operator, ask: ContactProblem, force: np.ndarray, limit: int | None = None) -> tuple:
     """Answer by a descent that must end, from admissible forces (m,) [N]: (Found, iterations).
 
     NotConverged when `limit` (20 m unless given) steps do not end it.

@@ -7,21 +7,21 @@ polygon that they enclose. `sets` is a `press_kernels.SetArrays`.
 import numpy as np
 from numba.core.options import DefaultOptions
 
-from ..compiled.inner import njit
+from ..compiled.jit import njit
 
-LEAN = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
+NJIT_NO_REFCOUNT = {"_nrt": False} if hasattr(DefaultOptions, "_nrt") else {}
 NOISE = 1e-13  # of the largest term: what counts as nothing
 SIDES, BOX = 16, 100.0  # most sides of a polygon; half its largest width, in the closing of the reference state
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def units(sets):
     """Scales of the polygons: of a closing [m], as of the reference state, and of a turn [rad], that over the arm."""
     arm = max(abs(sets.x[0]), abs(sets.x[-1]))
     return sets.base[3], sets.base[3] / arm if arm > 0 else 1.0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def outline(sets, slot):
     """Work out the polygon of the set in a slot: a box, cut by the line of every node (Sutherland, Hodgman 1974).
 
@@ -81,14 +81,14 @@ def outline(sets, slot):
     sets.sides[slot] = sides
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def boxed(sets, d, t):
     """Whether a motion (d [m], t [rad]) lies in the box in which polygons are drawn, BOX units to each side."""
     unit_d, unit_t = units(sets)
     return abs(d) <= BOX * unit_d and abs(t) <= BOX * unit_t
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def margin(sets, k, side, d, t):
     """How far the node of a side of set k is from failing: force [N] where it touches, else gap [m].
 
@@ -99,7 +99,7 @@ def margin(sets, k, side, d, t):
     return sets.rows[k, 0, i] + sets.rows[k, 1, i] * d + sets.rows[k, 2, i] * t - least
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def within(sets, k, d, t):
     """Whether the polygon of set k says that the set holds at (d [m], t [rad]); False also where it has no polygon.
 
@@ -113,7 +113,7 @@ def within(sets, k, d, t):
     return True
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def way_out(sets, k, d, t, dd, dt):
     """Share [1] of the increment (dd [m], dt [rad]) from (d, t) after which set k ends, and the side where it does.
 

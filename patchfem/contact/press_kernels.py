@@ -13,11 +13,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ..compiled.inner import njit
-from .polygon_kernels import LEAN, NOISE, outline, within
+from ..compiled.jit import njit
+from .polygon_kernels import NJIT_NO_REFCOUNT, NOISE, outline, within
 
-FAST = {"reassoc", "contract", "arcp"}
-LEAST = FAST | {"nnan", "nsz"}  # for passes that look for the least value: without them none is vectorised
+FASTMATH_FLAGS = {"reassoc", "contract", "arcp"}
+LEAST = FASTMATH_FLAGS | {"nnan", "nsz"}  # for passes that look for the least value: without them none is vectorised
 BLOCKS = 12  # sets tried with all failing nodes flipped at once
 FLAW = 1e-8  # relative residual above which the tableau is made anew; below it one refinement reaches round-off
 COUNT, SLOT, BUILT, PIVOTS, RENEWED = range(5)
@@ -61,7 +61,7 @@ class SetArrays(NamedTuple):
     corner: np.ndarray
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def pivot(sets, k):
     """Exchange force and gap of node k in the tableau; m^2 multiplications. False where the pivot is not positive."""
     tableau, row = sets.tableau, sets.row
@@ -87,7 +87,7 @@ def pivot(sets, k):
     return True
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def renew(sets):
     """Write the tableau of the empty contact set."""
     m = sets.x.size
@@ -101,7 +101,7 @@ def renew(sets):
     sets.meta[RENEWED] += 1
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def refine(sets):
     """Read the rows of the set off the tableau and refine them once on C itself; relative residual found before that.
    """
@@ -144,7 +144,7 @@ def refine(sets):
     return worst
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def store(sets, name):
     """Keep the refined set of the tableau in the next slot and return the slot; the oldest set gives way where none is
     free."""
@@ -185,7 +185,7 @@ def store(sets, name):
     return slot
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def to_wanted(sets):
     """Pivot the tableau to the set `wanted`; False where a pivot is not positive."""
     for i in range(sets.x.size):
@@ -194,7 +194,7 @@ def to_wanted(sets):
     return True
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def build(sets, name):
     """Work out the set `wanted` and return its slot; -1 where the compliance is not positive definite on it.
 
@@ -208,7 +208,7 @@ def build(sets, name):
     return store(sets, name)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def find(sets, name):
     """Slot of the set `wanted` with this `name`; -1 where it is not kept. Equal names are told apart node by node."""
     k = sets.heads[name & (sets.heads.size - 1)]
@@ -225,7 +225,7 @@ def find(sets, name):
     return k
 
 
-@njit(error_model="numpy", fastmath=LEAST, **LEAN)
+@njit(error_model="numpy", fastmath=LEAST, **NJIT_NO_REFCOUNT)
 def holds(sets, k, d, t):
     """Whether no node of set k fails at (d [m], t [rad]), and the bounds below which a node counts as failing.
 
@@ -244,7 +244,7 @@ def holds(sets, k, d, t):
     return pull >= force and deep >= gap, force, gap
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def flip(sets, k, d, t, force, gap, alone):
     """Write set k with its failing nodes exchanged into `wanted` and return its name; `alone`: only the first of them.
    """
@@ -260,7 +260,7 @@ def flip(sets, k, d, t, force, gap, alone):
     return name
 
 
-@njit(error_model="numpy", cache=True, **LEAN)
+@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def locate(sets, k, d, t):
     """Slot of the contact set at (d, t), searched from set k; -1 where none was found.
 
@@ -280,14 +280,14 @@ def locate(sets, k, d, t):
     return -1
 
 
-@njit(error_model="numpy", cache=True, **LEAN)
+@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def begin(sets, name):
     """Work out the set `wanted` under its `name` from the empty set and return its slot; -1 as in `build`."""
     renew(sets)
     return build(sets, name)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def pull(sets, k, h, turn):
     """Energy of the preloaded contact of set k, and its slopes in heave h = -d and in turn.
 
@@ -298,7 +298,7 @@ def pull(sets, k, h, turn):
     return q[0] + d * (q[1] + 0.5 * by_d) + turn * (q[2] + 0.5 * by_t), -(q[1] + by_d), q[2] + by_t
 
 
-@njit(error_model="numpy", cache=True, **LEAN)
+@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def press_state(sets, k, d, t, force):
     """Load N [N], moment M [N m] and energy [J] of set k at (d [m], t [rad]); its nodal forces are written.
 

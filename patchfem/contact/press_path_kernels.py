@@ -2,12 +2,12 @@
 
 import numpy as np
 
-from ..compiled.inner import njit
-from .polygon_kernels import LEAN, way_out, within
+from ..compiled.jit import njit
+from .polygon_kernels import NJIT_NO_REFCOUNT, way_out, within
 from .press_kernels import LEAST, holds, locate, pull
 
 
-@njit(error_model="numpy", fastmath=LEAST, **LEAN)
+@njit(error_model="numpy", fastmath=LEAST, **NJIT_NO_REFCOUNT)
 def reach(sets, k, d, t, dd, dt, force, gap):
     """Share [1] of the increment (dd [m], dt [rad]) from (d, t) at which the first node of set k falls to its bound.
 
@@ -23,7 +23,7 @@ def reach(sets, k, d, t, dd, dt, force, gap):
     return out
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def across(sets, k, side, d, t):
     """Slot of the contact set beyond a side of set k at (d [m], t [rad]), -1 where none was found; side -1: any side.
 
@@ -41,7 +41,7 @@ def across(sets, k, side, d, t):
     return locate(sets, k, d, t)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def path_mean(sets, k, h, turn, dh, dt, out):
     """Mean slopes of the energy of the preloaded contact along a straight increment (dh, dt) of heave and turn from set
     k on.

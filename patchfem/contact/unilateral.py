@@ -15,7 +15,7 @@ import numpy as np
 from ..core import Compliance, NotConverged, Outcome, PatchfemError, Pressure, frozen_array, say
 from ..elasticity.lapack import one_thread
 from . import gradients
-from .active_set import ROUND, Ask, Found, Operator, factor, first_set, flaw, rest, settle
+from .active_set import ROUND, ContactProblem, Found, Operator, factor, first_set, flaw, rest, settle
 
 LIMIT = 1e-9  # largest relative residual of a skin that still counts as solved
 SOLVED = 1e-12  # of a contact without a skin
@@ -41,7 +41,7 @@ class Solved(NamedTuple):
     iterations: int
 
 
-def _fallen_back(operator: Operator, ask: Ask, limit: int) -> tuple:
+def _fallen_back(operator: Operator, ask: ContactProblem, limit: int) -> tuple:
     """(Found, iterations) by slower methods, for problems whose contact sets came back.
 
     In turn: the active set from all nodes, the active set from where conjugate gradients end, a finite descent.
@@ -58,7 +58,7 @@ def _fallen_back(operator: Operator, ask: Ask, limit: int) -> tuple:
     return found, first + second + third + fourth
 
 
-def _balanced_on_one(operator: Operator, ask: Ask, lean: float) -> Found | None:
+def _balanced_on_one(operator: Operator, ask: ContactProblem, lean: float) -> Found | None:
     """The answer where one node under the load line carries the whole load and no other touches; None where none does.
 
     Of the rotations that leave the other nodes open the middle one is taken, or none where that is among them. lean
@@ -83,7 +83,7 @@ def _balanced_on_one(operator: Operator, ask: Ask, lean: float) -> Found | None:
                  float(ask.gap[k] + theta * ask.x[k] + column[k]), float(theta), float(1 / operator.c[k, k]))
 
 
-def solve(operator: Operator, ask: Ask, start: np.ndarray | None = None, limit: int = 100) -> Solved:
+def solve(operator: Operator, ask: ContactProblem, start: np.ndarray | None = None, limit: int = 100) -> Solved:
     """Forces and rigid motion of a contact problem.
 
     start: (m,) contact set of a neighbouring problem. limit: iterations of one active set. NotConverged when active
@@ -119,7 +119,7 @@ def solve_forces(c, x, gap, target, start=None, limit: int = 100, spring: float 
     (delta, -theta). NotConverged when both the active set and its fallbacks miss the complementarity.
     """
     load, moment = (*map(float, target), None, None)[:2]
-    out = solve(Operator(c), Ask(x, gap, load, moment, spring), start, limit)
+    out = solve(Operator(c), ContactProblem(x, gap, load, moment, spring), start, limit)
     motion = (gap.min() + out.closing, -out.theta) if target.size else ()
     return out.force, np.array(motion[:target.size]), out.iterations
 
@@ -178,7 +178,7 @@ def press(pieces: Compliance, gap: np.ndarray, load: float, moment: float | None
     refuse(pieces.interface.x, gap, load, moment, spring)
     if load == 0:
         return _apart(gap, float(gap.min()), rotation)
-    ask = Ask(pieces.interface.x, gap, float(load), None if moment is None else float(moment), spring)
+    ask = ContactProblem(pieces.interface.x, gap, float(load), None if moment is None else float(moment), spring)
     return _pressed(pieces, ask, start, float(gap.min()), rotation)
 
 
@@ -196,7 +196,7 @@ def press_by(pieces: Compliance, gap: np.ndarray, approach: float, rotation: flo
     if approach - gap.min() < LEAST:
         raise PatchfemError(f"contact.approach: an overlap of {say(approach - gap.min(), 3)} is too small to compute "
                             f"with; for pieces that touch without load give {gap.min():.6g} m")
-    return _pressed(pieces, Ask(pieces.interface.x, gap - approach), start, approach, rotation)
+    return _pressed(pieces, ContactProblem(pieces.interface.x, gap - approach), start, approach, rotation)
 
 
 def _apart(gap, approach: float, rotation: float) -> Pressure:
@@ -204,7 +204,7 @@ def _apart(gap, approach: float, rotation: float) -> Pressure:
                     Outcome.NO_CONTACT, 0, MappingProxyType({}))
 
 
-def _pressed(pieces: Compliance, ask: Ask, start, touch: float, rotation: float) -> Pressure:
+def _pressed(pieces: Compliance, ask: ContactProblem, start, touch: float, rotation: float) -> Pressure:
     """Solve and check a problem; gaps are counted from `touch` [m], so that a far offset costs no digits."""
     x, c, weight = pieces.interface.x, pieces.normal, pieces.interface.weight
     with one_thread():
@@ -236,7 +236,7 @@ def undetermined(c, turns: bool, spring: float) -> str:
             f"contact.load_line.moment: raise contact.load) or {holder} contact.holder.rotational_stiffness")
 
 
-def checked(c, ask: Ask, out: Solved) -> tuple:
+def checked(c, ask: ContactProblem, out: Solved) -> tuple:
     """Openings (m,) [m] >= 0 and relative residuals of an answer; NotConverged where a residual exceeds 1e-12.
 
     c: compliance (m, m) [m/N]; the gap of a problem under a load is counted from first touch.

@@ -8,13 +8,13 @@ and the entries before it:
 3. `tableau_kernels`  coefficients of the Runge-Kutta step of order 8
 4. `doubling`         a step of stiff modes from a short one
 5. `propagator`       exact modal steps under any drive
-6. `resume`           a long march goes on from its state on disk
-7. `repeats`          when a motion has become periodic and its rest is known
+6. `checkpoint`           a long march goes on from its state on disk
+7. `periodicity`          when a motion has become periodic and its rest is known
 8. `integrated`       histories of a run from its modal coordinates
 9. `cycles`          extremes and phasors of a cycle of samples
 10. `curve_points`    places of a curve as close as its bends want
 11. `periodic`        Newton's method on the map of an engine over a period
-12. `contacts`        what one interface is to the loop of a march: solve, given, commit, state
+12. `interfaces`        what one interface is to the loop of a march: solve, given, commit, state
 13. `events`          exact from event to event: rigid and elastic-plastic elements, or no friction
 14. `lanes`             many cases of one mode under a sine side by side; answers of `events` and `smooth` to its bars
 15. `march`           any law in time, under the path-mean forces of each step

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from ..compiled.inner import njit
-from ..friction.flags_kernels import FAST, LEAN
+from ..compiled.jit import njit
+from ..friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def factor(a):
     """Cholesky factor of a (n, n) in its lower half, in place, one over its diagonal on the diagonal; False where a is
     not positive definite."""
@@ -27,7 +27,7 @@ def factor(a):
     return True
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def solve(a, b):
     """Put the solution x of (l l^T) x = b in place of b (n,), a as `factor` left it; returns b . x >= 0.
 
@@ -48,7 +48,7 @@ def solve(a, b):
     return product
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def eliminate(a, b):
     """Put the solution x of a x = b in place of b (n,), pivots in place; False where one is below 1e-12."""
     n = b.size

@@ -6,11 +6,11 @@ modal accelerations that are constant over the step.
 
 import numpy as np
 
-from ..compiled.inner import njit
-from ..friction.flags_kernels import FAST, LEAN
+from ..compiled.jit import njit
+from ..friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def free_slide(state, reach, port, table, at):
     """Increment of the slide of a port [m] over a step without interface forces."""
     n = state.shape[1]
@@ -20,7 +20,7 @@ def free_slide(state, reach, port, table, at):
     return out
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def free_rate(state, row, free, dense, table, at):
     """Rate of the slide `row` (n,) at the end of a step without interface forces [m/s]."""
     n, out = row.size, 0.0
@@ -35,7 +35,7 @@ def free_rate(state, row, free, dense, table, at):
     return out
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def struck(state, row, speed, now, mass):
     """Change the rate of the slide `row` (n,) from `now` to `speed` [m/s] by a blow along it, in place; energy that it
     takes [J]."""
@@ -47,15 +47,15 @@ def struck(state, row, speed, now, mass):
     return 0.5 * mass * (now * now - speed * speed) / share
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def push_back(force, row, mass, accel):
     """Modal accelerations (n,) of one interface force [N] that resists the slide row (n,)."""
     for i in range(accel.size):
         accel[i] = -row[i] * force / mass
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def move(state, free, push, loss, dense, dense_loss, table, at, accel, spare, ledger):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def move(state, free, push, loss, dense, dense_loss, table, at, accel, scratch, ledger):
     """Advance the modes in place by one step and book its energies.
 
     ledger[0]: work of the drive, ledger[1]: viscous loss, ledger[2]: work in magnitude [J]. spare: (2, n) room. The
@@ -75,14 +75,14 @@ def move(state, free, push, loss, dense, dense_loss, table, at, accel, spare, le
             state[0, i] = free[0, i] * z + free[1, i] * v + push[0, i] * f + table[at, i]
             state[1, i] = free[2, i] * z + free[3, i] * v + push[1, i] * f + table[at, n + i]
     else:
-        lost += _move_coupled(state, dense, dense_loss, table, at, accel, spare)
+        lost += _move_coupled(state, dense, dense_loss, table, at, accel, scratch)
     ledger[0] += work
     ledger[1] += lost
     ledger[2] += abs(work)
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def _move_coupled(state, dense, loss, table, at, accel, spare):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def _move_coupled(state, dense, loss, table, at, accel, scratch):
     """Advance the modes as `move` does where damping couples the coordinates; quadratic part of the viscous loss
     [J]."""
     n = state.shape[1]
@@ -103,14 +103,14 @@ def _move_coupled(state, dense, loss, table, at, accel, spare):
                 part += dense[i, j * n + k] * state[j, k]
         for k in range(n):
             part += dense[i, 2 * n + k] * accel[k]
-        spare[i // n, i % n] = part
+        scratch[i // n, i % n] = part
     for i in range(n):
-        state[0, i] = spare[0, i]
-        state[1, i] = spare[1, i]
+        state[0, i] = scratch[0, i]
+        state[1, i] = scratch[1, i]
     return lost
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def stored(state, omega, mass):
     """Kinetic and elastic energy [J] of the modes."""
     out = 0.0
@@ -119,7 +119,7 @@ def stored(state, omega, mass):
     return 0.5 * mass * out
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def accelerations(state, omega, damp, damping, base, drive, accel, out):
     """Modal accelerations (n,) [m s-2] at an instant, relative to the base.
 
@@ -135,7 +135,7 @@ def accelerations(state, omega, damp, damping, base, drive, accel, out):
                 out[0, i] -= damping[i, k] * state[1, k]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def safe_point(low, high, guess):
     """The point `guess` if it lies inside (low, high), else their middle."""
     if low < guess < high and np.isfinite(guess):
@@ -143,7 +143,7 @@ def safe_point(low, high, guess):
     return 0.5 * (low + high)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def narrowed(low, high, here, miss, gain, late):
     """Narrow the search for the root of a rising function by Newton's steps in a bracket: (low, high, next place).
 
@@ -166,7 +166,7 @@ def narrowed(low, high, here, miss, gain, late):
     return low, high, new
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def sample(row, state, slide, output):
     """Write slide, slide speed and output of the modes into a row after the modes themselves, its first 2 n + 2
     entries.
@@ -184,7 +184,7 @@ def sample(row, state, slide, output):
     return q, v, out
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def note(row, force, energy, slip, out, travel, total, ledger):
     """Write force, slip and the interface's energy into a row, and the peak of all energy into the ledger.
 
@@ -198,7 +198,7 @@ def note(row, force, energy, slip, out, travel, total, ledger):
     return 1 if abs(out) > travel else 0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def tell(count, work, ledger):
     """Add the iterations of a step (below 0: it failed) and its friction work [J]."""
     ledger[5] += abs(count)
@@ -207,7 +207,7 @@ def tell(count, work, ledger):
     ledger[8] += work
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def ended(state, free, push, dense, table, at, accel, out):
     """Coordinates and rates at the end of a step under `accel` (n,), into out (2, n); nothing is moved or booked."""
     n = state.shape[1]

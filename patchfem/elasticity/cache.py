@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core import frozen_array
-from ..disk import own
+from ..disk import user_cache
 
 MOST_BYTES = 512 * 2**20
 PARTS = ("nn", "tt", "nt")
@@ -22,7 +22,7 @@ PARTS = ("nn", "tt", "nt")
 
 def folder() -> Path:
     """Folder of the kept compliances: patchfem/operators below PATCHFEM_CACHE, XDG_CACHE_HOME or ~/.cache."""
-    return own.cache_base() / "patchfem" / "operators"
+    return user_cache.cache_base() / "patchfem" / "operators"
 
 
 GRID_SOURCE = ("elasticity.py", "tensor_stiffness.py", "condense.py", "grid_fronts.py")
@@ -67,7 +67,7 @@ def fetch(key: str, columns: int) -> tuple | None:
     Each is (columns, columns), read-only [m2/N].
     """
     path = folder() / f"{key}.npz"
-    if not path.is_file() or own.refused(path.parent):
+    if not path.is_file() or user_cache.refused(path.parent):
         return None
     try:
         with np.load(path, allow_pickle=False) as kept:
@@ -85,7 +85,7 @@ def keep(key: str, parts: tuple) -> None:
     The file is written whole and renamed. The files unused for longest are deleted beyond 512 MiB.
     """
     place, name = folder(), None
-    if own.refused(place):
+    if user_cache.refused(place):
         return
     try:
         handle, name = tempfile.mkstemp(dir=place, suffix=".partial")

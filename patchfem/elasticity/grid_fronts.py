@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import rates
+from .. import cost_model
 from ..core import NotConverged
 from .lapack import dgemm, dpotrf, dtrsm
 
@@ -272,8 +272,8 @@ def predicted_seconds(nx: int, ny: int, mirrored: bool) -> float:
     is; memory that a process touches for the first time takes up to as long again.
     """
     shapes, fronts, entries, operations, _ = counts(nx, ny, mirrored)
-    return rates.PER_CALL + rates.PER_SHAPE * shapes + rates.PER_FRONT * fronts + rates.PER_ENTRY * entries + \
-        rates.PER_OPERATION * operations
+    return cost_model.PER_CALL + cost_model.PER_SHAPE * shapes + cost_model.PER_FRONT * fronts + cost_model.PER_ENTRY * entries + \
+        cost_model.PER_OPERATION * operations
 
 
 def predicted_bytes(nx: int, ny: int, mirrored: bool) -> float:

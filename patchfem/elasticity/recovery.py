@@ -11,7 +11,7 @@ from functools import partial
 import numpy as np
 
 from ..core import frozen_array
-from ..mesh.around import Gathered, Patches, patches
+from ..mesh.nodal_averages import Gathered, Patches, patches
 from .elasticity import Layers, hooke, lame
 
 SPREAD = 0.1  # determinant of the correlations of (1, x, y) over a patch below which it takes in its neighbours

@@ -3,12 +3,12 @@
 In: a `Result`. Out: files. A module imports its own entry of this list and the entries before it:
 
 1. `written`    values of swept keys as they were written
-2. `readback`   files of results read back, one fault that names what is wrong
+2. `read_results`   files of results read back, one fault that names what is wrong
 3. `results`    the results folder, whole at every moment
 4. `summary`    summary.json
 5. `netcdf`     result.nc
 6. `histories`  what result.nc holds, taken from a run
-7. `missed`     cases of a sweep that miss their tolerance
+7. `tolerance_misses`     cases of a sweep that miss their tolerance
 8. `fields`     fields of the pieces as VTKHDF, VTU and PVD
 9. `lab`        histories and loops in the formats of laboratories
 10. `drawing`   drawings as SVG, films, a script for ParaView
@@ -22,7 +22,7 @@ In: a `Result`. Out: files. A module imports its own entry of this list and the 
 18. `cost`      error against time of the knobs of a scene
 19. `fits`      fits of any kind, from their options to their folder
 20. `backbone`  frequency and damping over the amplitude on disk
-21. `chosen`    a results folder in the format, or the picture, that the ending of a file asks for
+21. `convert`    a results folder in the format, or the picture, that the ending of a file asks for
 
 Read `folder` first.
 """

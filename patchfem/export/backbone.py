@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import __version__, scales
+from .. import __version__, formatting
 from ..campaigns.backbone.records import Backbone, Curve
-from ..disk.whole import write_rows, write_text
+from ..disk.atomic_write import write_rows, write_text
 from .drawing import charts, pictures
 from .netcdf import Contents, write
 from .pages.document import Section, document, prose, table
@@ -136,7 +136,7 @@ def drawn(curves: dict) -> list:
     A frequency whose error is larger than itself would stretch the axis, so it is left out.
     """
     amplitudes = np.concatenate([curve.amplitude for curve in curves.values()])
-    unit, scale = scales.axis_unit(amplitudes, "m")
+    unit, scale = formatting.axis_unit(amplitudes, "m")
     along = charts.axis("amplitude at the output", unit, True)
     is_log = all((curve.damping > 0).all() for curve in curves.values())
     frequency = []
@@ -234,9 +234,9 @@ class FormattedPoint(NamedTuple):
 
 def _format_point(curve: Curve, k: int) -> FormattedPoint:
     return FormattedPoint(
-        scales.short(curve.amplitude[k], "m", 3),
-        scales.told(curve.frequency[k], curve.frequency_error[k], unit="Hz"),
-        scales.told(curve.damping[k], curve.damping_error[k]),
+        formatting.short(curve.amplitude[k], "m", 3),
+        formatting.told(curve.frequency[k], curve.frequency_error[k], unit="Hz"),
+        formatting.told(curve.damping[k], curve.damping_error[k]),
     )
 
 
@@ -244,13 +244,13 @@ def _format_stuck(found: Backbone) -> str:
     """Format the frequency with a sticking contact, with its error where it is known."""
     _, stuck, error = found.frequencies
     if error:
-        return scales.told(stuck, error, unit="Hz")
-    return scales.short(stuck, "Hz", 5)
+        return formatting.told(stuck, error, unit="Hz")
+    return formatting.short(stuck, "Hz", 5)
 
 
 def sentences(found: Backbone) -> list:
     """Return the answer in sentences: first both ends of the best curve."""
-    free = scales.short(found.frequencies.free, "Hz", 5)
+    free = formatting.short(found.frequencies.free, "Hz", 5)
     stuck = ""
     if found.frequencies.stuck is not None:
         stuck = f", and {_format_stuck(found)} while the contact sticks"
@@ -275,7 +275,7 @@ def sentences(found: Backbone) -> list:
         )
     if found.flutter is not None:
         out.append(
-            f"At amplitudes above {scales.short(found.flutter, 'm', 3)} the mode gains energy, "
+            f"At amplitudes above {formatting.short(found.flutter, 'm', 3)} the mode gains energy, "
             "because friction dissipates less than the negative damping supplies."
         )
     return out
@@ -294,8 +294,8 @@ def _describe_largest_damping(curve: Curve) -> list:
     if count < 2:
         return []
     k = int(np.argmax(curve.damping))
-    amplitude = scales.short(curve.amplitude[k], "m", 3)
-    frequency = scales.short(curve.frequency[k], "Hz", 5)
+    amplitude = formatting.short(curve.amplitude[k], "m", 3)
+    frequency = formatting.short(curve.frequency[k], "Hz", 5)
     return [
         f"Among these {count} amplitudes the damping ratio is largest at {amplitude}: "
         f"{curve.damping[k]:.3g}, with a frequency of {frequency}."

@@ -15,8 +15,8 @@ from ..campaigns.cost import (
     worst_error,
     worst_of_run,
 )
-from ..disk.whole import write_rows, write_text
-from ..scales import plain
+from ..disk.atomic_write import write_rows, write_text
+from ..formatting import plain
 from .drawing import charts, pictures
 
 AXES = {TOLERANCE: "tolerance", "element_size": "element size", "steps_per_cycle": "steps per cycle",

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from .. import __version__
 from ..core import Missing, NotConverged, PatchfemError
-from ..disk.whole import write_text
+from ..disk.atomic_write import write_text
 from ..runs.results.result import Result, without_folders
 from ..runs.run import KeptState, marches, run
 from . import netcdf, report

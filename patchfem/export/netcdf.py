@@ -12,7 +12,7 @@ import h5netcdf
 import h5py
 import numpy as np
 
-from ..disk.whole import sturdy, whole, write_bytes
+from ..disk.atomic_write import sturdy, whole, write_bytes
 
 LARGE = 10_000_000  # numbers
 CACHE = 1 << 18  # bytes of each variable that stay in memory until its file is closed

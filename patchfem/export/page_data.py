@@ -14,7 +14,7 @@ from ..structure.drive_sizes import largest
 from .histories import largest_multiplier
 from .pages.driven import command, driven
 from .pages.released import released
-from .pages.words import verdict
+from .pages.sentences import verdict
 from .summary import cycles_of, summary_of, versions
 
 

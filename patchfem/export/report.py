@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from .. import scales
+from .. import formatting
 from ..effects import shown_absent
 from ..runs.results.result import Result
 from .drawing import charts, pictures
@@ -15,7 +15,7 @@ from .page_data import RunData, data_of
 from .pages import player
 from .pages.document import Section, document, prose, table, warned
 from .pages.driven import changed
-from .pages.words import (
+from .pages.sentences import (
     SHARP,
     G,
     headline,
@@ -207,7 +207,7 @@ def _wear(data: RunData) -> Picture | None:
     return Picture(
         charts.wear,
         (data.patch.x, *profiles, history),
-        f"Wear of the patch over {scales.plain(history['cycle'][-1], 4)} cycles: pressure and worn depth "
+        f"Wear of the patch over {formatting.plain(history['cycle'][-1], 4)} cycles: pressure and worn depth "
         f"of both pieces together{', means over the width' if depth.ndim == 3 else ''}, and measures of "
         "patch and motion divided by their values on the unworn patch. All other pictures show the worn "
         "patch."
@@ -220,8 +220,8 @@ def _edge_peaks(history: dict) -> str:
     above = np.asarray(history.get("pressure_peak_at_edge", ()))
     if not (above > 0).any():
         return ""
-    cycles = ", ".join(scales.plain(one, 4) for one in np.asarray(history["cycle"])[above > 0])
-    most = scales.short(float(above.max()), "Pa", 2)
+    cycles = ", ".join(formatting.plain(one, 4) for one in np.asarray(history["cycle"])[above > 0])
+    most = formatting.short(float(above.max()), "Pa", 2)
     return (
         f" After {cycles} cycles the peak pressure is that of a node at the edge of the contact; it stands up to "
         f"{most} above all pressures farther inside and has an error of this size."
@@ -239,7 +239,7 @@ def _worn_map(data: RunData) -> Picture | None:
         charts.worn_map,
         (data.patch.x, data.patch.width, depth),
         "Worn depth of both pieces together after "
-        f"{scales.plain(wear.history['cycle'][-1], 4)} cycles, in every strip over the width.",
+        f"{formatting.plain(wear.history['cycle'][-1], 4)} cycles, in every strip over the width.",
     )
 
 
@@ -255,7 +255,7 @@ def _interface(data: RunData) -> Picture | None:
             "resultant force is in colour"
         )
     if charts.part_in_contact(data.patch.x, fields["normal_stress"][0]):
-        length, scale = scales.axis_unit(data.patch.x, "m")
+        length, scale = formatting.axis_unit(data.patch.x, "m")
         caption += (
             ". Only the part in contact is drawn; the whole length is "
             f"{(data.patch.x[-1] - data.patch.x[0]) * scale:.4g} {length}"
@@ -302,7 +302,7 @@ def _bodies(data: RunData) -> Picture | None:
     bodies = data.patch.bodies
     mises = bodies["mises"]
     largest = max(float(np.max(part)) for part in mises)
-    unit, scale = scales.axis_unit([largest], "Pa")
+    unit, scale = formatting.axis_unit([largest], "Pa")
     values = (bodies["x"], bodies["depth"], mises, bodies["pressure"])
     return Picture(
         charts.bodies,
@@ -317,7 +317,7 @@ def _of_mesh(data: RunData) -> str:
     sigma, mine = data.patch.fields["normal_stress"][0], data.patch.bodies["pressure"]
     if sigma.size == mine.size:
         return ""
-    unit, scale = scales.axis_unit([sigma.max()], "Pa")
+    unit, scale = formatting.axis_unit([sigma.max()], "Pa")
     return (
         f" The stress is computed on a mesh, on which the largest pressure is "
         f"{mine.max() * scale:.3g} {unit}; near the narrow pressure peaks of up to "
@@ -423,7 +423,7 @@ def _histories(data: RunData) -> Picture | None:
             else f"{kept} of the samples {'was' if kept == 1 else 'were'} kept."
         )
         what = "turning points and stops were kept, joined by lines." if swings else what
-        unit, scale = scales.axis_unit(history["time"], "s")
+        unit, scale = formatting.axis_unit(history["time"], "s")
         caption += f" Before {begin * scale:.4g} {unit} only {what}"
     # a swing that dies down has no band per cycle: its turns are kept, and the line through them shows it
     return Picture(charts.histories, (history, window, period, title, swings), caption)

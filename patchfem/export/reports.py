@@ -3,8 +3,8 @@
 from pathlib import Path
 
 from ..core import PatchfemError
-from ..disk.whole import fault, write_text
-from .pages import beside, sweep
+from ..disk.atomic_write import fault, write_text
+from .pages import several_runs, sweep
 from .sweeps import page as sweeps
 
 PAGE = "report.html"
@@ -25,9 +25,9 @@ def report_of(folders: list, out: Path | None = None) -> Path:
                             f"{folders[many.index(False)]} is not")
     out = out if out is not None else (folders[0] / PAGE if many[0] and len(folders) == 1 else Path(PAGE))
     if not many[0]:
-        return _written(beside.page([beside.read(folder) for folder in folders]), out)
+        return _written(several_runs.page([several_runs.read(folder) for folder in folders]), out)
     tables = [sweeps.seen_from(sweeps.read_table(folder), folder, out) for folder in folders]
-    names = beside.distinct([folder.resolve().name for folder in folders])
+    names = several_runs.distinct([folder.resolve().name for folder in folders])
     return _written(sweep.page(tables[0] if len(tables) == 1 else sweeps.joined(tables, names)), out)
 
 

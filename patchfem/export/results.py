@@ -9,9 +9,9 @@ import shutil
 from pathlib import Path
 
 from ..core import Missing, PatchfemError
-from ..disk.claim import Claim
+from ..disk.atomic_write import KEPT, unfinished, unmade
 from ..disk.exchange import aside, put, restore, undisturbed
-from ..disk.whole import KEPT, unfinished, unmade
+from ..disk.lock import Claim
 
 PAGE = "report.html"
 INTERFACES, MOST = "interfaces", 6  # fields of interfaces that have a patch of their own; so many of them

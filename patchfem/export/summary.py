@@ -9,8 +9,8 @@ from pathlib import Path
 
 from .. import __version__
 from ..core import Outcome
+from ..disk.atomic_write import write_text
 from ..disk.installed import installed
-from ..disk.whole import write_text
 from ..effects import EFFECTS
 from ..runs.patch import values
 from ..runs.results.result import Result, choices, measure_engines

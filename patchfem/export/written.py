@@ -2,7 +2,7 @@
 
 import re
 
-from ..scales import plain
+from ..formatting import plain
 
 NUMBER = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*)?\Z")
 LONG = 9  # letters of a number from which on a range made it, not a person

@@ -16,7 +16,7 @@ SHARP = 1e-9  # of the range: intervals below it are at round-off, and linear
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Answer:
+class FitIntervals:
     """Intervals of a fit: ends (n, 2), methods, open_ends (n, 2), correlation (n, n), sensitivity (n,), unknown (d, n),
     rows.
 
@@ -32,14 +32,14 @@ class Answer:
     rows: float
 
 
-def nothing(n: int) -> Answer:
+def nothing(n: int) -> FitIntervals:
     """The Answer of a fit of n values whose intervals were not asked for: NaN throughout, method "none"."""
     nan = np.full((n, n), np.nan)
-    return Answer(np.full((n, 2), np.nan), ("none",) * n, np.zeros((n, 2), bool), nan, np.full(n, np.nan),
+    return FitIntervals(np.full((n, 2), np.nan), ("none",) * n, np.zeros((n, 2), bool), nan, np.full(n, np.nan),
                   np.zeros((0, n)), np.nan)
 
 
-def intervals(model: Counted, u, cost: float, descend: Callable, ordered: bool = False) -> Answer:
+def intervals(model: Counted, u, cost: float, descend: Callable, ordered: bool = False) -> FitIntervals:
     """The Answer at the least squares u (n,) of sum of squares `cost`; descend settles the other values of a profile.
 
     A value on a bound is held there in the linear intervals of the others and has a profile of its own. ordered: the
@@ -80,7 +80,7 @@ def intervals(model: Counted, u, cost: float, descend: Callable, ordered: bool =
             probe = u.copy()
             probe[i] = ends[i, side]
             ends[i, side] = model.space.values(probe)[i]
-    return Answer(ends, tuple(methods), open_ends, _correlation(spread, lost), size / np.sqrt(model.rows),
+    return FitIntervals(ends, tuple(methods), open_ends, _correlation(spread, lost), size / np.sqrt(model.rows),
                   _directions(model, u, n, inner, null, size), float(rows))
 
 

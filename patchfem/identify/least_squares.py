@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from ..core import NotConverged, Outcome, frozen_array
-from .intervals import Answer, intervals, nothing
+from .intervals import FitIntervals, intervals, nothing
 from .space import Counted, space, spread_points
 
 QUICK = 1e-4  # change of the sum of squares by a step at which the descent of a quick model ends
@@ -123,7 +123,7 @@ def answered(model: Counted, found: list, bars: str = "rows", starts=None) -> Fi
     return _frozen(model, u, answer, rms, agreed, Outcome.DONE if done or alike > 1 else Outcome.NOT_CONVERGED)
 
 
-def _frozen(model: Counted, u, answer: Answer, rms: float, agreed: int, outcome: Outcome) -> Fit:
+def _frozen(model: Counted, u, answer: FitIntervals, rms: float, agreed: int, outcome: Outcome) -> Fit:
     sides = tuple("low" if x <= 0 else "high" if x >= 1 else "" for x in u)
     return Fit(frozen_array(model.space.values(u)), frozen_array(answer.ends), answer.methods,
                frozen_array(answer.open_ends, bool), frozen_array(answer.correlation), rms,

@@ -11,7 +11,7 @@ from io import IncrementalNewlineDecoder
 from math import isfinite
 from pathlib import Path
 
-from ..faults import Missing, PatchfemError
+from ..exceptions import Missing, PatchfemError
 
 LARGEST = 64 * 2**20  # bytes of text
 BLOCK = 2**17  # bytes read at a time

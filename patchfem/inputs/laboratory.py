@@ -14,7 +14,7 @@ from ..core import Missing, PatchfemError
 from . import matlab, universal
 from .cells import NUMBER, text_of
 from .loops import OWN, own_name
-from .records import LARGEST, UNITS, Channel, Records, Wanted, checked, chosen, factor_of
+from .records import LARGEST, UNITS, Channel, Records, RequestedChannel, checked, chosen, factor_of
 
 UNIVERSAL = (".uff", ".unv", ".uf", ".58")
 ENDINGS = (*UNIVERSAL, ".mat", ".csv", ".txt")
@@ -25,7 +25,7 @@ _COLUMN = re.compile(r"([\w.]+)\(:,\s*([1-9][0-9]*)\)")
 
 
 def read_records(path, asked: list, own: Mapping = OWN) -> Records:
-    """Records over time of a file, in SI; asked: `Wanted` channels, none to take those that say what they are.
+    """Records over time of a file, in SI; asked: `RequestedChannel` channels, none to take those that say what they are.
 
     own: quantity -> the names of `patchfem export` that stand for it, as of `loops.own_name`. PatchfemError names the
     file and what is wanted, Missing where there is no file.
@@ -102,7 +102,7 @@ def _refuse_commas(path, name: str, column) -> None:
 
 
 def _variables(path: Path, asked: list) -> Records:
-    """`Records` of a .mat file; asked: `Wanted`, each with a variable such as `F`, `data(:,2)` or `run.load.F`.
+    """`Records` of a .mat file; asked: `RequestedChannel`, each with a variable such as `F`, `data(:,2)` or `run.load.F`.
 
     Only real arrays are read; nothing in the file is run or unpickled. PatchfemError names what is not there,
     Missing where there is no file.
@@ -121,7 +121,7 @@ def _variables(path: Path, asked: list) -> Records:
                           sorted(asked, key=lambda one: one.quantity != "time")}, [])
 
 
-def _values(path, arrays: dict, one: Wanted, held: str):
+def _values(path, arrays: dict, one: RequestedChannel, held: str):
     found = _COLUMN.fullmatch(one.source)
     name, column = (found[1], int(found[2]) - 1) if found else (one.source, None)
     if name not in arrays:

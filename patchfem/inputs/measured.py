@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from ..faults import PatchfemError
+from ..exceptions import PatchfemError
 from .cells import cells_of, header_of, number_of, text_of
 
 UNITS = {"frequency": {"Hz": 1.0, "kHz": 1e3},

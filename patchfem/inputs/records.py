@@ -37,7 +37,7 @@ class Channel(NamedTuple):
     factor: float | None = None
 
 
-class Wanted(NamedTuple):
+class RequestedChannel(NamedTuple):
     """A channel asked for: what it is (a key of UNITS), which of the file (name, number from 1 or place), its unit or
     ""."""
 
@@ -61,7 +61,7 @@ class Records:
 
 
 def wanted(texts, names=UNITS) -> list:
-    """`Wanted` of texts such as "force=Load cell [lbf]"; several may stand in one text, separated by commas.
+    """`RequestedChannel` of texts such as "force=Load cell [lbf]"; several may stand in one text, separated by commas.
 
     names: those that may be asked for.
 
@@ -80,7 +80,7 @@ def wanted(texts, names=UNITS) -> list:
             factor_of(name, unit, "--map ")
         if name in [one.quantity for one in found]:
             raise PatchfemError(f"--map {name}: given twice")
-        found.append(Wanted(name, source, unit))
+        found.append(RequestedChannel(name, source, unit))
     return found
 
 

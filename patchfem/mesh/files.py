@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from ..core import PatchfemError
-from ..disk.whole import whole
+from ..disk.atomic_write import whole
 from .anymesh import PairMesh, Tagged, pieces
 from .decks import read_inp
 from .pairs import blocks

@@ -16,7 +16,7 @@ from .law import load_of, stretching
 from .model import Model, resolved
 
 if TYPE_CHECKING:
-    from ..scene.changed import Numbered
+    from ..scene.overrides import Numbered
 
 LOADS = ("normal", None, "load"), ("contact", None, "load")  # of the contact of [friction], as `Numbered` has them
 

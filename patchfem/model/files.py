@@ -8,7 +8,7 @@ check otherwise.
 from pathlib import Path
 
 from ..effects import waveform_of
-from ..faults import PatchfemError
+from ..exceptions import PatchfemError
 from ..inputs import measured
 from ..mesh import files
 from ..scene.rules import limits

@@ -11,7 +11,7 @@ import numpy as np
 from ..core import ModalBasis, PatchfemError, Start, frozen_array
 from ..effects import has, module_of, waveform_of
 from ..friction import record
-from ..scene.keys.same import once
+from ..scene.keys.memoize import once
 from ..structure import masses, starts
 from ..structure.modes import basis
 from . import structure_files, structure_reduced

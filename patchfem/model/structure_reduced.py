@@ -6,8 +6,8 @@ from functools import lru_cache
 import numpy as np
 
 from ..core import ModalBasis, PatchfemError
+from ..formatting import plain
 from ..inputs import matrices
-from ..scales import plain
 from ..structure import masses, reduced
 from ..structure.places import AXES
 

@@ -12,7 +12,7 @@ from typing import NamedTuple
 from .errors import coarser_errors, orders
 
 
-class Coarser(NamedTuple):
+class CoarserRuns(NamedTuple):
     """One way in which a run can be coarser.
 
     runs: variants, hashable arguments of `solve`, coarse to coarser; rule(values of the run beside, *values of the
@@ -27,9 +27,9 @@ class Coarser(NamedTuple):
 
 
 def estimate(solve: Callable, fine: dict, ladder, made: dict | None = None) -> tuple:
-    """Errors by measure name, one dict per `Coarser`, and the seconds of the coarser runs.
+    """Errors by measure name, one dict per `CoarserRuns`, and the seconds of the coarser runs.
 
-    solve(variant) -> a run with `values`; fine: measures of the run itself; ladder: of `Coarser`; made: variant -> run,
+    solve(variant) -> a run with `values`; fine: measures of the run itself; ladder: of `CoarserRuns`; made: variant -> run,
     those that are made already; it is filled.
     """
     begin, made = perf_counter(), {} if made is None else made
@@ -58,9 +58,9 @@ def left_open(kinds, errors, runs) -> dict:
     return {"parts": out, "orders": orders(*runs) if len(runs) == 3 else {}}
 
 
-def coarser_space(coarser, beside=None, of: str = "mesh") -> Coarser:
-    """Return the `Coarser` whose one run has a mesh twice as coarse, or fewer modes, at second order.
+def coarser_space(coarser, beside=None, of: str = "mesh") -> CoarserRuns:
+    """Return the `CoarserRuns` whose one run has a mesh twice as coarse, or fewer modes, at second order.
 
-    coarser, beside, of: as in `Coarser`.
+    coarser, beside, of: as in `CoarserRuns`.
     """
-    return Coarser((coarser,), partial(coarser_errors, order=2.0), beside, of)
+    return CoarserRuns((coarser,), partial(coarser_errors, order=2.0), beside, of)

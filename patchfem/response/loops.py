@@ -17,7 +17,7 @@ RESTS = 1e-9  # of the largest rate: slower is at rest
 MOVES = 1e-3  # of the largest step of the slide: a rest has ended, whatever round-off moved in it
 
 
-class Turn(NamedTuple):
+class Reversal(NamedTuple):
     """The largest or the smallest slide of a cycle: its value [m], and the force [N] there.
 
     force is None where the slide rests at it over an end of the window, so that one side of a jump is not known.
@@ -58,7 +58,7 @@ def turns_of(time, slide, rate, force, period: float, by: str = "rate") -> list:
             at += part.start
             if by != "jumps" and share == 0.0 and at in (part.start, part.stop - 1):
                 at, share = _crossed(way * rate, at, at == part.start)
-            pair.append(Turn(way * value, None if at is None else _pull(way * slide, force, at, share, value, by)))
+            pair.append(Reversal(way * value, None if at is None else _pull(way * slide, force, at, share, value, by)))
         out.append(tuple(pair))
     return out
 

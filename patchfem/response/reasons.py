@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..core import Measure, Outcome
-from ..scales import plain
+from ..formatting import plain
 from ..structure.drive_sizes import is_periodic, sinusoidal, whole
 from .measures import lateral
 from .rows import TABLE

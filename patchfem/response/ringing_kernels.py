@@ -7,8 +7,8 @@ off (Giraud, Langou, Rozloznik 2005); a column that the others make up counts fo
 
 from math import cos, exp, inf, sin, sqrt
 
-from ..compiled.inner import njit
-from ..friction.flags_kernels import FAST, LEAN
+from ..compiled.jit import njit
+from ..friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
 EPS = 2.0**-52
 ALIKE = 1e-12  # share of a column that is left beside the others, below which they make it up
@@ -16,7 +16,7 @@ FIRST, MOST = 1e-3, 1e9  # damping of a fit at first and at last
 CLOSE, STILL = 1e-13, 1e-15  # steps over the scales of the poles that end a fit
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def waves(time, poles, columns, first):
     """Fill columns (c, k) from row `first` on with the sinusoids of poles (2 r,) at times (k,) [s]."""
     for r in range(poles.size // 2):
@@ -26,7 +26,7 @@ def waves(time, poles, columns, first):
             columns[first + 2 * r, j], columns[first + 2 * r + 1, j] = fall * cos(turn), fall * sin(turn)
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def dot(a, b):
     """Sum of a (k,) times b (k,)."""
     out = 0.0
@@ -35,14 +35,14 @@ def dot(a, b):
     return out
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def less(a, share, b):
     """Take share times b (k,) from a (k,)."""
     for j in range(a.size):
         a[j] -= share * b[j]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def orthonormal(columns, count, basis, corner):
     """Fill rows of basis with those of columns made orthonormal and corner (count, count) with what makes the columns
     of them: column j = sum corner[i, j] basis[i]. A column that counts for nothing has a basis of zeros."""
@@ -64,7 +64,7 @@ def orthonormal(columns, count, basis, corner):
             own[at] = own[at] / left if corner[j, j] > 0 else 0.0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def projected(value, count, basis, inside, left):
     """Fill left (k,) with what a basis of `count` rows leaves of value (k,), inside (count,) with the shares of it."""
     for at in range(value.size):
@@ -78,7 +78,7 @@ def projected(value, count, basis, inside, left):
         less(left, share, basis[i])
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def numbers_of(count, corner, inside, numbers):
     """Fill numbers (count,) with what the columns are taken times, by their shares in the basis."""
     for i in range(count - 1, -1, -1):
@@ -88,7 +88,7 @@ def numbers_of(count, corner, inside, numbers):
         numbers[i] = part / corner[i, i] if corner[i, i] > 0 else 0.0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def left_over(time, value, poles, columns, few):
     """Fill the room with what sinusoids of these poles leave of value (k,) at times (k,) [s]; its sum of squares."""
     count = few.shape[1]
@@ -99,7 +99,7 @@ def left_over(time, value, poles, columns, few):
     return dot(columns[2, 0], columns[2, 0])
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def derived(time, poles, scale, columns, few, slopes, normal):
     """Fill the slopes (2 r, k) of what is left by poles over scale (2 r,), after Kaufman (1975), and normal (2 r, 2 r +
     1): their products, and last those with what is left."""
@@ -123,7 +123,7 @@ def derived(time, poles, scale, columns, few, slopes, normal):
         normal[r, many] = dot(slopes[r], columns[2, 0])
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def stepped(normal, damping, step, lower):
     """Fill step (m,) with -(N + damping diag N)^-1 pull of normal (m, m + 1), by Cholesky's method; a direction that
     counts for nothing is not taken. lower: room (m, m). Returns pull times the step."""
@@ -157,7 +157,7 @@ def stepped(normal, damping, step, lower):
     return gain
 
 
-@njit(error_model="numpy", cache=True, **LEAN)
+@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def fitted(time, value, poles, scale, ends, room):
     """Fit sinusoids to value (k,) at times (k,) [s] by Levenberg and Marquardt's method: (times that a fit was looked
     at, the sum of squares that the best one leaves).

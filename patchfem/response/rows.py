@@ -13,7 +13,7 @@ import numpy as np
 from ..core import Integrated, Response, Row
 from ..structure import drive_sizes
 from . import stationary
-from .loops import Turn, drift, half_range, interface_loop, secant_stiffness, turns_of
+from .loops import Reversal, drift, half_range, interface_loop, secant_stiffness, turns_of
 from .measures import (
     REST,
     acceleration_peak,
@@ -102,7 +102,7 @@ class Seen:
     def turns(self) -> list:
         """(smallest, largest) Turn of the interface's slide in every whole cycle of the window."""
         if self.own.turns:
-            return [tuple(Turn(*one) for one in pair) for pair in self.own.turns]
+            return [tuple(Reversal(*one) for one in pair) for pair in self.own.turns]
         w = self.samples
         return turns_of(w.time, w.slide, w.slide_rate, w.force, self.drive.period, self.by)
 

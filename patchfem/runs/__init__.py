@@ -16,5 +16,5 @@ module imports its own entry of this list and the entries before it:
 11. `plan`  what would run: engine, sizes, cost
 12. `self_checks`  two routes to one number: what a run notices by itself
 13. `run`  a plan becomes a result
-14. `many`  many models at once
+14. `batch`  many models at once
 """

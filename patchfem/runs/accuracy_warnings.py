@@ -12,8 +12,8 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 from ..effects import has
+from ..formatting import plain
 from ..response import rows
-from ..scales import plain
 from .patch import faces, ladder, press
 from .results import notes, patch_rows
 from .rig import costs, engines

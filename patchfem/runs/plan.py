@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from math import inf
 
-from .. import compiled, rates
+from .. import compiled, cost_model
 from ..core import Missing, PatchfemError, say
 from ..effects import EFFECTS, has
 from ..friction import record
@@ -176,7 +176,7 @@ def _cost(model: Model, per_point: bool) -> Cost:
         motion = of_rig.cost(model, per_point, points)
     elif model.kind == "bench":
         motion = of_bench.cost(model, points)
-    total = Cost({"start": rates.START}, (MemoryPart(PACKAGES, "packages"),)) + pressing + motion
+    total = Cost({"start": cost_model.START}, (MemoryPart(PACKAGES, "packages"),)) + pressing + motion
     if model.wear is not None and model.patch is not None:
         total += of_wear.cost(model, points, motion.times["motion"] + motion.times.get("histories", 0.0))
     return replace(total, parts=tuple(sorted((part for part in total.parts if part.bytes > 0), reverse=True)))

@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import compiled
 from ..core import Measure, NotConverged, Outcome
-from ..dynamics import resume
+from ..dynamics import checkpoint
 from ..model.model import Model
 from ..model.source import placed
 from . import joint
@@ -163,7 +163,7 @@ def _keeping(kept: KeptState | None, what: Plan, patch):
 
     if kept.resume and model.wear is None and not path(1).is_file():
         raise evolve.nothing_kept(kept.path)
-    return resume.keeping(resume.Keeper(path, state_key(model, patch, kept.version), kept.resume))
+    return checkpoint.keeping(checkpoint.Keeper(path, state_key(model, patch, kept.version), kept.resume))
 
 
 def state_key(model, patch, version: str) -> str:

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 from ..core import say
 from ..effects import has
+from ..formatting import plain
 from ..model.model import Model
-from ..scales import plain
 from ..structure import drive_sizes
 from .bench import engine as bench_engine
 from .patch import grids as patch_grids

@@ -10,8 +10,8 @@ from typing import Any, Literal, get_args, get_origin
 
 from pydantic import ValidationError
 
-from ..faults import PatchfemError
-from . import meant
+from ..exceptions import PatchfemError
+from . import suggestions
 from .keys import quantities, removed
 from .keys.contact import Material
 from .keys.tables import Tables
@@ -352,7 +352,7 @@ def _unknown(draft: Draft, model: type[Table], raw: dict[str, Any], key: str, pa
     there = path in draft.sets
     written = {name: raw[name] for name in (*keys(model), key)
                if name in raw and (not there or f"{at}.{name}".strip(".") in draft.sets)}
-    near = meant.table_meant(model, written, key) if is_table else meant.key_meant(model, at, written, key, there)
+    near = suggestions.table_meant(model, written, key) if is_table else suggestions.key_meant(model, at, written, key, there)
     # one that stands outside of every table, as --set may be given it, is meant where a table has it
     deeper = [] if at or is_table else [f"{name}.{key}" for name in tables
                                         if key in keys(model_of(model, keys(model)[name]))]

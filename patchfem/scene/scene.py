@@ -15,21 +15,21 @@ from pathlib import Path
 from textwrap import shorten
 from typing import Any
 
-from ..disk.opened import reading
+from ..disk.open_with_timeout import reading
 from ..effects import MOST_COORDINATES, takes
 from . import axes
 from .keys import tables
-from .keys.same import once
+from .keys.memoize import once
 from .keys.types import keys as keys_of
 from .lines import DEEPEST, TooDeep, key_lines, place_of
 from .reader import Draft, SceneError, apply_set
 from .rules.accuracy import knobs_unused
 from .rules.check import check
-from .rules.draft import ASPERITIES, LAWS, SLIDES, unused
 from .rules.drive import drive_unused, waveform_unused
 from .rules.friction import kinetic_unused, rest_speed_unused, temperature_unused
 from .rules.limits import combinations, not_yet_built
 from .rules.methods import method_unused
+from .rules.scene_draft import ASPERITIES, LAWS, SLIDES, unused
 from .rules.structure import unseen
 from .sets import assignments, sized
 from .text import effects, toml

@@ -10,7 +10,7 @@ from .keys.materials import MATERIALS
 from .keys.quantities import KINDS, NUMBER
 from .keys.tables import Tables
 from .keys.types import Table, keys, kind_of, meaning, model_of, whole_tables
-from .rules.draft import SELECTORS, each
+from .rules.scene_draft import SELECTORS, each
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 SPELLED = {"u": "[uµμ]", "^2": "(?:\\^2|²)", "^3": "(?:\\^3|³)", " ": "[ ·]"}

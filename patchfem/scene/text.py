@@ -8,12 +8,12 @@ from functools import cache
 from typing import Any
 
 from .keys.contact import Material, OnePiece
+from .keys.memoize import once
 from .keys.quantities import format_si
-from .keys.same import once
 from .keys.tables import Accuracy, Drive, Interface, Measured, Tables
 from .keys.types import Table, keys, kind_of, model_of
-from .rules.draft import SELECTORS, unused
 from .rules.drive import drive_unused, waveform_unused
+from .rules.scene_draft import SELECTORS, unused
 
 _SELECTORS = ("kind", "law", "reading", "waveform")
 

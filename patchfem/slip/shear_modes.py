@@ -434,14 +434,14 @@ def _backbone(limit, shape, values, length, slides, start) -> tuple:
     No step takes a point further back than BACK lengths, where the law is so steep that Newton does not come back. NaN
     where it does not come to an end.
     """
-    b, going, r = start, np.arange(slides.size), values.size
+    b, unconverged, r = start, np.arange(slides.size), values.size
     first, second = np.tril_indices(r)
     products, upper = (shape.T[first] * shape.T[second]).T, np.empty((r, r), np.int64)
     upper[first, second] = upper[second, first] = np.arange(first.size)
     for _ in range(400):
-        xi = slides[going, None] - b[going] @ shape.T
+        xi = slides[unconverged, None] - b[unconverged] @ shape.T
         decay = np.exp(np.minimum(-xi / length, 700.0))
-        missing = b[going] / values - (limit * (1 - decay)) @ shape
+        missing = b[unconverged] / values - (limit * (1 - decay)) @ shape
         tangent = ((limit * decay / length) @ products)[:, upper] + np.diag(1 / values)
         try:
             step = np.linalg.solve(tangent, missing[:, :, None])[:, :, 0]
@@ -450,11 +450,11 @@ def _backbone(limit, shape, values, length, slides, start) -> tuple:
         change = step @ shape.T  # of xi
         part = np.where(change < 0, (xi + BACK * length) / np.where(change < 0, -change, 1.0), 1.0).min(axis=1)
         part = np.where((part > 0) & (part < 1), part, 1.0)
-        b[going] -= part[:, None] * step
-        size = np.abs(b[going]).max(axis=1) + 1e-300
-        going = going[~((part == 1.0) & (np.abs(step).max(axis=1) <= 1e-11 * size))]  # quadratic: the next is round-off
-        if not going.size:
+        b[unconverged] -= part[:, None] * step
+        size = np.abs(b[unconverged]).max(axis=1) + 1e-300
+        unconverged = unconverged[~((part == 1.0) & (np.abs(step).max(axis=1) <= 1e-11 * size))]  # quadratic: the next is round-off
+        if not unconverged.size:
             break
     out = -np.expm1(np.minimum(-(slides[:, None] - b @ shape.T) / length, 700.0)) @ limit
-    out[going] = np.nan
+    out[unconverged] = np.nan
     return out, b

@@ -113,7 +113,7 @@ ITEMS = (
     Item("4.A, Fig. 25", "titanium pieces with a coating of 6 mil tungsten carbide", RIG, "studies/patch/from_file.py",
          "tests/elasticity/test_elasticity.py", "works"),
     Item("4.A", "the normal load is varied by changing the weight", RIG, "",
-         "tests/runs/many/test_patches.py", "works"),
+         "tests/runs/batch/test_patches.py", "works"),
     Item("4.B, Fig. 26", "modal test without friction: 143 Hz, damping ratio 0.003", RIG, _figure("_26"), MODAL,
          "works"),
     Item("4.B", "rocking at 73 Hz and yaw at 129 Hz, in addition to the axial mode", RIG, "studies/table_1/unfitted.py",

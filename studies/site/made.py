@@ -24,9 +24,9 @@ from reference import tried
 import patchfem as pf
 from patchfem.commands.sources import SOURCES
 from patchfem.effects import EFFECTS, LAWS
+from patchfem.formatting import told
 from patchfem.response.rows import ROWS as MOTION
 from patchfem.runs.results.patch_rows import ROWS as STATIC
-from patchfem.scales import told
 from patchfem.scene.keys.types import keys, meaning
 
 ROOT = Path(__file__).parents[2]

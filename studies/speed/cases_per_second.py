@@ -36,12 +36,12 @@ from peer import Peer, run, timed
 from rig_texts import TEXTS
 from switched import PROBLEMS, follow
 
-from patchfem.campaigns.sweeps.asked import Asked
+from patchfem.campaigns.sweeps.case_models import Asked
 from patchfem.campaigns.sweeps.cases import Cases
-from patchfem.campaigns.sweeps.executors import Here
+from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.core import Missing
 from patchfem.export.sweeps.run import swept
-from patchfem.runs.many import many
+from patchfem.runs.batch import batches
 from patchfem.scene.axes import values_of
 from patchfem.scene.scene import loads
 
@@ -130,17 +130,17 @@ def by_patchfem(cases: np.ndarray):
     """Answers of the cases from the values of their keys on, by this process: by lanes where they are many."""
     axes = [values_of(key, map(repr, column), False) for key, column in zip(
         ("friction.static", "structure.mode.block.damping"), cases.T.tolist())]
-    return swept(Asked(Path("block.toml"), SCENE), Cases(tuple(axes), True), Here())
+    return swept(Asked(Path("block.toml"), SCENE), Cases(tuple(axes), True), LocalExecutor())
 
 
 def by_exact(cases: np.ndarray):
     """The same by the exact engine alone, in its batch."""
-    lanes = many.BATCHES
-    many.BATCHES = tuple(one for one in lanes if one.name != "lumped.lanes")
+    lanes = batches.BATCHES
+    batches.BATCHES = tuple(one for one in lanes if one.name != "lumped.lanes")
     try:
         return by_patchfem(cases)
     finally:
-        many.BATCHES = lanes
+        batches.BATCHES = lanes
 
 
 def top(slide: np.ndarray) -> float:
@@ -236,7 +236,7 @@ def of_family(name: str, count: int, seed: int):
     r = np.random.default_rng(seed)
     axes = [values_of(key, [f"{one!r} {UNITS.get(key, '')}".strip() for one in draw(r, count).tolist()], False)
             for key, draw in keys.items()]
-    return swept(Asked(RIG, text), Cases(tuple(axes), True), Here())
+    return swept(Asked(RIG, text), Cases(tuple(axes), True), LocalExecutor())
 
 
 def families(seed: int = 1, names=tuple(FAMILIES), goes: int = 3, share: float = 1.0) -> list[dict]:

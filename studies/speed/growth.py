@@ -97,15 +97,15 @@ def once(axis: str, size: int) -> dict:
 
 def swept(count: int, place: Path) -> None:
     """A sweep of so many cases, a power of ten, into a folder."""
-    from patchfem.campaigns.sweeps import ask
-    from patchfem.campaigns.sweeps.executors import Here
+    from patchfem.campaigns.sweeps import parse_request
+    from patchfem.campaigns.sweeps.executors import LocalExecutor
     from patchfem.export.sweeps.run import Place, sweep_into
 
     place.mkdir()
     (place / "rig.toml").write_text(rig())
     first, second = {100: (2, 5), 1000: (5, 10)}.get(count, (10, 10))
     over = [text.format(first, second, count // (first * second)) for text in GRID]
-    sweep_into(*ask.asked_of(place / "rig.toml", (), ask.Request(over)), Place(place / "out", keep="none"), Here())
+    sweep_into(*parse_request.asked_of(place / "rig.toml", (), parse_request.Request(over)), Place(place / "out", keep="none"), LocalExecutor())
 
 
 def row(axis: str, size: int) -> dict:

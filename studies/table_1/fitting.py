@@ -13,7 +13,7 @@ from rungs import CONTAINS, HELD, HERE, ROOT2, RUNGS, SCREEN, SEED, STUCK, TABLE
 
 from patchfem.campaigns.rows.cells import cells_of, scores
 from patchfem.campaigns.rows.computed import Computed
-from patchfem.campaigns.rows.nulls import predicted
+from patchfem.campaigns.rows.null_models import predicted
 from patchfem.campaigns.rows.search import residual_of
 from patchfem.core import G_N
 from patchfem.identify.least_squares import NEAR, descents

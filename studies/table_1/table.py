@@ -17,7 +17,7 @@ from fitting import NULLS as RIVALS
 from rungs import EACH, HERE, ROOT2, RUNGS, STUCK, TABLE, variants
 
 from patchfem.campaigns.rows.cells import cells_of, scores
-from patchfem.campaigns.rows.nulls import NULLS, predicted
+from patchfem.campaigns.rows.null_models import NULLS, predicted
 
 UNITS = {"static": "", "stiffness": "MN/m", "damping": "kN s/m", "slide": "", "accelerometer": "", "load": "N",
          "amplitude": "um", "acceleration_gain": "", "share": "", "mass": "", "factor": ""}

@@ -10,7 +10,7 @@ from command_line import cli
 from scene_texts import BENCH, PIECE
 
 import patchfem as pf
-from patchfem.campaigns import knobs
+from patchfem.campaigns import numerical_settings
 from patchfem.campaigns.cost import TOLERANCE, Cost, cheapest, curve, quickest, sentence
 from patchfem.export.cost import lines_of
 from patchfem.model.model import build
@@ -41,7 +41,7 @@ def made(label, seconds, error, distance=None, value=1.0):
 @pytest.mark.share(0)
 @pytest.mark.parametrize("keys, own", [('element_size = "0.25 mm"', "249 um"), ("", "0.03")])
 def test_exact_the_error_at_the_setting_of_the_scene_is_that_of_its_run(keys, own, monkeypatch):
-    monkeypatch.setattr(knobs, "TOLERANCES", (1e-1, 1e-2))
+    monkeypatch.setattr(numerical_settings, "TOLERANCES", (1e-1, 1e-2))
     mine = model(keys, 0.03)
     found = next(one for one in curve(mine, "element_size") if own in one.label)  # of equal runs one names them all
     stated = run(mine, fresh=True).measures
@@ -156,5 +156,5 @@ def test_exact_a_bench_without_pieces_has_the_steps_as_its_knob():
     """A law with a memory and one without; settings that gave the same run would be one."""
     for text in (BENCH, BENCH.replace('law = "coulomb"', 'law = "nonlocal"\nbond_length = "1 um"')):
         found = build(loads(text))
-        assert knobs.knobs_of(found) == ["steps_per_cycle"]
+        assert numerical_settings.knobs_of(found) == ["steps_per_cycle"]
     assert len(curve(found, "steps_per_cycle")) > 2

@@ -9,8 +9,8 @@ from scene_texts import DRIVE, KILOGRAM, PIECE, POINT, friction_of
 
 import patchfem as pf
 from patchfem.campaigns.fits.patch import Curves, fit_law, fit_patch
+from patchfem.formatting import plain, short
 from patchfem.friction.record import loop_from
-from patchfem.scales import plain, short
 from patchfem.scene.keys.tables import Friction
 
 SLIDE = '[slide]\nkind = "triangle"\namplitude = "10 um"\nspeed = "5 mm/s"\n'

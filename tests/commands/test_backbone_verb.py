@@ -8,7 +8,7 @@ import pytest
 import xarray as xr
 from scene_texts import IWAN, shaken
 
-from patchfem import scales
+from patchfem import formatting
 from patchfem.__main__ import main
 from patchfem.campaigns.backbone.records import Backbone, Curve, LossExponents, ModeFrequencies
 from patchfem.export.backbone import drawn, page
@@ -45,8 +45,8 @@ def test_exact_files_and_the_answer_hold_the_same_numbers(scene, capsys):
     assert json.loads((folder / "backbone.json").read_text("utf-8")) == answer
     page = (folder / "report.html").read_text("utf-8")
     assert "Frequency and damping against amplitude" in page
-    ends = [f"{scales.told(one['frequency'][k], one['frequency_error'][k], unit='Hz')}, damping ratio "
-            f"{scales.told(one['damping'][k], one['damping_error'][k])}" for one in [curve] for k in (0, -1)]
+    ends = [f"{formatting.told(one['frequency'][k], one['frequency_error'][k], unit='Hz')}, damping ratio "
+            f"{formatting.told(one['damping'][k], one['damping_error'][k])}" for one in [curve] for k in (0, -1)]
     assert f"<div class=verdict><b>Mode axial at 10 um: {ends[0]}; at 1 mm: {ends[1]}.</b>" in page
     assert (folder / "backbone.svg").read_text("utf-8").startswith("<svg")
 

@@ -14,7 +14,7 @@ import patchfem as pf
 from patchfem.__main__ import SCREEN, app, known
 from patchfem.commands import shared
 from patchfem.core import Measure, Outcome
-from patchfem.export.pages.words import (
+from patchfem.export.pages.sentences import (
     GROUPS,
     SHARP,
     group_of,

@@ -22,7 +22,7 @@ from patchfem.commands.sweep import Progress
 from patchfem.export.summary import summary_of
 from patchfem.export.sweeps.folder import TABLES, Folder
 from patchfem.export.sweeps.page import read_table
-from patchfem.runs.many import many
+from patchfem.runs.batch import batches
 
 RIG = POINT + COULOMB + SHORT
 LOADS, LEVELS = ["10 N", "26 lbf", "-1 N"], ["1 g", "5 g"]
@@ -118,8 +118,8 @@ def test_exact_the_table_of_a_scene_says_the_same(swept, tmp_path):
 
 
 def test_exact_a_resumed_sweep_runs_what_is_missing(swept, scene, tmp_path, monkeypatch):
-    ran, real = [], many.answers
-    monkeypatch.setattr(many, "answers", lambda models, *more: ran.extend(
+    ran, real = [], batches.answers
+    monkeypatch.setattr(batches, "answers", lambda models, *more: ran.extend(
         model for model in models if isinstance(model, pf.Model)) or real(models, *more))
     out = tmp_path / "swept"
     assert cli("sweep", scene, "--over", "normal.load=10 N,-1 N", *OVER[2:], "-o", out).code == 3
@@ -152,7 +152,7 @@ def test_refuses_to_resume_into_a_whole_sweep_of_another(scene, tmp_path, change
 
 
 def test_exact_an_interrupt_keeps_what_is_done(swept, scene, tmp_path, monkeypatch):
-    real, left = many.answers, [2]
+    real, left = batches.answers, [2]
 
     def stops(models, *more):
         if not left[0]:
@@ -160,7 +160,7 @@ def test_exact_an_interrupt_keeps_what_is_done(swept, scene, tmp_path, monkeypat
         left[0] -= 1
         return real(models, *more)
 
-    monkeypatch.setattr(many, "answers", stops)
+    monkeypatch.setattr(batches, "answers", stops)
     monkeypatch.setattr(sweep, "SPAN", 0.0)  # a case a chunk, each of which comes too soon to be stopped within
     out = tmp_path / "swept"
     answer = cli("sweep", scene, *OVER, "-o", out)
@@ -171,7 +171,7 @@ def test_exact_an_interrupt_keeps_what_is_done(swept, scene, tmp_path, monkeypat
     assert told["cases"]["unfinished"] == 6 - held
     assert f"({6 - held} of 6 cases ha{'s' if held == 5 else 've'} no result yet" in told["answer"]
     assert (out / "report.html").is_file()
-    monkeypatch.setattr(many, "answers", real)
+    monkeypatch.setattr(batches, "answers", real)
     text = "cases already have an answer from an interrupted sweep"
     copied = tmp_path / "copied"
     shutil.copytree(out, copied)
@@ -184,19 +184,19 @@ def test_exact_an_interrupt_keeps_what_is_done(swept, scene, tmp_path, monkeypat
 
 
 def test_exact_older_tables_are_none_while_cases_are_answered(scene, tmp_path, monkeypatch):
-    out, real = tmp_path / "swept", many.answers
+    out, real = tmp_path / "swept", batches.answers
     assert cli("sweep", scene, "--over", "friction.static=0.1,0.2", "-o", out).code == 0
 
     def stops(*given):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(many, "answers", stops)
+    monkeypatch.setattr(batches, "answers", stops)
     assert cli("sweep", scene, "--over", "friction.static=0.2,0.3", "-o", out, "--resume").code == 130
     assert {one.name for one in out.iterdir()} == {"cases", "chunks", *TABLES}
     assert [(row["friction.static"], row["outcome"] != "") for row in rows(out)] == [("0.2", True), ("0.3", False)]
     assert cli("sweep", scene, "--over", "friction.static=0.4", "-o", out, "--resume").code == 130  # nothing to tell
     assert {one.name for one in out.iterdir()} == {"cases", "chunks", *(f"{name}.partial" for name in TABLES)}
-    monkeypatch.setattr(many, "answers", real)
+    monkeypatch.setattr(batches, "answers", real)
     assert cli("sweep", scene, "--over", "friction.static=0.2,0.3", "-o", out, "--resume").code == 0
     assert [row["friction.static"] for row in rows(out)] == ["0.2", "0.3"]
     assert {one.name for one in out.iterdir()} == {"cases", "chunks", *TABLES}
@@ -226,8 +226,8 @@ def test_refuses_a_second_writer(scene, tmp_path, monkeypatch):
 
 
 def test_exact_shards_make_the_same_files(swept, scene, tmp_path, monkeypatch):
-    out, ran, real = tmp_path / "swept", [], many.answers
-    monkeypatch.setattr(many, "answers", lambda models, *more: ran.extend(models) or real(models, *more))
+    out, ran, real = tmp_path / "swept", [], batches.answers
+    monkeypatch.setattr(batches, "answers", lambda models, *more: ran.extend(models) or real(models, *more))
     for part in ("2/4", "1/4", "4/4"):
         assert cli("sweep", scene, *OVER, "-o", out, "--shard", part).code == 0
     early = cli("sweep", scene, *OVER, "-o", out, "--collect")
@@ -379,7 +379,7 @@ def test_exact_the_answer_begins_with_the_measure_that_is_asked_for(tmp_path):
     (["", ""], 0, "2 cases"), (["not_converged", ""], 3, "1 not_converged"), (["", "failed"], 3, "case 2: it broke"),
     (["failed", "failed"], 2, "no case could be run")])
 def test_exact_the_exit_code_says_how_cases_ended(scene, tmp_path, monkeypatch, ends, code, says):
-    left, real = list(ends), many.answers
+    left, real = list(ends), batches.answers
 
     def ended(models, *more):
         found = real(models, *more)
@@ -390,7 +390,7 @@ def test_exact_the_exit_code_says_how_cases_ended(scene, tmp_path, monkeypatch, 
                 found.outcome[case] = end
         return found
 
-    monkeypatch.setattr(many, "answers", ended)
+    monkeypatch.setattr(batches, "answers", ended)
     answer = cli("sweep", scene, "--over", "friction.static=0.1,0.2", "-o", tmp_path / "a")
     assert answer.code == code and says in answer.out + answer.err
 

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from pieces import LENGTH, LOAD, WIDTH, coated_pair, rough
 
 from patchfem.contact import unilateral
-from patchfem.contact.active_set import Ask, Operator, settle
+from patchfem.contact.active_set import ContactProblem, Operator, settle
 from patchfem.contact.gaps import crown, tilt
 from patchfem.contact.gradients import nearest
 from patchfem.contact.unilateral import SOLVED, press, press_by, solve, undetermined
@@ -241,7 +241,7 @@ CYCLE = 1e-9 * np.array([[144.0, -60, 108], [-60, 54, -69], [108, -69, 101]])  #
 
 def test_exact_sets_that_come_back_are_left_to_the_gradients():
     gap, x = np.array([2e-9, -8e-9, 8e-9]), np.array([-1e-3, 0, 1e-3])
-    ask = Ask(x, gap)
+    ask = ContactProblem(x, gap)
     for start in (gap < 0, np.ones(3, bool)):
         assert settle(Operator(CYCLE), ask, start)[0] is None
     state = press_by(pair_on(x, CYCLE), gap + 8e-9, 8e-9)
@@ -257,7 +257,7 @@ CONTROLS = {"load": (LOAD, None, 0.0), "line": (LOAD, 2e-3 * LOAD, 0.0), "spring
 def test_exact_answers_do_not_change_where_every_set_comes_back(control, monkeypatch):
     pair = coated_pair(100)
     gap = rough(np.random.default_rng(3), pair.interface.x, 1e-6)
-    ask = Ask(pair.interface.x, gap - (0.0 if control[0] else gap.min() + 1e-7), *control)
+    ask = ContactProblem(pair.interface.x, gap - (0.0 if control[0] else gap.min() + 1e-7), *control)
     wanted = solve(Operator(pair.normal), ask)
     monkeypatch.setattr(unilateral, "settle", lambda _, ask, start, limit: (None, start, 1))
     found = solve(Operator(pair.normal), ask)
@@ -267,7 +267,7 @@ def test_exact_answers_do_not_change_where_every_set_comes_back(control, monkeyp
 
 def test_refuses_to_return_what_did_not_converge(monkeypatch):
     pair = coated_pair(100)
-    wrong = solve(Operator(pair.normal), Ask(pair.interface.x, np.zeros(101), LOAD))
+    wrong = solve(Operator(pair.normal), ContactProblem(pair.interface.x, np.zeros(101), LOAD))
     for bad in (wrong._replace(closing=wrong.closing * (1 + 1e-9)), wrong._replace(force=wrong.force * (1 + 1e-9))):
         monkeypatch.setattr(unilateral, "solve", lambda *_, bad=bad: bad)
         with pytest.raises(NotConverged, match="exceeds 1e-12"):

@@ -13,11 +13,11 @@ from scene_texts import BENCH
 
 from patchfem.core import Missing
 from patchfem.disk import exchange
-from patchfem.disk.claim import HELD, HOST, Claim, alive, started
+from patchfem.disk.lock import HELD, HOST, Claim, alive, started
 from patchfem.export.results import Folder
 from patchfem.export.sweeps.folder import Folder as SweepFolder
 from patchfem.export.sweeps.folder import Writer
-from patchfem.runs.many.answers import Answers
+from patchfem.runs.batch.case_results import CaseResults
 
 PYTHON = [sys.executable, "-c"]
 # each of several processes tries to own every file, all at the same instants
@@ -25,7 +25,7 @@ RACE = """\
 import sys
 from pathlib import Path
 from patchfem.core import Missing
-from patchfem.disk.claim import Claim
+from patchfem.disk.lock import Claim
 place, count = Path(sys.argv[1]), int(sys.argv[2])
 print("ready", flush=True)
 sys.stdin.readline()
@@ -41,7 +41,7 @@ sys.stdin.readline()  # owners live on until all have tried
 HOLD = """\
 import sys
 from pathlib import Path
-from patchfem.disk.claim import Claim
+from patchfem.disk.lock import Claim
 Claim(Path(sys.argv[1]), "out", "run").take()
 print("taken", flush=True)
 sys.stdin.readline()
@@ -158,7 +158,7 @@ def test_refuses_a_second_sweep_and_leaves_the_first_its_folder(tmp_path):
         with pytest.raises(Missing, match="another sweep"), SweepFolder(tmp_path / "out", [1]):
             pass
         writer = Writer(tmp_path / "out", "out", first.chunks.names, "summaries", first.token)
-        assert writer([0], Answers.blank(1), ["{}"])
+        assert writer([0], CaseResults.blank(1), ["{}"])
     assert names(tmp_path / "out" / "cases" / f"{1:016x}") == {"summary.json"}
     assert len(names(tmp_path / "out" / "chunks")) == 1
 

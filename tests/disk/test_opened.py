@@ -7,7 +7,7 @@ import time
 import pytest
 
 from patchfem.campaigns.sweeps.table import read
-from patchfem.disk import opened
+from patchfem.disk import open_with_timeout
 from patchfem.scene import scene
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="this system has no named pipes")
@@ -38,7 +38,7 @@ def test_exact_a_pipe_that_begins_late_and_pauses_is_read_whole(pipe):
 
 def test_refuses_a_pipe_that_nobody_writes_to(pipe, monkeypatch):
     """It once held `check` and every other verb for ever."""
-    monkeypatch.setattr(opened, "PATIENCE", 0.1)
+    monkeypatch.setattr(open_with_timeout, "PATIENCE", 0.1)
     with pytest.raises(scene.SceneError, match=r"x\.toml: cannot be read: this is a pipe, and no data came"):
         scene.text_of(pipe)
     assert read(pipe)[1] == [f"{pipe}: cannot be read: this is a pipe, and no data came through it within 0 s"]
@@ -52,7 +52,7 @@ def test_always_a_system_without_such_pipes_reads_its_files(tmp_path, monkeypatc
     monkeypatch.delattr(os, "O_NONBLOCK")
     monkeypatch.setattr(os, "set_blocking", refused)
     (tmp_path / "x.toml").write_bytes(b"a = 1\r\n\x1a")
-    with opened.reading(tmp_path / "x.toml") as file:
+    with open_with_timeout.reading(tmp_path / "x.toml") as file:
         assert file.read() == b"a = 1\r\n\x1a"
 
 
@@ -60,5 +60,5 @@ def test_exact_what_cannot_be_read_is_closed(tmp_path):
     before = len(os.listdir("/dev/fd"))
     for _ in range(3):
         with pytest.raises(IsADirectoryError):
-            opened.reading(tmp_path)
+            open_with_timeout.reading(tmp_path)
     assert len(os.listdir("/dev/fd")) == before

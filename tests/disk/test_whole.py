@@ -16,7 +16,7 @@ from limits import limited
 from scene_texts import BENCH, COATED
 
 from patchfem.core import Missing
-from patchfem.disk.whole import PLACED, beside, room, sturdy, unfinished, whole, write_inside, write_text
+from patchfem.disk.atomic_write import PLACED, beside, room, sturdy, unfinished, whole, write_inside, write_text
 
 SIZES = [1 << 10, 1 << 14, 1 << 16]
 

@@ -80,7 +80,7 @@ def test_elastic_plastic_elements_have_a_cycle_that_lasts_and_one_that_does_not(
 
     def swing(amplitude: float) -> float:
         """The next largest displacement of a swing that has slid from -amplitude to amplitude."""
-        slid = np.minimum(yields, amplitude)
+        slip_path = np.minimum(yields, amplitude)
 
         def along(t, y):
             held = (np.abs(y[2:]) < yields) | (y[2:] * y[1] < 0)
@@ -90,7 +90,7 @@ def test_elastic_plastic_elements_have_a_cycle_that_lasts_and_one_that_does_not(
         def stops(t, y):
             return y[1]
 
-        stops.terminal, state, at = True, np.array([amplitude, 0.0, *slid]), 0.0
+        stops.terminal, state, at = True, np.array([amplitude, 0.0, *slip_path]), 0.0
         for direction in (1.0, -1.0):
             stops.direction = direction
             state[1] = -direction * 1e-12

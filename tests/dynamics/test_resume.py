@@ -15,22 +15,22 @@ from limits import limited
 from march_paths import share_one_loop
 from scene_texts import BENCH, COATED, DRIVE, FORCED, GROWING, MODE, NONLOCAL, PAIR, PLASTIC, POINT, SECOND
 
-from patchfem.dynamics import resume
+from patchfem.dynamics import checkpoint
 from patchfem.dynamics.march import march
 from patchfem.export.results import is_state
 
 MARCH = '[accuracy]\nmethod = "march"\nsteps_per_cycle = 60\n'
-FAST = DRIVE.replace("cycles = 30", "cycles = 16.3")
+FASTMATH_FLAGS = DRIVE.replace("cycles = 30", "cycles = 16.3")
 RIGS = {
-    "one slide": POINT + PLASTIC + MODE + SECOND + FAST + MARCH,
-    "a list of bonds": POINT + NONLOCAL + "order = 0.5\n" + MODE + FAST + MARCH,
-    "bonds that grow": POINT + GROWING + MODE + FAST + MARCH,
+    "one slide": POINT + PLASTIC + MODE + SECOND + FASTMATH_FLAGS + MARCH,
+    "a list of bonds": POINT + NONLOCAL + "order = 0.5\n" + MODE + FASTMATH_FLAGS + MARCH,
+    "bonds that grow": POINT + GROWING + MODE + FASTMATH_FLAGS + MARCH,
     "joints": PAIR + FORCED.replace("cycles = 25", "cycles = 14") + MARCH,
-    "a load that swings": POINT + 'amplitude = "20 N"\nfrequency = "50 Hz"\n' + PLASTIC + MODE + FAST + MARCH,
+    "a load that swings": POINT + 'amplitude = "20 N"\nfrequency = "50 Hz"\n' + PLASTIC + MODE + FASTMATH_FLAGS + MARCH,
     "levels": POINT + PLASTIC + MODE + DRIVE.replace("cycles = 30", 'cycles = 8').replace(
         'acceleration = "5 g"', 'waveform = "levels"\nlevels = ["3 g", "6 g", "4 g"]') + MARCH,
     "a patch that pitches": COATED.replace("0.5 mm", "1.5 mm") + '[contact.crown]\nradius = "100 m"\n' + PLASTIC + MODE
-                            + 'pitch = "1 rad/m"\n' + FAST.replace("16.3", "12") + MARCH,
+                            + 'pitch = "1 rad/m"\n' + FASTMATH_FLAGS.replace("16.3", "12") + MARCH,
 }
 
 
@@ -38,7 +38,7 @@ RIGS = {
 def often(monkeypatch):
     """Marches keep their state after every second cycle; the list has a number per state."""
     monkeypatch.setattr(march, "PIECES", 2)
-    saved, save = [], resume.save
+    saved, save = [], checkpoint.save
 
     def counted(*of):
         saved.append(1)
@@ -46,9 +46,9 @@ def often(monkeypatch):
         if len(saved) == often.stop:
             raise KeyboardInterrupt
 
-    monkeypatch.setattr(resume, "SECONDS", 0.0)
-    monkeypatch.setattr(resume, "SHARE", np.inf)
-    monkeypatch.setattr(resume, "save", counted)
+    monkeypatch.setattr(checkpoint, "SECONDS", 0.0)
+    monkeypatch.setattr(checkpoint, "SHARE", np.inf)
+    monkeypatch.setattr(checkpoint, "save", counted)
     often = type("Often", (), {"saved": saved, "stop": 0})()
     return often
 
@@ -128,7 +128,7 @@ def test_always_a_march_goes_on_where_its_state_has_no_room(tmp_path, often):
 
 
 def test_always_a_short_march_keeps_nothing(tmp_path, monkeypatch):
-    monkeypatch.setattr(resume, "save", lambda *of: 1 / 0)
+    monkeypatch.setattr(checkpoint, "save", lambda *of: 1 / 0)
     (tmp_path / "scene.toml").write_text(RIGS["one slide"], "utf-8")
     assert cli("run", tmp_path / "scene.toml", "--no-page", "-o", tmp_path / "out").code == 0
 
@@ -140,7 +140,7 @@ def test_exact_a_batch_queue_may_end_it_and_it_goes_on(tmp_path, number):
     """In a process of its own that marches every cycle; one that is killed says nothing and leaves its state too."""
     scene, out = tmp_path / "scene.toml", tmp_path / "out"
     scene.write_text(RIGS["one slide"].replace("cycles = 16.3", "cycles = 4000"), "utf-8")
-    code = "from patchfem.dynamics import resume; resume.SECONDS = 0.05; resume.SHARE = 1.0; " \
+    code = "from patchfem.dynamics import checkpoint as c; c.SECONDS = 0.05; c.SHARE = 1.0; " \
            "from patchfem.dynamics.march import march; march.REPEATS = -1.0; " \
            "from patchfem.__main__ import main; main()"
     words = [sys.executable, "-c", code, "run", scene, "--no-page", "-q", "-o", out]

@@ -22,8 +22,8 @@ def test_exact_a_large_file_is_made_on_the_disk_with_the_same_contents(tmp_path,
     with xr.open_dataset(tmp_path / "small.nc") as small, xr.open_dataset(tmp_path / "large.nc") as large:
         assert small.identical(large)
     with pytest.raises(Missing), monkeypatch.context() as full:
-        full.setattr("patchfem.disk.whole.Overflow.truncate", lambda *given: 0)
-        full.setattr("patchfem.disk.whole.Overflow.write", _no_room)
+        full.setattr("patchfem.disk.atomic_write.Overflow.truncate", lambda *given: 0)
+        full.setattr("patchfem.disk.atomic_write.Overflow.write", _no_room)
         netcdf.write(held, tmp_path / "none.nc")
     assert {one.name for one in tmp_path.iterdir()} == {"small.nc", "large.nc"}
 

@@ -19,7 +19,7 @@ from scene_texts import COATED
 from vtkmodules.vtkIOHDF import vtkHDFReader
 
 import patchfem
-from patchfem.disk.whole import unfinished
+from patchfem.disk.atomic_write import unfinished
 from patchfem.elasticity.elasticity import lame
 from patchfem.elasticity.recovery import cells_of, quadratures
 from patchfem.export.fields import bodies, vtkhdf

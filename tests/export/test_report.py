@@ -18,7 +18,7 @@ from patchfem.core import G_N, Outcome
 from patchfem.export import report
 from patchfem.export.drawing import charts
 from patchfem.export.page_data import Measured, Motion, PressedPatch, RunData, SceneText, Verdict
-from patchfem.export.pages import words
+from patchfem.export.pages import sentences
 from patchfem.export.pages.document import prose
 from patchfem.response.rows import TABLE as MOTION
 
@@ -258,7 +258,7 @@ def test_exact_the_same_data_give_the_same_bytes(tmp_path, name):
     ("absolute_acceleration_peak", 5 * G_N, "m s-2", None, ""),
     ("energy_balance", 1e-13, "1", 0.0, "")])
 def test_exact_units_follow_the_size(name, value, unit, error, text):
-    assert words.others(name, measure(value, unit, error)) == text
+    assert sentences.others(name, measure(value, unit, error)) == text
 
 
 def test_exact_the_band_joins_the_reversals_of_each_cycle():
@@ -308,6 +308,6 @@ def test_exact_a_stress_without_bound_is_named_where_it_is_the_largest(cell, sai
 def test_exact_a_fraction_that_is_extrapolated_is_told_from_the_places_of_the_finest_mesh():
     """59.2 % from x = -1.724 to 1.724 of 6 mm were two answers, as these ends give 57.5 %."""
     contact = {"from": -3e-3, "to": 3e-3, "stretches": [[-1.724e-3, 1.724e-3]]}
-    assert words.placed(contact, 0.592) == (", from x = -1.724 to 1.724 mm on the finest mesh (57.5 %; the fraction "
+    assert sentences.placed(contact, 0.592) == (", from x = -1.724 to 1.724 mm on the finest mesh (57.5 %; the fraction "
                                             "before is extrapolated from all meshes)")
-    assert words.placed(contact, 1.724 / 3) == words.placed(contact) == ", from x = -1.724 to 1.724 mm"
+    assert sentences.placed(contact, 1.724 / 3) == sentences.placed(contact) == ", from x = -1.724 to 1.724 mm"

@@ -15,7 +15,7 @@ from scene_texts import COATED, DRIVE, MODE, SLIDE, only
 from patchfem.dynamics.march import march
 from patchfem.effects import LAWS
 from patchfem.runs.run import run
-from patchfem.scene.rules.draft import LAWS as KEYS
+from patchfem.scene.rules.scene_draft import LAWS as KEYS
 from patchfem.scene.scene import SceneError, loads
 
 VALUES = {"reference_speed": "1 mm/s", "bond_length": "1 um", "stiffness": "1e7 N/m", "chi": "-0.5", "beta": "0.5",

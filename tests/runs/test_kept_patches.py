@@ -6,8 +6,8 @@ import pytest
 from scene_texts import COATED, MODE, PLASTIC, SHEAR
 
 import patchfem as pf
-from patchfem.runs.many import one_by_one
-from patchfem.runs.many.meshes import meshed
+from patchfem.runs.batch import one_by_one
+from patchfem.runs.batch.meshes import meshed
 from patchfem.runs.patch import jenkins_elements, store
 from patchfem.runs.patch.store import content_key
 

@@ -8,7 +8,7 @@ from scene_texts import COATING, CROWNED_JOINT, PIECE
 
 from patchfem.core import PatchfemError
 from patchfem.model.model import build
-from patchfem.runs.many.meshes import meshed
+from patchfem.runs.batch.meshes import meshed
 from patchfem.runs.run import run
 from patchfem.scene import scene
 

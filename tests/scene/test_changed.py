@@ -5,7 +5,7 @@ import pytest
 from scene_texts import COULOMB, DRIVE, MODE, NONLOCAL, PATCH, POINT, SECOND
 
 from patchfem.api import load
-from patchfem.scene.changed import Base
+from patchfem.scene.overrides import Base
 from patchfem.scene.scene import SceneError, loads, with_files
 
 RIG = POINT + COULOMB + MODE + SECOND + DRIVE

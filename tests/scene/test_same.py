@@ -2,7 +2,7 @@
 
 import gc
 
-from patchfem.scene.keys.same import MOST, once
+from patchfem.scene.keys.memoize import MOST, once
 
 
 class Held:

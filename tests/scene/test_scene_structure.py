@@ -12,7 +12,7 @@ from patchfem.model.source import placed
 from patchfem.model.structure import modes_of, motions, start_state
 from patchfem.runs.plan import plan
 from patchfem.runs.run import run
-from patchfem.scene.changed import Base
+from patchfem.scene.overrides import Base
 from patchfem.scene.scene import SceneError, load, loads
 
 MASSES = """\

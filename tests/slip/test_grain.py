@@ -7,7 +7,7 @@ import patchfem as pf
 from patchfem.model.model import build
 from patchfem.runs.bench.engine import slips_by_elements
 from patchfem.scene.scene import loads
-from patchfem.slip.grain import spread
+from patchfem.slip.mesh_correction import spread
 
 
 def work(k, y, amplitude):

@@ -40,7 +40,7 @@ except SystemExit as end:
 ALWAYS = {"pyvista", "meshio", "numba"}
 
 
-class Answer(NamedTuple):
+class FitIntervals(NamedTuple):
     """Exit code, stdout and stderr."""
 
     code: int
@@ -48,12 +48,12 @@ class Answer(NamedTuple):
     err: str
 
 
-def cli(*words) -> Answer:
+def cli(*words) -> FitIntervals:
     """What `patchfem WORDS` answers."""
     out, err = io.StringIO(), io.StringIO()
     with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err), pytest.raises(SystemExit) as end:
         main([str(word) for word in words])
-    return Answer(end.value.code or 0, out.getvalue(), err.getvalue())
+    return FitIntervals(end.value.code or 0, out.getvalue(), err.getvalue())
 
 
 def loaded(code: str, *words) -> set:

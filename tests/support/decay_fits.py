@@ -28,7 +28,7 @@ from patchfem.export.lab import imported
 from patchfem.identify.least_squares import descend
 from patchfem.identify.space import Counted, space
 from patchfem.model.model import build
-from patchfem.scene.changed import Base
+from patchfem.scene.overrides import Base
 from patchfem.scene.ranges import ranges
 
 LOAD, MASS, OWN, SLIDERS, BETA = 100.0, 1.0, 2 * np.pi * 100.0, 400, 0.5

@@ -14,8 +14,8 @@ from scene_texts import MODE
 import patchfem as pf
 from patchfem.api import base_of
 from patchfem.response.rows import TABLE as MOTION
-from patchfem.runs.many import meshes, one_by_one
-from patchfem.runs.many.lumped import lanes
+from patchfem.runs.batch import meshes, one_by_one
+from patchfem.runs.batch.lumped import lanes
 from patchfem.runs.results.patch_rows import TABLE as STATIC
 from patchfem.scene.sets import assignments
 

@@ -11,7 +11,7 @@ from patchfem.friction.laws.tanh import Rate
 OMEGA = 2 * np.pi * 143
 # laws of the one compiled loop of joints that most tests share
 ALL = (*(f"friction.laws.{law}_kernels" for law in ("coulomb", "elastic_plastic", "stretch", "tanh")),
-       "dynamics.contacts.spring_kernels")
+       "dynamics.interfaces.spring_kernels")
 
 
 def share_one_loop(monkeypatch) -> None:

@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 LOOKS = 4  # at the guards in a step of the integrator
 
 
-class Plant(NamedTuple):
+class ModalSystem(NamedTuple):
     """M x'' + C x' + K x = -base a(t) - faces^T F; output (n,), stiffness K_1 of the first mode at the contact,
     cubic [N/m3]."""
 
@@ -31,7 +31,7 @@ class Plant(NamedTuple):
     fastest: float
 
 
-def plant_of(s: dict) -> Plant:
+def plant_of(s: dict) -> ModalSystem:
     if s["several"]:
         m = s["masses"]
         K, C = np.zeros((2, 2)), np.zeros((2, 2))
@@ -52,7 +52,7 @@ def plant_of(s: dict) -> Plant:
         base = -mass * output if forced(s) else mass * column["base"]
         first = mass * (omega[0] / column["slide"][0])**2
     fastest = np.sqrt(np.linalg.eigvalsh(np.linalg.solve(M, K)).max()) / (2 * np.pi)
-    return Plant(M, C, K, base, faces, output, first, s.get("cubic", 0.0), float(fastest))
+    return ModalSystem(M, C, K, base, faces, output, first, s.get("cubic", 0.0), float(fastest))
 
 
 def forced(s: dict) -> bool:

@@ -117,7 +117,7 @@ LINKS = {
                     "friction/laws/exponential_kernels.py", "friction/laws/stretch_kernels.py"), "march"),
     "propagator": (("dynamics/propagator.py", "dynamics/doubling.py", "dynamics/march/loop_kernels.py"), "march"),
     "events": (("dynamics/events/stick_kernels.py", "dynamics/events/series_kernels.py",
-                "dynamics/events/march_kernels.py", "dynamics/events/plant.py", "dynamics/events/drive_kernels.py",
+                "dynamics/events/march_kernels.py", "dynamics/events/modal_system.py", "dynamics/events/drive_kernels.py",
                 "dynamics/events/slope_kernels.py", "dynamics/events/search_kernels.py"), "exact"),
     "participation": (("structure/modes.py", "structure/drives.py", "structure/drive_sizes.py", "model/structure.py",
                        "model/rig.py", "model/drive.py"), "exact"),

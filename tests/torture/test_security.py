@@ -18,9 +18,9 @@ UNSAFE = {"pickle", "marshal", "shelve", "dill", "cloudpickle", "joblib", "code"
 NETWORK = {"socket", "socketserver", "ssl", "urllib", "http", "ftplib", "smtplib", "xmlrpc", "requests", "httpx",
            "aiohttp", "webbrowser"}
 WORDS = re.compile(rf"\b({'|'.join(CODE)})\(|\b({'|'.join(UNSAFE | NETWORK)})\b|np\.load\(|allow_pickle|shell|\bos\.")
-HARMLESS = {("compiled.kept", "pickle"),  # numba's own form of machine code, in a folder that is the user's own
+HARMLESS = {("compiled.cache_files", "pickle"),  # numba's own form of machine code, in a folder that is the user's own
             ("compiled", "compile()"), ("compiled", "exec()"),  # a loop of the package with its law put in
-            ("compiled.plain", "compile()"), ("compiled.plain", "exec()"),  # a module of the package as it is written
+            ("compiled.no_jit", "compile()"), ("compiled.no_jit", "exec()"),  # a module of the package as it is written
             ("__main__", "shell=shell")}  # the name of the shell whose completions are written
 FINE = "re.compile('x'); from .http import x; np.load(a, allow_pickle=False); json.load(f)"
 

@@ -9,7 +9,7 @@ import numpy as np
 from ...core import PatchfemError
 from ...dynamics.events.elements import JOINED, cells_joined
 from ...dynamics.harmonic.forces import Group
-from ...effects import has, unbuilt
+from ...effects import has, not_supported_message
 from ...model.model import Model
 from ...response.errors import error_of_change
 from ...runs.patch import result as patch_result
@@ -259,7 +259,7 @@ def build_joint(model: Model, name: str) -> Joint:
     modes, number = model.rig.modes, _find_mode(model.rig, name)
     if modes.lateral_faces is not None:
         key = next(one.key for one in model.rig.interfaces if one.lateral)
-        refusal = unbuilt("a backbone with interfaces that slide in a plane", "out")
+        refusal = not_supported_message("a backbone with interfaces that slide in a plane", "out")
         raise PatchfemError(refusal, f"{key}.lateral")
     patch = None
     coarser: tuple = (None,)

@@ -24,7 +24,7 @@ from ...inputs.cells import text_of
 from ...inputs.columns import read_columns
 from ...model.source import placed
 from ...response.errors import error_of_change
-from ...scene.changed import Base
+from ...scene.overrides import Base
 from ...scene.scene import Scene
 from ..backbone.curves import backbone
 from .problem import FittedKeys, Problem, model_without_joint, parse_ranges

@@ -10,11 +10,11 @@ from ...inputs.loops import Loop
 from ...model.gap import shape_side
 from ...model.model import Model, build
 from ...model.source import placed
+from ...runs.batch import meshes
 from ...runs.bench import bench as law_bench
 from ...runs.bench.engine import smooth_sum_of
 from ...runs.bench.ledger import Watch
-from ...runs.many import meshes
-from ...scene.changed import Base
+from ...scene.overrides import Base
 from ...scene.scene import Scene, SceneError
 from .loop_path import count_whole_cycles, prepend_lead_in
 from .problem import press_patch

@@ -13,8 +13,8 @@ from ...identify.words import remarks
 from ...model.model import Model, build
 from ...runs import joint
 from ...runs.patch import ladder
-from ...scene.changed import Base
 from ...scene.lines import pieces_of
+from ...scene.overrides import Base
 from ...scene.ranges import Range, ranges
 from ...scene.scene import Scene, SceneError, loads
 

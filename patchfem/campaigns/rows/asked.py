@@ -7,7 +7,7 @@ from dataclasses import replace
 from ...core import BaseSine, PatchfemError
 from ...effects import waveform_of
 from ...model.model import Model, build
-from ...scene.changed import Base
+from ...scene.overrides import Base
 from ...scene.scene import Scene, SceneError, loads
 from ..fits.problem import model_without_joint
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from ...model.source import placed
 from ...response.spectrum import reading
-from ...runs.many.watched import Watcher
+from ...runs.batch.watched import Watcher
 from ..fits.problem import press_patch
 from .asked import READINGS, Asked
 

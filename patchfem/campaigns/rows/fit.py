@@ -19,7 +19,7 @@ from ..fits.problem import FittedKeys, Problem
 from .asked import Asked, Question
 from .cells import MOST, Cells, cells_of, scores
 from .computed import Computed
-from .nulls import NULLS, predicted
+from .null_models import NULLS, predicted
 from .search import Found, Search, residual_of, searched
 
 SAME_SCORE = 1.01  # Ratio of two scores, below which two searches found the same fit.

@@ -12,7 +12,7 @@ from math import isfinite, prod
 import numpy as np
 
 from ...scene.axes import Axis
-from .asked import Asked
+from .case_models import Asked
 
 PIECES = tuple(f"contact.{name}" for name in ("length", "width", "height", "pairs", "plane", "substrate", "coating",
                                               "upper", "lower", "mesh", "element_size", "step", "profile"))

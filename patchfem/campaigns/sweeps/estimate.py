@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from ...core import PatchfemError
-from ...runs.many.many import batch_compile_seconds, batch_of
+from ...runs.batch.batches import batch_compile_seconds, batch_of
 from ...runs.plan import plan
 from ...scene.axes import Axis
-from .asked import Asked
+from .case_models import Asked
 from .cases import Cases
 
 LOOKED = 9  # cases that are planned, spread over the sweep

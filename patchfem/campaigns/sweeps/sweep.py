@@ -14,10 +14,10 @@ from ...core import PatchfemError
 from ...model.alike import Alike
 from ...model.model import Model
 from ...runs import plan
-from ...runs.many import many
-from ...runs.many.answers import Answers
-from ...runs.many.meshes import Shared
-from .asked import Asked
+from ...runs.batch import batches
+from ...runs.batch.case_results import CaseResults
+from ...runs.batch.meshes import Shared
+from .case_models import Asked
 from .cases import Cases
 
 TRIES = 3  # deaths, the last of them alone, after which a case is given up
@@ -57,17 +57,17 @@ def warmed(work: Work) -> None:
     """Bring up what the first case of a work needs, though its meshes are not chosen yet; what is wrong with it is told
     by its own run."""
     try:
-        many.batch_of(model := work.asked.model(work.cases.sets(0)), len(work.cases)) or plan.plan(model)
+        batches.batch_of(model := work.asked.model(work.cases.sets(0)), len(work.cases)) or plan.plan(model)
     except Exception:
         return
 
 
-def answer(work: Work, numbers: Sequence[int], say: Callable | None = None) -> tuple[Answers | None, list]:
+def answer(work: Work, numbers: Sequence[int], say: Callable | None = None) -> tuple[CaseResults | None, list]:
     """Answers of some cases, and of each what `work.tell` makes of it; None and nothing where `work.write` has written
     them. This is what a worker does with a chunk."""
     models = _alike(work, numbers) or [_model(work, number) for number in numbers]
     keep = work.keep and (lambda case, result: work.keep(numbers[case], result))
-    found = many.answers(models, keep, say, work.estimate, len(work.cases))
+    found = batches.answers(models, keep, say, work.estimate, len(work.cases))
     told = [] if work.tell is None else [work.tell(number, model, found, case)
                                          for case, (number, model) in enumerate(zip(numbers, models))]
     return handed(work, numbers, found, told)
@@ -80,7 +80,7 @@ def timed(work: Work, numbers: Sequence[int], say: Callable | None = None) -> tu
     return perf_counter() - begin - (compiled.SPENT[0] - made), found
 
 
-def handed(work: Work, numbers: Sequence[int], found: Answers, told: list) -> tuple[Answers | None, list]:
+def handed(work: Work, numbers: Sequence[int], found: CaseResults, told: list) -> tuple[CaseResults | None, list]:
     """What a worker hands on of its answers: nothing of those that `work.write` has written."""
     return (None, []) if work.write is not None and work.write(numbers, found, told) else (found, told)
 
@@ -125,7 +125,7 @@ def _least(work: Work) -> int:
     """Fewest cases of a chunk: as many as the batch of the first is worth, since a few of them say nothing of how long
     many take."""
     try:
-        batch = many.batch_of(_model(work, 0), len(work.cases))
+        batch = batches.batch_of(_model(work, 0), len(work.cases))
     except Exception:  # what is wrong with the case is told by its own run
         return 1
     return batch.together if work.keep is None and batch is not None else 1
@@ -198,7 +198,7 @@ def _handed(chunks: Chunks, done: Iterator) -> Iterator[tuple]:
         if isinstance(found, Died):
             lost = chunks.died(chunk)
             if lost:
-                failed = Answers.blank(len(lost))
+                failed = CaseResults.blank(len(lost))
                 for case, number in enumerate(lost):
                     failed.fail(case, f"{found.reason}, {chunks.deaths[number]} times")
                 yield lost, failed, None, seconds

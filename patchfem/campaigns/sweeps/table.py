@@ -10,7 +10,7 @@ import io
 import re
 from pathlib import Path
 
-from ...disk.opened import reading
+from ...disk.open_with_timeout import reading
 from ...inputs.cells import NUMBER
 from ...scene.axes import Axis, values_of
 from .cases import Cases

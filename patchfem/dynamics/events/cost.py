@@ -5,7 +5,7 @@ from math import pi, sqrt
 import numpy as np
 
 from ...core import ModalBasis
-from ...rates import PYTHON_PIECE, PYTHON_SAMPLE
+from ...cost_model import PYTHON_PIECE, PYTHON_SAMPLE
 from ...structure.drive_sizes import fastest
 
 

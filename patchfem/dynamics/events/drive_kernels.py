@@ -8,28 +8,28 @@ product with a number of cycles is exact, and the rest. So the phase keeps its d
 
 from math import cos, exp, expm1, floor, pi, sin
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import FAST, LEAN
+from ...compiled.jit import njit
+from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .series_kernels import TWICE
 
 SINE, LINE, CHIRP, LOG_CHIRP = 0.0, 1.0, 2.0, 3.0  # kinds of a segment
 CYCLE, OFFSET, KIND, CONSTANT, AMPLITUDE, OMEGA, PHASE, SLOPE, DISPLACED, RATE, TURNS, TURNS_LEFT = range(12)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def since(segment, cycle, offset, period):
     """Time [s] since a segment began."""
     return (cycle - segment[CYCLE]) * period + (offset - segment[OFFSET])
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def rate_of(segment, period):
     """Fastest rate [1/s] of a drive, and at least that of its cycles, whose sines and cosines are taken of the
     motion."""
     return max(segment[RATE], 2 * pi / period)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def phase_of(segment, cycle, offset, period):
     """Phase of the drive [rad], modulo 2 pi; along a straight line that of the cycle."""
     if segment[KIND] == SINE:
@@ -46,7 +46,7 @@ def phase_of(segment, cycle, offset, period):
     return (segment[PHASE] + segment[OMEGA] * expm1(segment[SLOPE] * time) / segment[SLOPE]) % (2 * pi)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def value_now(segment, cycle, offset, period):
     """Drive [m s-2] of a segment at a time (cycle, offset)."""
     kind, theta, time = segment[KIND], phase_of(segment, cycle, offset, period), since(segment, cycle, offset, period)
@@ -59,7 +59,7 @@ def value_now(segment, cycle, offset, period):
     return segment[CONSTANT] + size * sin(theta)
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def drive_series(segment, cycle, offset, period, h, top, waves):
     """Fill waves[0] (>= top + 1,) with the series over u = t/h of a drive [m s-2] from the time (cycle, offset) on.
 
@@ -87,7 +87,7 @@ def drive_series(segment, cycle, offset, period, h, top, waves):
         wave[k] *= segment[AMPLITUDE]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def swept(kind, omega, theta, slope, h, top, waves):
     """Fill waves[0] with the series of the sine of a swept phase, by s' = phi' c and c' = -phi' s; waves[2] with phi'.
 
@@ -105,7 +105,7 @@ def swept(kind, omega, theta, slope, h, top, waves):
         wave[k + 1], cosine[k + 1] = s / (k + 1), c / (k + 1)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def squared(kind, omega, slope, top, waves):
     """Multiply waves[0] by the series of the swept omega squared."""
     wave, square = waves[0], waves[2]

@@ -7,13 +7,13 @@ import numpy as np
 
 from ...compiled import kernels, load, when_compiling
 from ...core import ModalBasis, NotConverged, Outcome, PatchfemError, Response, Start, frozen_array
-from ...rates import PYTHON_READ
+from ...cost_model import PYTHON_READ
 from ...structure.drive_sizes import even_samples
 from .cost import python_seconds, sample_seconds
 from .elements import coulomb, stretches, table_of, virgin
 from .event_list import BORDER, RELEASE, REVERSAL, ROOM, STOP, EventLog
+from .modal_system import books_of, cleared, clock_of, into, past_of, place, plant_of, room_of
 from .names_kernels import OF_FACE, OF_RUN
-from .plant import books_of, cleared, clock_of, into, past_of, place, plant_of, room_of
 from .reading import Reading, ring_of
 
 HERE = "dynamics.events"
@@ -100,13 +100,13 @@ def is_loop_kept(modes: ModalBasis, drive) -> bool:
     The loop for one mode, whose frequency is a number, and that for several, whose frequencies are an array, are
     compiled apart.
     """
-    plant = plant_of(modes)
-    table = table_of([coulomb(1.0)] * len(plant.faces))
+    modal_system = plant_of(modes)
+    table = table_of([coulomb(1.0)] * len(modal_system.faces))
     motion, rows = np.zeros((2, modes.omega.size)), np.zeros((1, 1))
-    memory = virgin(table, np.zeros(len(plant.faces)))
+    memory = virgin(table, np.zeros(len(modal_system.faces)))
     march = kernels(f"{HERE}.march_kernels").march
-    return march.is_kept((0.0, 0.0), motion, plant, table, memory, past_of(plant, table),
-                         clock_of(drive, len(plant.faces)), books_of(1, np.zeros(1)), room_of(plant), rows)
+    return march.is_kept((0.0, 0.0), motion, modal_system, table, memory, past_of(modal_system, table),
+                         clock_of(drive, len(modal_system.faces)), books_of(1, np.zeros(1)), room_of(modal_system), rows)
 
 
 def started(modes: ModalBasis, drive, groups, cycles: float, window: int = 1, travel: float = np.inf,
@@ -172,31 +172,31 @@ class _Run:
     def __init__(self, modes, drive, groups, cycles, window, travel, start, memory, like=None):
         self.modes, self.drive, self.groups, self.window = modes, drive, tuple(groups), window
         self.kernels, self.dense, self.reader = warm_up()
-        self.plant, old = plant_of(modes), like.arrays if like is not None else (None,) * 5
+        self.modal_system, old = plant_of(modes), like.arrays if like is not None else (None,) * 5
         n, count, table = modes.omega.size, max(1, ceil(cycles - 1e-9)), table_of(self.groups)
-        if np.any(~self.plant.faces.any(axis=1) & (table.static > 0)):
+        if np.any(~self.modal_system.faces.any(axis=1) & (table.static > 0)):
             raise PatchfemError("structure.mode.slide: no mode moves the interface, so friction cannot act")
         motion = np.zeros((2, n)) if start is None else np.array([start.z, start.v], float)
-        fresh = virgin(table, self.plant.faces @ motion[0])
+        fresh = virgin(table, self.modal_system.faces @ motion[0])
         memory = fresh if memory is None else type(fresh)(*(part.copy() for part in memory))
         wanted = np.zeros(count)
         wanted[max(0, int(cycles + 1e-9)) - 1::-window] = 1.0  # the last whole cycle of every window
-        new = (table, memory, past_of(self.plant, table), clock_of(drive, len(self.groups)),
+        new = (table, memory, past_of(self.modal_system, table), clock_of(drive, len(self.groups)),
                books_of(count, wanted, travel))
         self.arrays = tuple(map(into, old, new))
-        self.table, self.memory, self.past, self.clock, self.books = self.arrays
-        if like is not None and like.plant.faces.shape == self.plant.faces.shape:
-            self.room, self.spare = cleared(like.room), like.spare
+        self.table, self.memory, self.past, self.time_state, self.books = self.arrays
+        if like is not None and like.modal_system.faces.shape == self.modal_system.faces.shape:
+            self.workspace, self.scratch = cleared(like.workspace), like.scratch
         else:
-            self.room, self.spare = room_of(self.plant), room_of(self.plant)
+            self.workspace, self.scratch = room_of(self.modal_system), room_of(self.modal_system)
         self.motion, self.cycles, self.period = motion, cycles, drive.period
         self.width = self.kernels.HEAD + 2 * n + self.kernels.EACH * len(self.groups)
         self.early, self.even, self.kept, self.events, self.count = [], [], 0, [], 0
         self.rigid, self.outcome, self.snapshots = bool(self.table.static.any()), None, []
-        self.before = self._ways(self.plant.faces @ self.motion[1], np.abs(self.plant.faces) @ np.abs(self.motion[1]))
+        self.before = self._ways(self.modal_system.faces @ self.motion[1], np.abs(self.modal_system.faces) @ np.abs(self.motion[1]))
         self.passed, self.repeats, self.marked = False, False, np.zeros(0, bool)
-        self.begun = self.kernels.stored(self.motion, self.plant, self.table, self.memory)
-        still = self.kernels.stored(np.zeros_like(self.motion), self.plant, self.table, self.memory)
+        self.begun = self.kernels.stored(self.motion, self.modal_system, self.table, self.memory)
+        still = self.kernels.stored(np.zeros_like(self.motion), self.modal_system, self.table, self.memory)
         self.stretched = still - float(np.sum(self.memory.worked - self.memory.lost))  # [J] before the books began
         self.rows = np.empty((CHUNK, self.width)) if like is None or like.width != self.width else like.rows
 
@@ -226,8 +226,8 @@ class _Run:
         pieces, added one by one, left the energies 6e-11 apart."""
         sums = self.books.ledger[:LARGEST]
         before, sums[:] = sums.copy(), 0.0
-        code, used = self.kernels.march(stop, self.motion, self.plant, self.table, self.memory, self.past, self.clock,
-                                        self.books, self.room, rows)
+        code, used = self.kernels.march(stop, self.motion, self.modal_system, self.table, self.memory, self.past, self.time_state,
+                                        self.books, self.workspace, rows)
         sums += before
         if code == self.kernels.PILED:
             raise NotConverged(f"dynamics: at t = {rows[max(used - 1, 0), 0]:.9g} s the contact changes between stick "
@@ -274,9 +274,9 @@ class _Run:
     def _count_on(self, end: int, rows) -> None:
         """Count the cycles up to the last one before the number `end`, or before the next segment of the drive, as the
         next one, bit by bit, of a motion that repeats; rows: room, where that cycle wants more all are run."""
-        books, begin, k = self.books, int(self.clock.now[0]), int(self.clock.now[2]) + 1
-        if k < len(self.clock.segments):
-            end = min(end, int(self.clock.segments[k, 0]))
+        books, begin, k = self.books, int(self.time_state.now[0]), int(self.time_state.now[2]) + 1
+        if k < len(self.time_state.segments):
+            end = min(end, int(self.time_state.segments[k, 0]))
         end -= 1  # the last one is run: it crosses the border
         many = end - begin - 1
         if many < 1:
@@ -296,7 +296,7 @@ class _Run:
         for part in (books.extremes, books.phasors):
             part[begin + 1:end] = part[begin]
         books.phasors[begin:end] *= books.wanted[begin:end, None]
-        self.clock.now[0] = end
+        self.time_state.now[0] = end
         if len(rows):
             gained = self.memory.worked - before[1], self.memory.lost - before[2]
             self._again(done, many, *noted, [part / (many + 1) for part in gained])
@@ -330,7 +330,7 @@ class _Run:
             turned = np.flatnonzero(old != way)
             what = np.where(way[turned] == 0, STOP, np.where(old[turned] == 0, RELEASE, REVERSAL) * way[turned])
             z = rows[turned, self.kernels.HEAD:self.kernels.HEAD + self.modes.omega.size]
-            place = rows[turned, self._at(f, 8)] if self.rigid else z @ self.plant.faces[f]
+            place = rows[turned, self._at(f, 8)] if self.rigid else z @ self.modal_system.faces[f]
             self.events.append(np.stack([rows[turned, 0], rows[turned, 2] % (2 * np.pi), 0 * place + f, what, place],
                                         axis=1))
             self.count += turned.size
@@ -384,7 +384,7 @@ class _Run:
         """Rows (k + 1, w) of the window, and one of no length for its end."""
         head, each, n, memory = self.kernels.HEAD, self.kernels.EACH, self.modes.omega.size, self.memory
         row = np.zeros((1, self.width))
-        row[0, 0], row[0, 3], row[0, 5:7] = self.now, self.clock.now[2], self.clock.now[:2]
+        row[0, 0], row[0, 3], row[0, 5:7] = self.now, self.time_state.now[2], self.time_state.now[:2]
         row[0, head:head + n], row[0, head + n:head + 2 * n] = self.motion
         for k, part in ((0, memory.force), (4, memory.slip), (5, memory.worked), (6, memory.lost), (8, memory.place)):
             row[0, head + 2 * n + k::each] = part
@@ -396,11 +396,11 @@ class _Run:
     @property
     def now(self) -> float:
         """Time [s] of the run."""
-        return float(self.clock.now[0] * self.period + self.clock.now[1])
+        return float(self.time_state.now[0] * self.period + self.time_state.now[1])
 
     def _snapshot(self) -> dict:
         return {"time": self.now, "slide": float(self.memory.place[0]), "force": float(self.memory.force[0]),
-                "rate": float(self.plant.faces[0] @ self.motion[1]), "slip": float(self.memory.slip[0]),
+                "rate": float(self.modal_system.faces[0] @ self.motion[1]), "slip": float(self.memory.slip[0]),
                 "stretch": stretches(self.groups[0], self.memory, 0),
                 "faces": [(float(self.memory.place[k]), stretches(group, self.memory, k))
                           for k, group in enumerate(self.groups)]}
@@ -411,16 +411,16 @@ class _Run:
         span = stop - begun
         numbers = np.zeros(OF_RUN), np.zeros((faces, OF_FACE))
         cycles = max(1, round(span / self.period))
-        self.reader.read(rows, cycles, self.plant, self.clock, float(self.drive.moving), self.spare, *numbers)
+        self.reader.read(rows, cycles, self.modal_system, self.time_state, float(self.drive.moving), self.scratch, *numbers)
         reading = Reading(*numbers, float(span), self.period)
         done = slice(0, max(1, ceil(stop / self.period - 1e-9)))
         names = ("work_in", "viscous", "power")
         book = dict(zip(names, map(float, self.books.ledger[:3]))) | {"friction": float(self.books.ledger[4])}
-        now = self.kernels.stored(self.motion, self.plant, self.table, self.memory)
+        now = self.kernels.stored(self.motion, self.modal_system, self.table, self.memory)
         book |= {"stored": now - self.begun, "peak_stored": max(float(self.books.ledger[LARGEST]), self.begun)}
-        alone = len(self.drive.segments) == 1 and self.plant.faces.shape == (1, 1) and self.plant.faces[0, 0] != 0 \
+        alone = len(self.drive.segments) == 1 and self.modal_system.faces.shape == (1, 1) and self.modal_system.faces[0, 0] != 0 \
             and not self.rigid
-        ring = ring_of(self.plant, self.table, reading) if alone else None
+        ring = ring_of(self.modal_system, self.table, reading) if alone else None
         end = Start(*self.motion.copy()), type(self.memory)(*(part.copy() for part in self.memory))
         ledger, phasors = self.books.ledger, self.books.phasors[done] @ [1, 1j]
         return PieceRun(self.books.extremes[done].copy(), phasors, book, self.outcome, reading, int(ledger[6]),
@@ -466,7 +466,7 @@ class _Run:
     def dense_values(self, rows, owner, tau) -> np.ndarray:
         """Columns of `dense_kernels.evaluate` at tau (k,) [s] after the starts of the rows owner (k,)."""
         out = np.empty((owner.size, 2 * self.modes.omega.size + 1 + 6 * len(self.groups)))
-        self.dense.evaluate(rows, owner, tau, self.plant, self.clock, self.spare, out)
+        self.dense.evaluate(rows, owner, tau, self.modal_system, self.time_state, self.scratch, out)
         return out
 
     def _rows_as(self, rows, owner, tau, time) -> Response:
@@ -479,8 +479,8 @@ class _Run:
         z, v, push = out[:, :n].copy(), out[:, n:2 * n].copy(), out[:, 2 * n]
         slides, rates, forces, slips, works, losses = (out[:, 2 * n + 1 + k::6] for k in range(6))
         base = push if self.drive.moving else np.zeros_like(push)
-        accel = -np.outer(push, modes.base) - v @ self.plant.damping.T - z * self.plant.square \
-            - forces @ self.plant.faces / modes.mass
+        accel = -np.outer(push, modes.base) - v @ self.modal_system.damping.T - z * self.modal_system.square \
+            - forces @ self.modal_system.faces / modes.mass
         work, lost = works.sum(axis=1), losses.sum(axis=1)
         extra = {"ledger": np.stack([work, self.stretched + work - lost, lost, 0 * lost])}
         if len(self.groups) > 1:

@@ -12,13 +12,13 @@ says which hold after an event); in slip it adds a constant.
 
 from math import inf
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import FAST, LEAN
+from ...compiled.jit import njit
+from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
 RIGID = inf  # stiffness of an element that holds the slide
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def threshold(face, way, table, memory):
     """Slide [m] at which the next element of an interface slips in the direction `way`; infinite where all slip."""
     first, top = memory.slipping[face], memory.depth[face] - 1
@@ -27,7 +27,7 @@ def threshold(face, way, table, memory):
         memory.at[face, top] if first < table.count[face] else way * 1e300
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def give_way(face, way, table, memory):
     """Let the next element slip in the direction `way`, or the whole innermost group that had slipped this way."""
     top = memory.depth[face] - 1
@@ -38,7 +38,7 @@ def give_way(face, way, table, memory):
         memory.depth[face] = top
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def turn(face, memory):
     """Stop all elements that slip: they stay one group, stretched to their yield slides."""
     if memory.slipping[face] == 0:
@@ -52,27 +52,27 @@ def turn(face, memory):
     memory.way[face] = 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def holds(face, table, memory):
     """Whether the rigid element of an interface holds its slide."""
     return table.static[face] > 0.0 and memory.head[face] == 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def rubbed(face, table, memory):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def friction_force(face, table, memory):
     """Friction [N] of the rigid element of an interface: kinetic in slip, static at the limit while others hold the
     slide, 0 where it holds or is none."""
     head = memory.head[face]
     return head * table.kinetic[face] if abs(head) == 1.0 else 0.5 * head * table.static[face]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def pulled(face, table, memory):
     """Force [N] of an interface, without the reaction of a rigid element that holds."""
-    return rubbed(face, table, memory) + carried(face, table, memory)[0]
+    return friction_force(face, table, memory) + carried(face, table, memory)[0]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def carried(face, table, memory):
     """(force [N], elastic energy [J]) of the elements of an interface, group by group."""
     first, place = memory.slipping[face], memory.place[face]
@@ -89,7 +89,7 @@ def carried(face, table, memory):
     return force, 0.5 * energy
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def tangent(face, table, memory):
     """(stiffness [N/m] of the elements that hold, share of the friction limit of those that slip, their limit [N]); of
     a rigid element that holds the stiffness is infinite. What has no elements slips freely."""

@@ -7,11 +7,11 @@ import numpy as np
 
 from ...compiled import load
 from ...core import ModalBasis, NotConverged, Response, Start
-from ...rates import PYTHON_READ
+from ...cost_model import PYTHON_READ
 from . import histories
 from .elements import Memory
+from .modal_system import books_of, past_of, plant_of
 from .period import PeriodMap, Point
-from .plant import books_of, past_of, plant_of
 from .steady import turning
 
 ROWS = 256  # pieces of half a period for which there is room at first
@@ -41,7 +41,7 @@ class Orbits:
         self.wide = self.kernels.HEAD + 2 * modes.omega.size + self.kernels.EACH * len(groups)
         self.rows, self.books = np.zeros((ROWS, self.wide)), books_of(1, np.ones(1))
         self.forces = np.zeros(len(groups))
-        self.past = past_of(self.one.plant, self.one.table)
+        self.past = past_of(self.one.modal_system, self.one.table)
         self._given(modes)
 
     def _given(self, modes: ModalBasis) -> None:
@@ -58,9 +58,9 @@ class Orbits:
     def __call__(self, drive, near: Point | None = None) -> Seen:
         one = self.one
         point = turning(one, drive, near if self._fits(near) else None)[0].point
-        used, swing = self._half(drive, point, one.plant)
+        used, swing = self._half(drive, point, one.modal_system)
         self.peak.expect(PYTHON_READ * one.seconds / 2)
-        high = self.peak.held_call(self._held("peak", one.plant, float(drive.moving)), self.rows[:used])
+        high = self.peak.call_with_bound_args(self._held("peak", one.modal_system, float(drive.moving)), self.rows[:used])
         first = -2 * drive.omega**2 * complex(*self.books.phasors[0]) - 1j * drive.acceleration * drive.moving
         if self.gauge is not None:
             swing = self._half(drive, point, self.gauge)[1]
@@ -78,7 +78,7 @@ class Orbits:
         return near is not None and near.motion.size == 2 * self.one.n and near.memory.at.shape == still.at.shape \
             and np.array_equal(_all_of(near.memory), count)
 
-    def _half(self, drive, point: Point, plant) -> tuple:
+    def _half(self, drive, point: Point, modal_system) -> tuple:
         """(pieces, largest output [m]) of half a period from a Point, the pieces in `rows`; the other half turns
         over."""
         one, books, stop = self.one, self.books, (0.0, drive.period / 2)
@@ -86,7 +86,7 @@ class Orbits:
             one.begin(drive, point)
             self.march.expect(one.seconds / 2)
             books.ledger[:], books.phasors[:], books.limits[1], books.extremes[:] = 0.0, 0.0, 0.0, (np.inf, -np.inf)
-            code, used = self.march.held_call(self._held("march", plant), stop)
+            code, used = self.march.call_with_bound_args(self._held("march", modal_system), stop)
             if code == self.kernels.DONE:
                 return used, float(max(books.extremes[0, 1], -books.extremes[0, 0]))
             if code != self.kernels.FULL:
@@ -94,12 +94,12 @@ class Orbits:
                                    "again without time passing")
             self.rows, self.held = np.zeros((2 * len(self.rows), self.wide)), {}
 
-    def _held(self, name: str, plant, moving: float = 0.0) -> tuple:
+    def _held(self, name: str, modal_system, moving: float = 0.0) -> tuple:
         """What a compiled function is called with."""
-        one, key = self.one, (name, id(plant), moving)
+        one, key = self.one, (name, id(modal_system), moving)
         if key not in self.held:
-            self.held[key] = self.peak.held(plant, one.clock, moving, one.room, self.forces) if name == "peak" else \
-                self.march.held(one.motion, plant, one.table, one.memory, self.past, one.clock, self.books, one.room,
+            self.held[key] = self.peak.held(modal_system, one.time_state, moving, one.workspace, self.forces) if name == "peak" else \
+                self.march.held(one.motion, modal_system, one.table, one.memory, self.past, one.time_state, self.books, one.workspace,
                                 self.rows)
         return self.held[key]
 

@@ -9,7 +9,7 @@ from ...compiled import load
 from ...core import ModalBasis, NotConverged, PatchfemError
 from .cost import python_seconds
 from .elements import Memory, sorted_stretches, table_of, virgin
-from .plant import Clock, books_of, clock_of, place, plant_of, room_of
+from .modal_system import Clock, books_of, clock_of, place, plant_of, room_of
 
 SLOPES = 2.0  # times as long a map takes as Python where it carries its slopes
 DRIVES = 256  # sines whose clocks are remembered
@@ -81,16 +81,16 @@ class PeriodMap:
         self.follow, self.n = load("dynamics.events.slope_kernels").follow, modes.omega.size
         self._given(modes, groups)
         faces = len(self.groups)
-        self.room, self.books = room_of(self.plant), books_of(2, np.zeros(2))
-        self.spare = np.zeros((2, self.n)), np.zeros(faces), np.zeros_like(self.room.coefs)
+        self.workspace, self.books = room_of(self.modal_system), books_of(2, np.zeros(2))
+        self.scratch = np.zeros((2, self.n)), np.zeros(faces), np.zeros_like(self.workspace.coefs)
         self.motion, self.memory = np.zeros((2, self.n)), copied(self.still)
         self.seen, self.carried = np.zeros((2, faces), np.int64), {}
-        self.drive, self.clock, self.clocks, self.seconds = None, None, {}, 0.0
+        self.drive, self.time_state, self.clocks, self.seconds = None, None, {}, 0.0
 
     def _given(self, modes: ModalBasis, groups) -> None:
         """Take modes and elements."""
-        self.modes, self.groups, self.plant, self.table = modes, tuple(groups), plant_of(modes), table_of(groups)
-        self.faces, self.held = self.plant.faces, {}
+        self.modes, self.groups, self.modal_system, self.table = modes, tuple(groups), plant_of(modes), table_of(groups)
+        self.faces, self.held = self.modal_system.faces, {}
         self.still = virgin(self.table, np.zeros(len(self.groups)))
 
     def renewed(self, modes: ModalBasis, groups) -> bool:
@@ -121,13 +121,13 @@ class PeriodMap:
         """
         if drive is not self.drive:
             self._under(drive)
-        clock, books = self.clock, self.books
+        time_state, books = self.time_state, self.books
         self.motion[:] = point.motion.reshape(2, self.n)
         for mine, given in zip(self.memory, point.memory):
             mine[...] = given
         self.memory.place[:] = self.faces @ self.motion[0]
-        clock.now[:], clock.rest[:], books.ledger[:], books.limits[1] = 0.0, 0.0, 0.0, 0.0
-        books.extremes[:], self.room.orders[:] = (np.inf, -np.inf), -1.0
+        time_state.now[:], time_state.rest[:], books.ledger[:], books.limits[1] = 0.0, 0.0, 0.0, 0.0
+        books.extremes[:], self.workspace.orders[:] = (np.inf, -np.inf), -1.0
 
     def _under(self, drive) -> None:
         """Set the clock to a sine; it is made once for each of the last drives."""
@@ -140,11 +140,11 @@ class PeriodMap:
             stiff = max(float(one.stiffness.sum()) for one in self.groups)
             seconds = python_seconds(self.modes, drive, stiff, int(self.table.count.sum()))
             self.clocks[id(drive)] = drive, clock_of(drive, len(self.groups)), seconds
-        _, clock, self.seconds = self.clocks[id(drive)]
-        if self.clock is None:
-            self.clock = Clock(*(part.copy() for part in clock))
+        _, time_state, self.seconds = self.clocks[id(drive)]
+        if self.time_state is None:
+            self.time_state = Clock(*(part.copy() for part in time_state))
         self.drive = drive
-        self.clock.segments[:], self.clock.period[:] = clock.segments, clock.period
+        self.time_state.segments[:], self.time_state.period[:] = time_state.segments, time_state.period
 
     def __call__(self, drive, point: Point, half: bool, slopes: bool = True) -> Map:
         """The Map of a Point over a period of a sine, or over half of one. NotConverged where events pile up,
@@ -160,9 +160,9 @@ class PeriodMap:
         seen[0], seen[1] = memory.slipping, memory.depth
         self.follow.expect(self.seconds * (SLOPES if slopes else 1.0) / (1 + half))
         if size not in self.held:
-            self.held[size] = self.follow.held(self.motion, slope, marks, self.plant, self.table, memory, self.clock,
-                                               self.books, self.room, self.spare, seen)
-        pieces = self.follow.held_call(self.held[size], place(period / 2 if half else period, period))
+            self.held[size] = self.follow.held(self.motion, slope, marks, self.modal_system, self.table, memory, self.time_state,
+                                               self.books, self.workspace, self.scratch, seen)
+        pieces = self.follow.call_with_bound_args(self.held[size], place(period / 2 if half else period, period))
         if pieces < 0:
             raise NotConverged("dynamics: within one period the contact changes between stick and slip more often than "
                                "can be computed")

@@ -76,7 +76,7 @@ class Reading:
         return tuple(map(self.loop, range(self.faces.shape[-2])))
 
 
-def ring_of(plant, table, reading: Reading) -> tuple | None:
+def ring_of(modal_system, table, reading: Reading) -> tuple | None:
     """(amplitude [m s-2], frequency [rad/s], damping ratio) of what rings in the sticks of one mode behind one
     interface under one sine.
 
@@ -85,7 +85,7 @@ def ring_of(plant, table, reading: Reading) -> tuple | None:
     """
     if table.count[0] > 1:
         return (0.0, 0.0, 0.0) if reading.run[at.SWING] < RINGS else None
-    beta, half = plant.square[0] + table.stiff[0, -1] * plant.reach[0], plant.damping[0, 0] / 2
+    beta, half = modal_system.square[0] + table.stiff[0, -1] * modal_system.reach[0], modal_system.damping[0, 0] / 2
     own = np.sqrt(max(beta - half**2, 0.0))
     return (float(reading.run[at.RING]), float(own), float(half / np.sqrt(beta))) if own > 0 else (0.0, 0.0, 0.0)
 

@@ -9,8 +9,8 @@ as those cycles over ln(FAR/NEAR).
 
 from math import pi, sqrt
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import FAST, LEAN
+from ...compiled.jit import njit
+from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .drive_kernels import KIND, SINE
 
 NEAR, FAR = 1e-14, 1e-10  # of the size of the motion
@@ -18,24 +18,24 @@ SOON = 9000.0  # cycles from FAR to NEAR at most: what is left is then below 100
 SEGMENT, APART, REPEATS = range(3)  # of `Past.about`
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def apart(motion, plant, memory, clock, past):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def apart(motion, modal_system, memory, time_state, past):
     """(largest difference of the state from that one period before, size of the motion), both [m]; the difference is
     endless where other elements slip or stay, or where the drive is no sine."""
-    omega, most, size, segment = 2 * pi / clock.period[0], 0.0, 0.0, int(clock.now[2])
-    for i in range(len(plant.square)):
-        rate = max(omega, sqrt(plant.square[i]))
+    omega, most, size, segment = 2 * pi / time_state.period[0], 0.0, 0.0, int(time_state.now[2])
+    for i in range(len(modal_system.square)):
+        rate = max(omega, sqrt(modal_system.square[i]))
         z, v = past.motion[0, i], past.motion[1, i]
         size = max(size, max(abs(z), abs(motion[0, i])), max(abs(v), abs(motion[1, i])) / rate)
         most = max(most, abs(motion[0, i] - z), abs(motion[1, i] - v) / rate)
-    if past.about[SEGMENT] != segment or clock.segments[segment, KIND] != SINE:
+    if past.about[SEGMENT] != segment or time_state.segments[segment, KIND] != SINE:
         return 1e300, size
     old = past.memory
-    for f in range(len(plant.reach)):
+    for f in range(len(modal_system.reach)):
         if old.slipping[f] != memory.slipping[f] or old.way[f] != memory.way[f] or old.depth[f] != memory.depth[f] \
-                or old.head[f] != memory.head[f] or clock.rest[f] == 1.0:
+                or old.head[f] != memory.head[f] or time_state.rest[f] == 1.0:
             return 1e300, size
-        scale = sqrt(plant.reach[f] * plant.mass)  # of the slide in the coordinates
+        scale = sqrt(modal_system.reach[f] * modal_system.mass)  # of the slide in the coordinates
         for k in range(memory.depth[f]):
             if old.upto[f, k] != memory.upto[f, k] or old.side[f, k] != memory.side[f, k]:
                 return 1e300, size
@@ -43,35 +43,35 @@ def apart(motion, plant, memory, clock, past):
     return most, size
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def forget(past):
     """Let no state be noted."""
     past.about[SEGMENT], past.about[REPEATS] = -1.0, 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def come_back(motion, plant, memory, clock, past):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def come_back(motion, modal_system, memory, time_state, past):
     """Whether the state at a border of a cycle is the first one that is that of the border before to round-off.
 
     Then, and at all borders from there on, it takes the digits of that state; else it is noted in past.
     """
     about, old = past.about, past.memory
-    most, size = apart(motion, plant, memory, clock, past)
+    most, size = apart(motion, modal_system, memory, time_state, past)
     if most > FAR * size:
-        about[APART] = clock.now[0]
-    if most <= NEAR * size and (about[REPEATS] == 1.0 or clock.now[0] - about[APART] <= SOON):
-        for i in range(len(plant.square)):
+        about[APART] = time_state.now[0]
+    if most <= NEAR * size and (about[REPEATS] == 1.0 or time_state.now[0] - about[APART] <= SOON):
+        for i in range(len(modal_system.square)):
             motion[0, i], motion[1, i] = past.motion[0, i], past.motion[1, i]
-        for f in range(len(plant.reach)):
+        for f in range(len(modal_system.reach)):
             memory.place[f] = old.place[f]
             for k in range(memory.depth[f]):
                 memory.at[f, k] = old.at[f, k]
         first, about[REPEATS] = about[REPEATS] == 0.0, 1.0
         return first
-    about[SEGMENT], about[REPEATS] = clock.now[2], 0.0
-    for i in range(len(plant.square)):
+    about[SEGMENT], about[REPEATS] = time_state.now[2], 0.0
+    for i in range(len(modal_system.square)):
         past.motion[0, i], past.motion[1, i] = motion[0, i], motion[1, i]
-    for f in range(len(plant.reach)):
+    for f in range(len(modal_system.reach)):
         old.place[f], old.slipping[f], old.way[f] = memory.place[f], memory.slipping[f], memory.way[f]
         old.depth[f], old.head[f] = memory.depth[f], memory.head[f]
         for k in range(memory.depth[f]):

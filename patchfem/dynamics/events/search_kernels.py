@@ -7,8 +7,8 @@ yield before it is one root of a monotone function: no event can be missed.
 
 from math import sqrt
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import FAST, LEAN
+from ...compiled.jit import njit
+from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .memory_kernels import holds, threshold
 from .series_kernels import EPS, NONE, OVER, first_root, polish
 
@@ -16,7 +16,7 @@ NOTHING, YIELDS, TURNS, OUTPUT_TURNS, STOPS, RELEASES = 0, 1, 2, 3, 4, 5  # what
 TINY = 1e-14  # of the terms of a speed: below it a slide at a turning point has no acceleration
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def heading(poly, top, rests):
     """(order of the first term of a speed that counts, its sign); poly: its series; rests: it is zero at first."""
     if not rests and poly[0] != 0.0:
@@ -30,7 +30,7 @@ def heading(poly, top, rests):
     return 0, 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def speed_series(row, count, coefs, top, poly):
     """Fill poly (top,) with the series of the rate over u of row (n,) times the coordinates, `count` of them."""
     for k in range(top):
@@ -40,7 +40,7 @@ def speed_series(row, count, coefs, top, poly):
         poly[k] = (k + 1) * part
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def moved(poly, top, u):
     """Integral from 0 to u of a speed whose series is poly (top,)."""
     out = poly[top - 1] * OVER[top]
@@ -49,71 +49,71 @@ def moved(poly, top, u):
     return out * u
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def crossing(poly, top, room, limit, spare):
-    """u in (0, limit] at which a slide of speed series poly, monotone there, has moved by `room` the way it goes; NONE
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def crossing(poly, top, workspace, limit, scratch):
+    """u in (0, limit] at which a slide of speed series poly, monotone there, has moved by `workspace` the way it goes; NONE
     if it does not. room > 0 [m], signed; spare: room for a polynomial."""
     end = moved(poly, top, limit)
-    way = 1.0 if room > 0 else -1.0
-    if way * end < way * room:
+    way = 1.0 if workspace > 0 else -1.0
+    if way * end < way * workspace:
         return NONE
-    spare[0] = way * room
+    scratch[0] = way * workspace
     for k in range(top):
-        spare[k + 1] = -way * poly[k] * OVER[k + 1]
-    start, square = limit * room / end, spare[1] * spare[1] - 4 * spare[0] * spare[2]
-    if square > 0 and 2 * spare[0] < limit * (sqrt(square) - spare[1]):  # the root of the first three terms
-        start = 2 * spare[0] / (sqrt(square) - spare[1])
-    return polish(spare, 0, top, 0.0, limit, start)
+        scratch[k + 1] = -way * poly[k] * OVER[k + 1]
+    start, square = limit * workspace / end, scratch[1] * scratch[1] - 4 * scratch[0] * scratch[2]
+    if square > 0 and 2 * scratch[0] < limit * (sqrt(square) - scratch[1]):  # the root of the first three terms
+        start = 2 * scratch[0] / (sqrt(square) - scratch[1])
+    return polish(scratch, 0, top, 0.0, limit, start)
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def released(face, top, limit, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def released(face, top, limit, workspace):
     """(u, side) at which the reaction of a slide that is held first passes its limit [N], +1 or -1; NONE for u if it
     does not."""
-    react, spare, size = room.reactions[face], room.polys[room.react.shape[0]], limit
+    react, scratch, size = workspace.reactions[face], workspace.polys[workspace.react.shape[0]], limit
     for k in range(top - 1):
         size += abs(react[k])
     best, to = NONE, 0.0
-    if size < 2 * limit and room.orders[face, 0] == 0.0 and room.orders[face, 1] == 0.0:
+    if size < 2 * limit and workspace.orders[face, 0] == 0.0 and workspace.orders[face, 1] == 0.0:
         return best, to
     for side in (1, -1):
-        order = int(room.orders[face, (1 - side) // 2])
+        order = int(workspace.orders[face, (1 - side) // 2])
         for k in range(order, top - 1):
-            spare[k] = -side * react[k]
+            scratch[k] = -side * react[k]
         if order == 0:
-            spare[0] += limit
-            if spare[0] <= 4 * EPS * size:
-                spare[0] = max(spare[0], 0.0)
-        root = first_root(spare, order, top - 2, room.hulls) if order < top - 1 else NONE
+            scratch[0] += limit
+            if scratch[0] <= 4 * EPS * size:
+                scratch[0] = max(scratch[0], 0.0)
+        root = first_root(scratch, order, top - 2, workspace.hulls) if order < top - 1 else NONE
         if root < best:
             best, to = root, float(side)
     return best, to
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def rest(face, head, poly, top, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def rest(face, head, poly, top, workspace):
     """u at which the slip of a rigid element first rests; NONE if it does not. poly: series of its speed."""
-    spare, order = room.polys[room.react.shape[0]], int(room.orders[face, 0])
+    scratch, order = workspace.polys[workspace.react.shape[0]], int(workspace.orders[face, 0])
     if order == 0 and head * poly[0] <= 0.0:
         return 0.0
     for k in range(order, top):
-        spare[k] = head * poly[k]
-    return first_root(spare, order, top - 1, room.hulls) if order < top else NONE
+        scratch[k] = head * poly[k]
+    return first_root(scratch, order, top - 1, workspace.hulls) if order < top else NONE
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def next_event(top, plant, table, memory, clock, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def next_event(top, modal_system, table, memory, time_state, workspace):
     """(u, what, face, sign) of the first event of a piece; u = 1 and NOTHING where none ends it.
 
     u = 0: the state changes before anything moves.
     """
-    faces, polys = len(plant.reach), room.polys
+    faces, polys = len(modal_system.reach), workspace.polys
     u, what, face, sign = 1.0, NOTHING, 0, 0.0
     for f in range(faces):
         poly = polys[f]
-        speed_series(plant.faces[f], len(plant.square), room.coefs, top, poly)
+        speed_series(modal_system.faces[f], len(modal_system.square), workspace.coefs, top, poly)
         if holds(f, table, memory):
-            root, way = released(f, top, table.static[f], room)
+            root, way = released(f, top, table.static[f], workspace)
             if root <= u:
                 u, what, face, sign = root, RELEASES, f, way
             continue
@@ -121,21 +121,21 @@ def next_event(top, plant, table, memory, clock, room):
             way = memory.head[f]
             if abs(way) == 2.0:
                 continue
-            root = rest(f, way, poly, top, room)
+            root = rest(f, way, poly, top, workspace)
             if root <= u:
                 u, what, face, sign = root, TURNS, f, -way
             if table.count[f] == 0 or u == 0.0:
                 continue
         else:
-            order, way = heading(poly, top, clock.rest[f] == 1.0)
+            order, way = heading(poly, top, time_state.rest[f] == 1.0)
             if way == 0.0:
                 continue
             if memory.slipping[f] > 0 and way != memory.way[f]:
                 return 0.0, TURNS, f, way
-            spare = polys[faces]
+            scratch = polys[faces]
             for k in range(order, top):
-                spare[k] = way * poly[k]
-            root = first_root(spare, order, top - 1, room.hulls)
+                scratch[k] = way * poly[k]
+            root = first_root(scratch, order, top - 1, workspace.hulls)
             if root < u:
                 u, what, face, sign = root, TURNS, f, -way
         gap = threshold(f, way, table, memory) - memory.place[f]
@@ -144,13 +144,13 @@ def next_event(top, plant, table, memory, clock, room):
         root = crossing(poly, top, gap, u, polys[faces])
         if root <= u:
             u, what, face, sign = root, YIELDS, f, way
-    if plant.along < 0:
-        poly, spare = polys[faces + 1], polys[faces]
-        speed_series(plant.output, len(plant.square), room.coefs, top, poly)
-        order, way = heading(poly, top, clock.rest[faces] == 1.0)
+    if modal_system.along < 0:
+        poly, scratch = polys[faces + 1], polys[faces]
+        speed_series(modal_system.output, len(modal_system.square), workspace.coefs, top, poly)
+        order, way = heading(poly, top, time_state.rest[faces] == 1.0)
         for k in range(order, top):
-            spare[k] = way * poly[k]
-        root = first_root(spare, order, top - 1, room.hulls) if way != 0.0 else NONE
+            scratch[k] = way * poly[k]
+        root = first_root(scratch, order, top - 1, workspace.hulls) if way != 0.0 else NONE
         if root < u:
             u, what, face, sign = root, OUTPUT_TURNS, faces, -way
     return u, what, face, sign

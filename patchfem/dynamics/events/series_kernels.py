@@ -10,8 +10,8 @@ from math import comb, factorial, sqrt
 
 import numpy as np
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import FAST, LEAN
+from ...compiled.jit import njit
+from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .memory_kernels import RIGID
 
 REACH = 2.0  # longest piece times the fastest rate
@@ -38,7 +38,7 @@ for _g in range(1, _NODES + 1):
     _PLACE[_g, :_g], _WEIGHT[_g, :_g] = (1 + _x) / 2, _w / 2
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def powers(x):
     """Highest power that a piece of x times the fastest rate needs."""
     k = 4
@@ -47,7 +47,7 @@ def powers(x):
     return k
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def points(x):
     """Gauss points that integrate squares of the motion over a piece of x times the fastest rate."""
     g = 2
@@ -56,38 +56,38 @@ def points(x):
     return g
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def fastest(plant, springs):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def fastest(modal_system, springs):
     """Bound [1/s] of the rates of the modes with springs (i,) [N/m] between the interfaces; those that hold a
     slide only take motions away."""
-    square = plant.square_most
-    for f in range(len(plant.reach)):
+    square = modal_system.square_most
+    for f in range(len(modal_system.reach)):
         if springs[f] < RIGID:
-            square += springs[f] * plant.reach[f]
-    return 0.5 * plant.damping_most + sqrt(0.25 * plant.damping_most**2 + square)
+            square += springs[f] * modal_system.reach[f]
+    return 0.5 * modal_system.damping_most + sqrt(0.25 * modal_system.damping_most**2 + square)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def single_series(place, rate, force, spring, plant, wave, h, top, coefs):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def single_series(place, rate, force, spring, modal_system, wave, h, top, coefs):
     """`motion_series` of one mode with one interface, three times as fast."""
-    face, squared, base = plant.faces[0, 0] / plant.mass, h * h, plant.base[0]
-    stiff, damp = squared * (plant.square[0] + spring * plant.reach[0]), h * plant.damping[0, 0]
+    face, squared, base = modal_system.faces[0, 0] / modal_system.mass, h * h, modal_system.base[0]
+    stiff, damp = squared * (modal_system.square[0] + spring * modal_system.reach[0]), h * modal_system.damping[0, 0]
     here, after = place[0], h * rate[0]
     coefs[0, 0], coefs[1, 0] = here, after
-    here, after = after, -0.5 * (squared * (plant.square[0] * here + base * wave[0] + face * force) + damp * after)
+    here, after = after, -0.5 * (squared * (modal_system.square[0] * here + base * wave[0] + face * force) + damp * after)
     coefs[2, 0] = after
     for k in range(1, top - 1):
         here, after = after, -TWICE[k + 2] * (stiff * here + squared * base * wave[k] + damp * (k + 1) * after)
         coefs[k + 2, 0] = after
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def double_series(place, rate, force, spring, plant, wave, h, top, coefs):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def double_series(place, rate, force, spring, modal_system, wave, h, top, coefs):
     """`motion_series` of two modes with one interface and dampers of their own, all in registers."""
-    squared, face_1, face_2, base_1, base_2 = h * h, plant.faces[0, 0], plant.faces[0, 1], plant.base[0], plant.base[1]
-    second = len(plant.square) - 1  # no constant: of one mode, where nothing comes here, it would not compile
-    stiff_1, stiff_2, stiff = squared * plant.square[0], squared * plant.square[second], squared * spring / plant.mass
-    damp_1, damp_2, pull = h * plant.damping[0, 0], h * plant.damping[1, 1], squared * force / plant.mass
+    squared, face_1, face_2, base_1, base_2 = h * h, modal_system.faces[0, 0], modal_system.faces[0, 1], modal_system.base[0], modal_system.base[1]
+    second = len(modal_system.square) - 1  # no constant: of one mode, where nothing comes here, it would not compile
+    stiff_1, stiff_2, stiff = squared * modal_system.square[0], squared * modal_system.square[second], squared * spring / modal_system.mass
+    damp_1, damp_2, pull = h * modal_system.damping[0, 0], h * modal_system.damping[1, 1], squared * force / modal_system.mass
     here_1, here_2, after_1, after_2 = place[0], place[1], h * rate[0], h * rate[1]
     coefs[0, 0], coefs[0, 1], coefs[1, 0], coefs[1, 1] = here_1, here_2, after_1, after_2
     for k in range(top - 1):
@@ -99,89 +99,89 @@ def double_series(place, rate, force, spring, plant, wave, h, top, coefs):
         coefs[k + 2, 0], coefs[k + 2, 1] = new_1, new_2
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def still_series(place, force, plant, wave, top, coefs, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def still_series(place, force, modal_system, wave, top, coefs, workspace):
     """`motion_series` where what is held lets nothing move: the reactions alone."""
-    n = len(plant.square)
+    n = len(modal_system.square)
     for k in range(top + 1):
         for i in range(n):
             coefs[k, i] = place[i] if k == 0 else 0.0
-    for f in range(len(plant.reach)):
+    for f in range(len(modal_system.reach)):
         level, share = 0.0, 0.0
         for i in range(n):
-            part = plant.square[i] * place[i]
-            for g in range(len(plant.reach)):
-                if room.springs[g] < RIGID:
-                    part += plant.faces[g, i] * force[g] / plant.mass
-            level -= room.react[f, i] * part
-            share -= room.react[f, i] * plant.base[i]
+            part = modal_system.square[i] * place[i]
+            for g in range(len(modal_system.reach)):
+                if workspace.springs[g] < RIGID:
+                    part += modal_system.faces[g, i] * force[g] / modal_system.mass
+            level -= workspace.react[f, i] * part
+            share -= workspace.react[f, i] * modal_system.base[i]
         for k in range(top - 1):
-            room.reactions[f, k] = plant.mass * share * wave[k]
-        room.reactions[f, 0] += plant.mass * level
+            workspace.reactions[f, k] = modal_system.mass * share * wave[k]
+        workspace.reactions[f, 0] += modal_system.mass * level
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def constrained(k, scale, plant, coefs, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def constrained(k, scale, modal_system, coefs, workspace):
     """Take from the coefficients k + 2 what moves a slide that is held, and note the reaction [N] that does:
     a - slide^T r/mass with r = mass (slide slide^T)^+ slide a."""
-    for f in range(len(plant.reach)):
+    for f in range(len(modal_system.reach)):
         part = 0.0
-        for i in range(len(plant.square)):
-            part += room.react[f, i] * coefs[k + 2, i]
-        room.reactions[f, k] = part
-    for f in range(len(plant.reach)):
-        for i in range(len(plant.square)):
-            coefs[k + 2, i] -= plant.faces[f, i] * room.reactions[f, k]
-        room.reactions[f, k] *= plant.mass / scale
+        for i in range(len(modal_system.square)):
+            part += workspace.react[f, i] * coefs[k + 2, i]
+        workspace.reactions[f, k] = part
+    for f in range(len(modal_system.reach)):
+        for i in range(len(modal_system.square)):
+            coefs[k + 2, i] -= modal_system.faces[f, i] * workspace.reactions[f, k]
+        workspace.reactions[f, k] *= modal_system.mass / scale
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def motion_series(place, rate, force, springs, plant, wave, h, top, coefs, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def motion_series(place, rate, force, springs, modal_system, wave, h, top, coefs, workspace):
     """Fill coefs (>= top + 1, n) with the series of z'' = -D z' - w^2 z - base a - slide^T (force + springs
     slide)/mass; slides of infinite springs are held, and room.reactions (i, >= top - 1) are the forces [N] that do it.
 
     place, rate (n,): coordinates [m] and rates [m/s] at first; force (i,) [N] there; springs (i,) [N/m]; wave: series
     of a; room: with react and held as `stick_kernels.constrain` leaves them.
     """
-    n, faces, squared, pull = len(plant.square), plant.faces, h * h, room.pull
-    held = room.held[0] > 0.0
-    if room.held[1] == 1.0:
-        still_series(place, force, plant, wave, top, coefs, room)
+    n, faces, squared, pull = len(modal_system.square), modal_system.faces, h * h, workspace.pull
+    held = workspace.held[0] > 0.0
+    if workspace.held[1] == 1.0:
+        still_series(place, force, modal_system, wave, top, coefs, workspace)
         return
-    if n == 1 and len(plant.reach) == 1:
-        single_series(place, rate, force[0], springs[0], plant, wave, h, top, coefs)
+    if n == 1 and len(modal_system.reach) == 1:
+        single_series(place, rate, force[0], springs[0], modal_system, wave, h, top, coefs)
         return
-    if n == 2 and len(plant.reach) == 1 and not plant.coupled and not held:
-        double_series(place, rate, force[0], springs[0], plant, wave, h, top, coefs)
+    if n == 2 and len(modal_system.reach) == 1 and not modal_system.coupled and not held:
+        double_series(place, rate, force[0], springs[0], modal_system, wave, h, top, coefs)
         return
     for i in range(n):
         coefs[0, i], coefs[1, i] = place[i], h * rate[i]
-    for f in range(len(plant.reach)):
-        pull[f] = force[f] / plant.mass if springs[f] < RIGID else 0.0
+    for f in range(len(modal_system.reach)):
+        pull[f] = force[f] / modal_system.mass if springs[f] < RIGID else 0.0
     for k in range(top - 1):
         scale, damp = TWICE[k + 2] * squared, TWICE[k + 2] * h * (k + 1)
         if k > 0:
-            for f in range(len(plant.reach)):
+            for f in range(len(modal_system.reach)):
                 part = 0.0
                 for i in range(n):
                     part += faces[f, i] * coefs[k, i]
-                pull[f] = part * springs[f] / plant.mass if springs[f] < RIGID else 0.0
+                pull[f] = part * springs[f] / modal_system.mass if springs[f] < RIGID else 0.0
         for i in range(n):
-            part = -plant.square[i] * coefs[k, i] - plant.base[i] * wave[k]
-            for f in range(len(plant.reach)):
+            part = -modal_system.square[i] * coefs[k, i] - modal_system.base[i] * wave[k]
+            for f in range(len(modal_system.reach)):
                 part -= faces[f, i] * pull[f]
             lost = 0.0
-            if plant.coupled:
+            if modal_system.coupled:
                 for j in range(n):
-                    lost += plant.damping[i, j] * coefs[k + 1, j]
+                    lost += modal_system.damping[i, j] * coefs[k + 1, j]
             else:
-                lost = plant.damping[i, i] * coefs[k + 1, i]
+                lost = modal_system.damping[i, i] * coefs[k + 1, i]
             coefs[k + 2, i] = scale * part - damp * lost
         if held:
-            constrained(k, scale, plant, coefs, room)
+            constrained(k, scale, modal_system, coefs, workspace)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def value(poly, low, top, u):
     """Sum of poly[k] u^(k - low) for k from low to top."""
     square, even, odd, k = u * u, poly[top], 0.0, top - 1  # two chains of half the length
@@ -192,7 +192,7 @@ def value(poly, low, top, u):
     return even + u * odd if k < low else even * u + odd * square + poly[low]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def value_and_slope(poly, low, top, u):
     """The sum of `value` and its derivative over u."""
     square, k = u * u, top - 1
@@ -207,7 +207,7 @@ def value_and_slope(poly, low, top, u):
     return odd + u * even, even + 2 * u * (odd_slope + u * even_slope)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def polish(poly, low, top, left, right, u):
     """The root in [left, right] of a polynomial that falls there from above zero to below, by guarded Newton from u."""
     last = right - left
@@ -230,7 +230,7 @@ def polish(poly, low, top, left, right, u):
     return u
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def bernstein(poly, low, top, hull):
     """Fill hull (top - low + 1,) with the Bernstein coefficients of poly[low] ... poly[top] on [0, 1]."""
     degree, wide = top - low, (top - low) // 4 * 4 + 4  # whole registers
@@ -242,7 +242,7 @@ def bernstein(poly, low, top, hull):
             hull[i] += part * _HULL[degree, k, i]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def first_look(poly, low, top, hull):
     """u near which the Bernstein coefficients of the first FEW + 1 terms, in hull, come down to what all others can
     add; NONE where they stay above it, so that there is no root."""
@@ -261,8 +261,8 @@ def first_look(poly, low, top, hull):
     return NONE
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def lone_root(poly, low, top, u, room):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def lone_root(poly, low, top, u, workspace):
     """The root that Newton's method finds from u, in (0, 1], where it is proved to be the first one; NONE where not.
 
     p(r s) with p(r) = 0 is (1 - s) q(s), where the coefficients of q are sums of the last ones of p(r s): as long as q
@@ -281,7 +281,7 @@ def lone_root(poly, low, top, u, room):
         done = step <= 2 * EPS * u or (step < 0.01 * last and step * (step / last)**2 <= 0.1 * EPS * u)  # as `polish`
         last = step
         if done:
-            power, rows, total = 1.0, room[0], 0.0
+            power, rows, total = 1.0, workspace[0], 0.0
             for k in range(low, top + 1):
                 rows[k - low] = power * poly[k]
                 power *= u
@@ -290,11 +290,11 @@ def lone_root(poly, low, top, u, room):
                 rows[k] = total
             for k in range(top - low):
                 rows[k] = rows[k + 1]
-            return u if first_look(rows, 0, top - low - 1, room[1]) == NONE else NONE
+            return u if first_look(rows, 0, top - low - 1, workspace[1]) == NONE else NONE
     return NONE
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def first_root(poly, low, top, hulls):
     """First u in (0, 1] at which sum poly[k] u^(k - low), positive just after 0, is no longer so; NONE if none.
 
@@ -339,7 +339,7 @@ def first_root(poly, low, top, hulls):
         hulls[depth, WIDE - 1] = 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _halve(hull, half, degree, first):
     """Bernstein coefficients of the first or the second half of an interval (de Casteljau)."""
     for k in range(degree + 1):
@@ -354,7 +354,7 @@ def _halve(hull, half, degree, first):
                 half[k] = 0.5 * (half[k] + half[k + 1])
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _to_the_right(hulls, depth, width, degree):
     """Go on with the part to the right that an outer halving left: its depth and width; depth 0 where none is left."""
     while depth > 0 and hulls[depth, WIDE - 1] == 1.0:
@@ -366,7 +366,7 @@ def _to_the_right(hulls, depth, width, degree):
     return depth, width
 
 
-@njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", cache=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def largest(poly, top, best, hulls):
     """The larger of `best` and max |sum poly[k] u^k| over [0, 1], to 1e-14 of it: halves whose hull cannot pass it are
     left out, and of one that turns once that turn is what counts."""

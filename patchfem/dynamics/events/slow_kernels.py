@@ -7,8 +7,8 @@ of the springs between. h is many radians of every mode there, so what the highe
 
 from math import sqrt
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import FAST, LEAN
+from ...compiled.jit import njit
+from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from ..dense_kernels import factor, solve
 from .drive_kernels import drive_series, rate_of
 from .memory_kernels import RIGID
@@ -18,134 +18,134 @@ DEAD = 64 * EPS  # of the motion that follows: less that rings is round-off
 LATER = 16.0  # short pieces before it is looked again whether what rings has died out
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def compliances(springs, plant, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def compliances(springs, modal_system, workspace):
     """Factor slide w^-2 slide^T/mass + 1/spring of the interfaces into room.gram (i, i), 1 for one without force.
 
     The rows room.turned stand for the slides: of those that are held as `constrain` leaves them, 0 without force.
     """
-    n, faces = len(plant.square), len(plant.reach)
+    n, faces = len(modal_system.square), len(modal_system.reach)
     for f in range(faces):
         size = 0.0
         for i in range(n):
             if springs[f] < RIGID:
-                room.turned[f, i] = plant.faces[f, i] if springs[f] > 0.0 else 0.0
-            size += room.turned[f, i]**2
+                workspace.turned[f, i] = modal_system.faces[f, i] if springs[f] > 0.0 else 0.0
+            size += workspace.turned[f, i]**2
         for g in range(f + 1):
             part = 0.0
             for i in range(n):
-                part += room.turned[f, i] * room.turned[g, i] / plant.square[i]
-            room.gram[f, g] = part / plant.mass
-        room.gram[f, f] = room.gram[f, f] + 1 / springs[f] if size > 0.0 else 1.0
-    factor(room.gram)
+                part += workspace.turned[f, i] * workspace.turned[g, i] / modal_system.square[i]
+            workspace.gram[f, g] = part / modal_system.mass
+        workspace.gram[f, f] = workspace.gram[f, f] + 1 / springs[f] if size > 0.0 else 1.0
+    factor(workspace.gram)
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def unbalanced(force, place, springs, plant, left):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def unbalanced(force, place, springs, modal_system, left):
     """Fill left (n,) [m s-2] with force (n,) less what modes and springs of the places (n,) [m] pull."""
-    for i in range(len(plant.square)):
-        left[i] = force[i] - plant.square[i] * place[i]
-    for f in range(len(plant.reach)):
+    for i in range(len(modal_system.square)):
+        left[i] = force[i] - modal_system.square[i] * place[i]
+    for f in range(len(modal_system.reach)):
         pull = 0.0
-        for i in range(len(plant.square)):
-            pull += plant.faces[f, i] * place[i]
-        pull = pull * springs[f] / plant.mass if springs[f] < RIGID else 0.0
-        for i in range(len(plant.square)):
-            left[i] -= plant.faces[f, i] * pull
+        for i in range(len(modal_system.square)):
+            pull += modal_system.faces[f, i] * place[i]
+        pull = pull * springs[f] / modal_system.mass if springs[f] < RIGID else 0.0
+        for i in range(len(modal_system.square)):
+            left[i] -= modal_system.faces[f, i] * pull
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def balance(force, place, springs, plant, left, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def balance(force, place, springs, modal_system, left, workspace):
     """Fill place (n,) [m] with K^-1 force (n,) [m s-2] among the motions that leave the held slides alone, left (n,)
     with what those hold."""
-    for i in range(len(plant.square)):
+    for i in range(len(modal_system.square)):
         place[i] = 0.0
     for _ in range(2):  # the second time for the round-off of the first
-        unbalanced(force, place, springs, plant, left)
-        for f in range(len(plant.reach)):
-            room.row[1, f] = 0.0
-            for i in range(len(plant.square)):
+        unbalanced(force, place, springs, modal_system, left)
+        for f in range(len(modal_system.reach)):
+            workspace.row[1, f] = 0.0
+            for i in range(len(modal_system.square)):
                 off = place[i] if springs[f] == RIGID else 0.0
-                room.row[1, f] += room.turned[f, i] * (left[i] / plant.square[i] + off)
-        solve(room.gram, room.row[1])
-        for i in range(len(plant.square)):
-            for f in range(len(plant.reach)):
-                left[i] -= room.turned[f, i] * room.row[1, f] / plant.mass
-            place[i] += left[i] / plant.square[i]
-    unbalanced(force, place, springs, plant, left)
+                workspace.row[1, f] += workspace.turned[f, i] * (left[i] / modal_system.square[i] + off)
+        solve(workspace.gram, workspace.row[1])
+        for i in range(len(modal_system.square)):
+            for f in range(len(modal_system.reach)):
+                left[i] -= workspace.turned[f, i] * workspace.row[1, f] / modal_system.mass
+            place[i] += left[i] / modal_system.square[i]
+    unbalanced(force, place, springs, modal_system, left)
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def slow_series(place, rate, force, springs, plant, h, top, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def slow_series(place, rate, force, springs, modal_system, h, top, workspace):
     """Fill room.coefs, and room.reactions of slides that are held, as `motion_series` does but with the motion that
     follows the drive alone; what rings besides, as a share of it. place, rate (n,): the motion at first; the others as
     there; room.waves[0]: series of the drive over h [s]."""
-    n, faces, coefs, wave, pull = len(plant.square), len(plant.reach), room.coefs, room.waves[0], room.scales[0]
-    compliances(springs, plant, room)
+    n, faces, coefs, wave, pull = len(modal_system.square), len(modal_system.reach), workspace.coefs, workspace.waves[0], workspace.scales[0]
+    compliances(springs, modal_system, workspace)
     for i in range(n):
         coefs[top + 1, i], coefs[top + 2, i] = 0.0, 0.0
     for k in range(top, -1, -1):
         for i in range(n):
-            pull[i] = -plant.base[i] * wave[k] - (k + 1) * (k + 2) * coefs[k + 2, i] / (h * h)
+            pull[i] = -modal_system.base[i] * wave[k] - (k + 1) * (k + 2) * coefs[k + 2, i] / (h * h)
             for j in range(n):
-                pull[i] -= plant.damping[i, j] * (k + 1) * coefs[k + 1, j] / h
+                pull[i] -= modal_system.damping[i, j] * (k + 1) * coefs[k + 1, j] / h
             if k == 0:
-                pull[i] -= plant.square[i] * place[i]
+                pull[i] -= modal_system.square[i] * place[i]
                 for f in range(faces):
-                    pull[i] -= plant.faces[f, i] * force[f] / plant.mass if springs[f] < RIGID else 0.0
-        balance(pull, coefs[k], springs, plant, room.scales[1], room)
+                    pull[i] -= modal_system.faces[f, i] * force[f] / modal_system.mass if springs[f] < RIGID else 0.0
+        balance(pull, coefs[k], springs, modal_system, workspace.scales[1], workspace)
         for f in range(faces):
-            room.reactions[f, k] = 0.0
+            workspace.reactions[f, k] = 0.0
             for i in range(n):
-                room.reactions[f, k] += plant.mass * room.react[f, i] * room.scales[1, i]
+                workspace.reactions[f, k] += modal_system.mass * workspace.react[f, i] * workspace.scales[1, i]
     rings, follows = 0.0, 0.0
     for i in range(n):
-        size = abs(place[i]) + abs(plant.base[i] * wave[0]) / plant.square[i]
+        size = abs(place[i]) + abs(modal_system.base[i] * wave[0]) / modal_system.square[i]
         for k in range(1, top + 1):
             size += abs(coefs[k, i])
         for f in range(faces):
-            size += abs(plant.faces[f, i] * force[f]) / plant.mass / plant.square[i] if springs[f] < RIGID else 0.0
-        rings += plant.square[i] * coefs[0, i]**2 + (coefs[1, i] / h - rate[i])**2
-        follows += plant.square[i] * size**2
+            size += abs(modal_system.faces[f, i] * force[f]) / modal_system.mass / modal_system.square[i] if springs[f] < RIGID else 0.0
+        rings += modal_system.square[i] * coefs[0, i]**2 + (coefs[1, i] / h - rate[i])**2
+        follows += modal_system.square[i] * size**2
         coefs[0, i] = place[i]
     return sqrt(rings / max(follows, 1e-300))
 
 
-@njit(error_model="numpy", cache=True, fastmath=FAST, **LEAN)
-def at_reach(segment, cycle, offset, period, place, rate, force, plant, room):
+@njit(error_model="numpy", cache=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def at_reach(segment, cycle, offset, period, place, rate, force, modal_system, workspace):
     """Share of the motion that rings, of a piece as long as the drive allows, whose `slow_series` is left in the room.
 
     Kept for itself and called: it is rare, and compiled once for all that read pieces.
     """
     h, top = REACH / rate_of(segment, period), powers(REACH)
-    drive_series(segment, cycle, offset, period, h, top, room.waves)
-    return slow_series(place, rate, force, room.springs, plant, h, top, room)
+    drive_series(segment, cycle, offset, period, h, top, workspace.waves)
+    return slow_series(place, rate, force, workspace.springs, modal_system, h, top, workspace)
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def followed(motion, force, plant, clock, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def followed(motion, force, modal_system, time_state, workspace):
     """Rate [1/s] of the drive where the motion merely follows it, its series in the room as `at_reach` leaves it; 0
     elsewhere. now[4]: pieces since the last event or look."""
-    now, segment, period = clock.now, clock.segments[int(clock.now[2])], clock.period[0]
-    if rate_of(segment, period) > plant.slow:
+    now, segment, period = time_state.now, time_state.segments[int(time_state.now[2])], time_state.period[0]
+    if rate_of(segment, period) > modal_system.slow:
         return 0.0
     now[4] += 1
     if now[4] < LATER:
         return 0.0
-    if at_reach(segment, now[0], now[1], period, motion[0], motion[1], force, plant, room) <= DEAD:
+    if at_reach(segment, now[0], now[1], period, motion[0], motion[1], force, modal_system, workspace) <= DEAD:
         return rate_of(segment, period)
     now[4] = 0.0
     return 0.0
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def shortened(share, top, faces, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def shortened(share, top, faces, workspace):
     """Turn the series of a piece in the room into those over a share of it."""
     power = 1.0
     for k in range(top + 1):
-        for i in range(room.coefs.shape[1]):
-            room.coefs[k, i] *= power
-        room.waves[0, k] *= power
+        for i in range(workspace.coefs.shape[1]):
+            workspace.coefs[k, i] *= power
+        workspace.waves[0, k] *= power
         for f in range(faces):
-            room.reactions[f, k] *= power
+            workspace.reactions[f, k] *= power
         power *= share

@@ -82,7 +82,7 @@ class Yields(Shooting):
 
     def __init__(self, one: PeriodMap, drive, half: bool):
         part = drive.segments[0]
-        moved = abs(part.amplitude) / part.omega**2 * float(np.abs(one.plant.base).max())
+        moved = abs(part.amplitude) / part.omega**2 * float(np.abs(one.modal_system.base).max())
         self.one, self.drive, self.half, self.moved_by = one, drive, half, max(moved, 1e-300)
         self.rows = np.maximum(np.abs(one.faces).sum(axis=1), 1e-300)
 

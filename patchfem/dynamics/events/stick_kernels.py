@@ -9,8 +9,8 @@ or at it and going back, and every other one starts to move its own way, told by
 
 from math import sqrt
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import FAST, LEAN
+from ...compiled.jit import njit
+from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .memory_kernels import RIGID, holds, pulled, tangent
 from .series_kernels import EPS, TWICE, motion_series
 
@@ -22,25 +22,25 @@ MAX_ENUMERATED = 8  # slides at rest up to which all choices are tried where the
 EXCHANGES = 8  # exchanges for each slide, after which a choice by exchange is given up
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def turned_rows(plant, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def turned_rows(modal_system, workspace):
     """Turn the rows of the masked slides until they are orthogonal (one-sided Jacobi), room.turned = mix slide; the
     length of the longest."""
-    n, faces = len(plant.square), len(plant.reach)
+    n, faces = len(modal_system.square), len(modal_system.reach)
     for f in range(faces):
         for i in range(n):
-            room.turned[f, i] = plant.faces[f, i] if room.mask[f] == 1.0 else 0.0
+            workspace.turned[f, i] = modal_system.faces[f, i] if workspace.mask[f] == 1.0 else 0.0
         for g in range(faces):
-            room.mix[f, g] = 1.0 if f == g else 0.0
-    for _ in range(40 if room.held[0] > 1.0 else 0):
+            workspace.mix[f, g] = 1.0 if f == g else 0.0
+    for _ in range(40 if workspace.held[0] > 1.0 else 0):
         quiet = True
         for f in range(faces):
             for g in range(f + 1, faces):
                 a, b, c = 0.0, 0.0, 0.0
                 for i in range(n):
-                    a += room.turned[f, i]**2
-                    b += room.turned[g, i]**2
-                    c += room.turned[f, i] * room.turned[g, i]
+                    a += workspace.turned[f, i]**2
+                    b += workspace.turned[g, i]**2
+                    c += workspace.turned[f, i] * workspace.turned[g, i]
                 if abs(c) <= EPS * sqrt(a * b):
                     continue
                 quiet = False
@@ -48,165 +48,165 @@ def turned_rows(plant, room):
                 slope = (1.0 if steep >= 0 else -1.0) / (abs(steep) + sqrt(1 + steep * steep))
                 cosine = 1 / sqrt(1 + slope * slope)
                 for i in range(n):
-                    p, q = room.turned[f, i], room.turned[g, i]
-                    room.turned[f, i], room.turned[g, i] = cosine * (p - slope * q), cosine * (slope * p + q)
+                    p, q = workspace.turned[f, i], workspace.turned[g, i]
+                    workspace.turned[f, i], workspace.turned[g, i] = cosine * (p - slope * q), cosine * (slope * p + q)
                 for h in range(faces):
-                    p, q = room.mix[f, h], room.mix[g, h]
-                    room.mix[f, h], room.mix[g, h] = cosine * (p - slope * q), cosine * (slope * p + q)
+                    p, q = workspace.mix[f, h], workspace.mix[g, h]
+                    workspace.mix[f, h], workspace.mix[g, h] = cosine * (p - slope * q), cosine * (slope * p + q)
         if quiet:
             break
     most = 0.0
     for f in range(faces):
         size = 0.0
         for i in range(n):
-            size += room.turned[f, i]**2
+            size += workspace.turned[f, i]**2
         most = max(most, size)
     return sqrt(most)
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def constrain(plant, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def constrain(modal_system, workspace):
     """Hold the slides of room.mask (i,).
 
     Fills turned (i, n), orthogonal rows that span theirs (0 in those too many), react (i, n), the pseudo-inverse of
     their rows turned over (0 in those of the others), tied (i,) 1 where they hold a slide, and held: (how many there
     are, whether nothing can move).
     """
-    n, faces = len(plant.square), len(plant.reach)
+    n, faces = len(modal_system.square), len(modal_system.reach)
     count = 0.0
     for f in range(faces):
-        count += room.mask[f]
-        room.tied[f] = 0.0
+        count += workspace.mask[f]
+        workspace.tied[f] = 0.0
         for i in range(n):
-            room.react[f, i] = 0.0
-    room.held[0], room.held[1] = count, 0.0
+            workspace.react[f, i] = 0.0
+    workspace.held[0], workspace.held[1] = count, 0.0
     if count == 0.0:
         return
-    most = turned_rows(plant, room)
+    most = turned_rows(modal_system, workspace)
     for p in range(faces):
         size = 0.0
         for i in range(n):
-            size += room.turned[p, i]**2
+            size += workspace.turned[p, i]**2
         if sqrt(size) <= 1e-10 * most:
             for i in range(n):
-                room.turned[p, i] = 0.0
+                workspace.turned[p, i] = 0.0
             continue
         for q in range(faces):
-            if room.mask[q] == 1.0:
+            if workspace.mask[q] == 1.0:
                 for i in range(n):
-                    room.react[q, i] += room.mix[p, q] * room.turned[p, i] / size
+                    workspace.react[q, i] += workspace.mix[p, q] * workspace.turned[p, i] / size
     frees = 0.0 if count >= n else 1.0
     if count >= n:
         for i in range(n):
             for j in range(n):
                 part = 1.0 if i == j else 0.0
                 for f in range(faces):
-                    part -= room.react[f, i] * plant.faces[f, j]
+                    part -= workspace.react[f, i] * modal_system.faces[f, j]
                 frees = max(frees, abs(part))
     if frees < 1e-9:
-        room.held[1] = 1.0
+        workspace.held[1] = 1.0
     for f in range(faces):
         left, size = 0.0, 0.0
         for j in range(n):
-            part = plant.faces[f, j]
+            part = modal_system.faces[f, j]
             for g in range(faces):
                 along = 0.0
                 for i in range(n):
-                    along += plant.faces[f, i] * room.react[g, i]
-                part -= along * plant.faces[g, j]
+                    along += modal_system.faces[f, i] * workspace.react[g, i]
+                part -= along * modal_system.faces[g, j]
             left += part * part
-            size += plant.faces[f, j]**2
-        if room.held[1] == 1.0 or left < 1e-18 * size:
-            room.tied[f] = 1.0
+            size += modal_system.faces[f, j]**2
+        if workspace.held[1] == 1.0 or left < 1e-18 * size:
+            workspace.tied[f] = 1.0
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def leave_alone(rates, plant, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def leave_alone(rates, modal_system, workspace):
     """Take from rates (n,) what moves the slides that are held."""
-    n = len(plant.square)
-    if room.held[1] == 1.0:
+    n = len(modal_system.square)
+    if workspace.held[1] == 1.0:
         for i in range(n):
             rates[i] = 0.0
         return
-    for f in range(len(plant.reach)):
-        room.row[0, f] = 0.0
+    for f in range(len(modal_system.reach)):
+        workspace.row[0, f] = 0.0
         for i in range(n):
-            room.row[0, f] += plant.faces[f, i] * rates[i]
-    for f in range(len(plant.reach)):
+            workspace.row[0, f] += modal_system.faces[f, i] * rates[i]
+    for f in range(len(modal_system.reach)):
         for i in range(n):
-            rates[i] -= room.react[f, i] * room.row[0, f]
+            rates[i] -= workspace.react[f, i] * workspace.row[0, f]
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def keep(motion, plant, memory, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def keep(motion, modal_system, memory, workspace):
     """Take the round-off of slides that are held out of coordinates and rates."""
-    if room.held[0] == 0.0 or room.held[1] == 1.0:
+    if workspace.held[0] == 0.0 or workspace.held[1] == 1.0:
         return
-    n = len(plant.square)
-    leave_alone(motion[1], plant, room)
-    for f in range(len(plant.reach)):
-        room.row[0, f] = memory.place[f]
+    n = len(modal_system.square)
+    leave_alone(motion[1], modal_system, workspace)
+    for f in range(len(modal_system.reach)):
+        workspace.row[0, f] = memory.place[f]
         for i in range(n):
-            room.row[0, f] -= plant.faces[f, i] * motion[0, i]
-    for f in range(len(plant.reach)):
+            workspace.row[0, f] -= modal_system.faces[f, i] * motion[0, i]
+    for f in range(len(modal_system.reach)):
         for i in range(n):
-            motion[0, i] += room.react[f, i] * room.row[0, f]
+            motion[0, i] += workspace.react[f, i] * workspace.row[0, f]
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def round_off(motion, force, springs, plant, h, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def round_off(motion, force, springs, modal_system, h, workspace):
     """Fill scales (LAST + 2, n) with the magnitudes that the terms of a motion are added from, spans (i, LAST) with
     those of the reactions [N]; arguments as of `motion_series`."""
-    n, faces, squared, wave = len(plant.square), plant.faces, h * h, room.waves[0]
+    n, faces, squared, wave = len(modal_system.square), modal_system.faces, h * h, workspace.waves[0]
     for i in range(n):
-        room.scales[0, i], room.scales[1, i] = abs(motion[0, i]), abs(h * motion[1, i])
+        workspace.scales[0, i], workspace.scales[1, i] = abs(motion[0, i]), abs(h * motion[1, i])
     for k in range(LAST):
         scale, damp = TWICE[k + 2] * squared, TWICE[k + 2] * h * (k + 1)
-        for f in range(len(plant.reach)):
-            room.pull[f] = 0.0
+        for f in range(len(modal_system.reach)):
+            workspace.pull[f] = 0.0
             if springs[f] < RIGID and k == 0:
-                room.pull[f] = abs(force[f]) / plant.mass
+                workspace.pull[f] = abs(force[f]) / modal_system.mass
             elif springs[f] < RIGID:
                 for i in range(n):
-                    room.pull[f] += abs(faces[f, i]) * room.scales[k, i] * springs[f] / plant.mass
+                    workspace.pull[f] += abs(faces[f, i]) * workspace.scales[k, i] * springs[f] / modal_system.mass
         for i in range(n):
-            part, lost = plant.square[i] * room.scales[k, i] + abs(plant.base[i] * wave[k]), 0.0
-            for f in range(len(plant.reach)):
-                part += abs(faces[f, i]) * room.pull[f]
+            part, lost = modal_system.square[i] * workspace.scales[k, i] + abs(modal_system.base[i] * wave[k]), 0.0
+            for f in range(len(modal_system.reach)):
+                part += abs(faces[f, i]) * workspace.pull[f]
             for j in range(n):
-                lost += abs(plant.damping[i, j]) * room.scales[k + 1, j]
-            room.scales[k + 2, i] = scale * part + damp * lost
-        if room.held[0] == 0.0:
+                lost += abs(modal_system.damping[i, j]) * workspace.scales[k + 1, j]
+            workspace.scales[k + 2, i] = scale * part + damp * lost
+        if workspace.held[0] == 0.0:
             continue
-        for f in range(len(plant.reach)):
-            room.spans[f, k] = 0.0
+        for f in range(len(modal_system.reach)):
+            workspace.spans[f, k] = 0.0
             for i in range(n):
-                room.spans[f, k] += abs(room.react[f, i]) * room.scales[k + 2, i]
-        for f in range(len(plant.reach)):
+                workspace.spans[f, k] += abs(workspace.react[f, i]) * workspace.scales[k + 2, i]
+        for f in range(len(modal_system.reach)):
             for i in range(n):
-                room.scales[k + 2, i] += abs(faces[f, i]) * room.spans[f, k]
-            room.spans[f, k] *= plant.mass / scale
+                workspace.scales[k + 2, i] += abs(faces[f, i]) * workspace.spans[f, k]
+            workspace.spans[f, k] *= modal_system.mass / scale
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def leaves(face, sign, noise, plant, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def leaves(face, sign, noise, modal_system, workspace):
     """(order, sign) of the first term of sign * speed of a slide that is above its round-off; (LAST, 0) without."""
     for k in range(1, LAST):
         rate, size = 0.0, 0.0
-        for i in range(len(plant.square)):
-            rate += plant.faces[face, i] * room.coefs[k + 1, i]
-            size += abs(plant.faces[face, i]) * room.scales[k + 1, i]
+        for i in range(len(modal_system.square)):
+            rate += modal_system.faces[face, i] * workspace.coefs[k + 1, i]
+            size += abs(modal_system.faces[face, i]) * workspace.scales[k + 1, i]
         if abs(rate) > noise * size:
             return float(k), 1.0 if sign * rate > 0 else -1.0
     return float(LAST), 0.0
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def margin(face, side, noise, limit, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def margin(face, side, noise, limit, workspace):
     """(order, sign) of the first term of limit - side * reaction of a slide that is above its round-off; (LAST, 0)
     without."""
     for k in range(LAST):
-        left, size = -side * room.reactions[face, k], room.spans[face, k]
+        left, size = -side * workspace.reactions[face, k], workspace.spans[face, k]
         if k == 0:
             left, size = left + limit, size + limit
         if abs(left) > noise * size:
@@ -214,8 +214,8 @@ def margin(face, side, noise, limit, room):
     return float(LAST), 0.0
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def judge(noise, motion, plant, table, memory, h, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def judge(noise, motion, modal_system, table, memory, h, workspace):
     """(slide, side) of the first one for which the signs of slip in room.guess (i,), 0 of slides that hold, break the
     law just after an event, those of room.resting having no speed: overloaded on a side, 1 or -1, or 0 where it does
     not go the way of its slip; (-1, 0) where all obey.
@@ -223,39 +223,39 @@ def judge(noise, motion, plant, table, memory, h, room):
     memory.head, force, springs and what holds are left as they are under the guess, orders as the search for the next
     event takes them.
     """
-    faces = len(plant.reach)
+    faces = len(modal_system.reach)
     for f in range(faces):
-        room.mask[f] = 1.0 if table.static[f] > 0.0 and room.guess[f] == 0.0 else 0.0
-    constrain(plant, room)
+        workspace.mask[f] = 1.0 if table.static[f] > 0.0 and workspace.guess[f] == 0.0 else 0.0
+    constrain(modal_system, workspace)
     for f in range(faces):
         if table.static[f] > 0.0:
-            others = room.guess[f] != 0.0 and room.tied[f] == 1.0 and room.resting[f] == 1.0
-            memory.head[f] = 2.0 * room.guess[f] if others else room.guess[f]
+            others = workspace.guess[f] != 0.0 and workspace.tied[f] == 1.0 and workspace.resting[f] == 1.0
+            memory.head[f] = 2.0 * workspace.guess[f] if others else workspace.guess[f]
         memory.force[f] = pulled(f, table, memory)
-        room.springs[f] = tangent(f, table, memory)[0]
-        room.orders[f, 0], room.orders[f, 1] = 0.0, 0.0
-    motion_series(motion[0], motion[1], memory.force, room.springs, plant, room.waves[0], h, LAST + 1, room.coefs, room)
-    round_off(motion, memory.force, room.springs, plant, h, room)
+        workspace.springs[f] = tangent(f, table, memory)[0]
+        workspace.orders[f, 0], workspace.orders[f, 1] = 0.0, 0.0
+    motion_series(motion[0], motion[1], memory.force, workspace.springs, modal_system, workspace.waves[0], h, LAST + 1, workspace.coefs, workspace)
+    round_off(motion, memory.force, workspace.springs, modal_system, h, workspace)
     for f in range(faces):
-        if room.resting[f] == 0.0 or table.static[f] == 0.0 or abs(memory.head[f]) == 2.0:
+        if workspace.resting[f] == 0.0 or table.static[f] == 0.0 or abs(memory.head[f]) == 2.0:
             continue
         if memory.head[f] != 0.0:
-            order, lead = leaves(f, memory.head[f], noise, plant, room)
+            order, lead = leaves(f, memory.head[f], noise, modal_system, workspace)
             if lead <= 0.0:
                 return f, 0
-            room.orders[f, 0] = order
+            workspace.orders[f, 0] = order
             continue
         for side in (1, -1):
-            order, lead = margin(f, side, noise, table.static[f], room)
+            order, lead = margin(f, side, noise, table.static[f], workspace)
             if lead < 0.0:
                 return f, side
             if lead > 0.0:
-                room.orders[f, (1 - side) // 2] = order
+                workspace.orders[f, (1 - side) // 2] = order
     return -1, 0
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def exchanged(noise, motion, plant, table, memory, h, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def exchanged(noise, motion, modal_system, table, memory, h, workspace):
     """Exchange the first slide that breaks the law, from room.guess (i,) on; whether a choice is found.
 
     This is the rule of least index (Murty, Opsearch 11, 148, 1974). It ends with the only solution wherever the
@@ -263,81 +263,81 @@ def exchanged(noise, motion, plant, table, memory, h, room):
     is the case for slides that are independent and break at their kinetic limit. Of 1800 random choices among 5 to 16
     slides at rest it and `every` together missed 26, all of more than eight slides of fewer modes.
     """
-    for _ in range(EXCHANGES * len(plant.reach)):
-        slide, side = judge(noise, motion, plant, table, memory, h, room)
+    for _ in range(EXCHANGES * len(modal_system.reach)):
+        slide, side = judge(noise, motion, modal_system, table, memory, h, workspace)
         if slide < 0:
             return True
-        room.guess[slide] = float(side)
+        workspace.guess[slide] = float(side)
     return False
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def every(noise, motion, plant, table, memory, h, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def every(noise, motion, modal_system, table, memory, h, workspace):
     """Whether one of all choices of the slides at rest holds, those with few that slip first."""
-    faces, count, codes = len(plant.reach), 0, 1
+    faces, count, codes = len(modal_system.reach), 0, 1
     for f in range(faces):
-        if room.resting[f] == 1.0:
+        if workspace.resting[f] == 1.0:
             count, codes = count + 1, codes * 3
     for slips in range(count + 1):
         for code in range(codes):
             left, found = code, 0
             for f in range(faces - 1, -1, -1):
-                room.guess[f] = room.signs[f]
-                if room.resting[f] == 1.0:
+                workspace.guess[f] = workspace.signs[f]
+                if workspace.resting[f] == 1.0:
                     digit = left % 3
-                    room.guess[f] = -1.0 if digit == 2 else float(digit)
+                    workspace.guess[f] = -1.0 if digit == 2 else float(digit)
                     left, found = left // 3, found + (digit > 0)
-            if found == slips and judge(noise, motion, plant, table, memory, h, room)[0] < 0:
+            if found == slips and judge(noise, motion, modal_system, table, memory, h, workspace)[0] < 0:
                 return True
     return False
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def settle(motion, plant, table, memory, h, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def settle(motion, modal_system, table, memory, h, workspace):
     """Choose which rigid elements hold just after an event, and which way the others slip; whether a choice was found.
 
     The first guess is judged, then slides are exchanged, then all choices of a few slides are tried.
     room.signs (i,): the first guess; of slides outside of room.resting (i,) their slip. room.waves[0]: series of the
     drive over h [s]. Rates of the resting slides are taken out of the motion.
     """
-    faces, count = len(plant.reach), 0
+    faces, count = len(modal_system.reach), 0
     for f in range(faces):
-        room.mask[f] = room.resting[f]
-    constrain(plant, room)
-    if room.held[0] > 0.0:
-        leave_alone(motion[1], plant, room)
+        workspace.mask[f] = workspace.resting[f]
+    constrain(modal_system, workspace)
+    if workspace.held[0] > 0.0:
+        leave_alone(motion[1], modal_system, workspace)
     for f in range(faces):
-        if table.static[f] > 0.0 and room.tied[f] == 1.0:
-            room.resting[f] = 1.0
-        count += int(room.resting[f])
+        if table.static[f] > 0.0 and workspace.tied[f] == 1.0:
+            workspace.resting[f] = 1.0
+        count += int(workspace.resting[f])
     for noise in (NOISE, LOOSER * NOISE):
         for f in range(faces):
-            room.guess[f] = room.signs[f]
-        if judge(noise, motion, plant, table, memory, h, room)[0] < 0:
+            workspace.guess[f] = workspace.signs[f]
+        if judge(noise, motion, modal_system, table, memory, h, workspace)[0] < 0:
             return True
-        if count > MAX_ENUMERATED_FIRST and exchanged(noise, motion, plant, table, memory, h, room):
+        if count > MAX_ENUMERATED_FIRST and exchanged(noise, motion, modal_system, table, memory, h, workspace):
             return True
-        if count <= MAX_ENUMERATED and every(noise, motion, plant, table, memory, h, room):
+        if count <= MAX_ENUMERATED and every(noise, motion, modal_system, table, memory, h, workspace):
             return True
     return False
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def at_rest(u, h, top, plant, table, memory, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def at_rest(u, h, top, modal_system, table, memory, workspace):
     """Note in room.resting (i,) which slides of rigid elements have no speed at u of a piece: those held, and those
     whose speed is round-off; room.signs are those of their slip."""
-    for f in range(len(plant.reach)):
+    for f in range(len(modal_system.reach)):
         head = memory.head[f]
-        room.signs[f] = 0.0 if head == 0.0 else 1.0 if head > 0 else -1.0
-        room.resting[f] = 1.0 if table.static[f] > 0.0 else 0.0
+        workspace.signs[f] = 0.0 if head == 0.0 else 1.0 if head > 0 else -1.0
+        workspace.resting[f] = 1.0 if table.static[f] > 0.0 else 0.0
         if holds(f, table, memory) or table.static[f] == 0.0 or abs(head) == 2.0:
             continue
         speed, size, power = 0.0, 0.0, 1.0
         for k in range(1, top + 1):
-            for i in range(len(plant.square)):
-                part = plant.faces[f, i] * room.coefs[k, i] * (k * power)
+            for i in range(len(modal_system.square)):
+                part = modal_system.faces[f, i] * workspace.coefs[k, i] * (k * power)
                 speed += part
                 size += abs(part)
             power *= u
-        if room.signs[f] * speed > NOISE * size:
-            room.resting[f] = 0.0
+        if workspace.signs[f] * speed > NOISE * size:
+            workspace.resting[f] = 0.0

@@ -63,17 +63,17 @@ class Stretch:
     """
 
     def __init__(self, run, row, after, span: float):
-        modes, plant, n = run.modes, run.plant, run.modes.omega.size
+        modes, modal_system, n = run.modes, run.modal_system, run.modes.omega.size
         self.run, self.row, self.after, self.span = run, row, after, span
         at = run._at(0, 0)
         columns = row[at:].reshape(len(run.groups), run.kernels.EACH)
         self.held, self.signs = np.isinf(columns[:, 1]), columns[:, 7]
-        rows = plant.faces[self.held]
+        rows = modal_system.faces[self.held]
         self.pinv = np.linalg.pinv(rows, rcond=1e-10)
         self.project = np.eye(n) - self.pinv @ rows
         if len(rows) and np.abs(self.project).max() < 1e-9:
             self.project = np.zeros((n, n))
-        self.given = np.where(self.held, 0.0, columns[:, 0]) @ plant.faces / modes.mass
+        self.given = np.where(self.held, 0.0, columns[:, 0]) @ modal_system.faces / modes.mass
         self.square, self.dampers = np.diag(modes.omega**2), np.asarray(modes.dampers, float)
 
     def slope(self) -> np.ndarray:
@@ -107,8 +107,8 @@ class Stretch:
         face, stops = _what_happened(self, later, changed, modes.mass * pull @ self.pinv)
         gradient, static, kinetic = np.zeros(2 * n), run.table.static[face], run.table.kinetic[face]
         if stops:
-            gradient[n:] = run.plant.faces[face]
-            speed = float(run.plant.faces[face] @ before)
+            gradient[n:] = run.modal_system.faces[face]
+            speed = float(run.modal_system.faces[face] @ before)
         else:
             react = self.pinv[:, np.flatnonzero(self.held) == face][:, 0]
             gradient[:n], gradient[n:] = -react @ self.square, -react @ self.dampers

@@ -8,8 +8,8 @@ from ...contact.stiffness import tangential_stiffness
 from ...core import Outcome, PatchfemError, Response
 from ...friction.grooves import Grooves
 from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes
-from ..contacts.arrays import Climbing
 from ..integrated import accelerations
+from ..interfaces.arrays import Climbing
 from ..march.march import Run
 from ..march.varying_load import PLASTIC, Rubbing, plastic, rub_of
 

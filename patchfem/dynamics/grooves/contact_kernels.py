@@ -12,35 +12,35 @@ from math import cos, sin, sqrt
 
 import numpy as np
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import LEAN
+from ...compiled.jit import njit
+from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ..modal_kernels import narrowed
 from . import points_kernels as points
 
 LOAD, WAVE, AMPLITUDE, PHASE, LIFTED = range(5)  # of contacts.arrays.Climbing.flank
 RISE, VERTICAL, LAST, LAST_BUT_ONE, LIFTS, PULL, PULL_SLOPE, ALONG, MEAN_SLOPE, PATH, HELD, PLACE, BEFORE, NORMAL \
     = range(14)  # of now_at
-INNER = sqrt(0.6)  # outer points of Gauss's rule of three
+NJIT_INTERNAL = sqrt(0.6)  # outer points of Gauss's rule of three
 STEEP = 1e-4  # radians of a groove below which sines are series
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def steep(flank, q):
     """Slope t [1] of the flank at the slide q [m]."""
     return flank[AMPLITUDE] * flank[WAVE] * np.sin(flank[WAVE] * q - flank[PHASE])
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def path_over(flank, q, dq):
     """Mean of sqrt(1 + t^2), ds/dq, over the slide dq [m] from q [m], by Gauss's rule of three."""
     path = 0.0
     for k in range(-1, 2):
-        t = steep(flank, q + 0.5 * dq * (1 + k * INNER))
+        t = steep(flank, q + 0.5 * dq * (1 + k * NJIT_INTERNAL))
         path = path + (4 / 9 if k == 0 else 5 / 18) * np.sqrt(1 + t * t)
     return path
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def over(flank, q, dq):
     """(mean slope dz/dq, mean of sqrt(1 + t^2), ds/dq) over the slide dq [m] from q [m]."""
     half, middle = 0.5 * flank[WAVE] * dq, flank[WAVE] * (q + 0.5 * dq) - flank[PHASE]
@@ -48,7 +48,7 @@ def over(flank, q, dq):
     return flank[AMPLITUDE] * flank[WAVE] * sin(middle) * share, path_over(flank, q, dq)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def climb(dq, q, dt, flank, at):
     """(path [m] along the flank, normal force [N] at its end without friction, slope [1] there) of a slide dq [m] in dt
     [s]; mean slope, path over slide and mean vertical force [N] go into `at`."""
@@ -60,7 +60,7 @@ def climb(dq, q, dt, flank, at):
     return at[PATH] * dq, max(at[HELD], 0.0) * sqrt(1 + end * end), end
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def resist(pulled, gain, middle, dt, flank, at):
     """Write the mean force against a slide, and its slope [N/m], into `at`; pulled [N], gain [N/m]: mean force along
     the flank and its slope; middle [m]: of the slide."""
@@ -70,7 +70,7 @@ def resist(pulled, gain, middle, dt, flank, at):
     at[PULL_SLOPE] = gain * path * path + at[HELD] * bend + 2 * flank[LIFTED] * slope * slope / (dt * dt)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def pull(dq, q, dt, c):
     """Write the mean force over the slide dq [m] in dt [s], and what belongs to it, into c.now_at: NORMAL is then the
     normal force at its end; BEFORE is that at its start, PLACE the force of the law there."""
@@ -79,7 +79,7 @@ def pull(dq, q, dt, c):
     resist(pulled, gain, q + 0.5 * dq, dt, c.flank, c.now_at)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve(free, beta, q, v, dt, c, goal):
     """(dq [m], mean force [N], iterations) of a step with dq = free - beta force, as of `contacts.element_kernels`."""
     at, low, high = c.now_at, -np.inf, np.inf
@@ -99,7 +99,7 @@ def solve(free, beta, q, v, dt, c, goal):
     return dq, at[PULL], -200
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def given(dq, q, v, dt, c, goal):
     """(mean force [N], True) over a slide dq [m] in dt [s] that is prescribed."""
     t = steep(c.flank, q)
@@ -108,7 +108,7 @@ def given(dq, q, v, dt, c, goal):
     return c.now_at[PULL], True
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit(dq, force, q, v0, v1, dt, c):
     """Keep the solved step of mean force [N]; (energy dissipated along the flank [J], True)."""
     at = c.now_at
@@ -124,7 +124,7 @@ def commit(dq, force, q, v0, v1, dt, c):
     return lost, fine
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def state(c, q, v):
     """(force against the slide [N], energy stored in height, lifted mass and law [J], irreversible slip [m]) at the
     slide q [m] and the speed v [m/s]."""

@@ -9,8 +9,8 @@ where the direction is 0.
 
 from math import cos, inf, nan, sin, sqrt, tanh
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import LEAN, knee
+from ...compiled.jit import njit
+from ...friction.flags_kernels import NJIT_NO_REFCOUNT, knee
 from ..smooth.arrays import EASE, FREE, PLACE, PULL, UPRIGHT
 
 __all__ = ["SET_VALUED", "begin", "finish", "gives", "knee", "rate", "shown"]
@@ -19,21 +19,21 @@ SET_VALUED = True
 LOAD, WAVE, AMPLITUDE, PHASE, LIFTED, STATIC, KINETIC, SPEED = range(1, 9)  # of num
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def flank(num, q):
     """(slope t of the flank [1], its rate t' over the slide [1/m]) at the slide q [m]."""
     steep, turn = num[0, AMPLITUDE] * num[0, WAVE], num[0, WAVE] * q - num[0, PHASE]
     return steep * sin(turn), steep * num[0, WAVE] * cos(turn)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def holds(num, turn):
     """(smallest, largest) force [N] with which the flank holds the slide at rest, as `turn` has it."""
     t, mu, load = flank(num, turn[PLACE])[0], num[0, STATIC], num[0, LOAD]
     return load * (t - mu) / (1 + mu * t), load * (t + mu) / (1 - mu * t)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def gives(num, turn):
     """Direction in which it lets go of the slide at rest, 0 where it holds; a force of the speed never holds."""
     if num[0, SPEED] > 0:
@@ -42,13 +42,13 @@ def gives(num, turn):
     return 1.0 if turn[PULL] > high else -1.0 if turn[PULL] < low else 0.0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def begin(num, mem, way, y):
     """Path to the next kink: there is none, and no state to set."""
     return inf
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def rate(num, mem, turn, dq, v, y, out):
     """Force F [N] against the slide; writes the rates of y into out, F and the vertical force V [N] into turn.
 
@@ -74,7 +74,7 @@ def rate(num, mem, turn, dq, v, y, out):
     return turn[PULL]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def shown(num, mem, turn, dq, q, v, y):
     """(force [N] that `rate` left in turn, energy [J] of the load's height and of the mass that rises, the
     slide q [m])."""
@@ -83,7 +83,7 @@ def shown(num, mem, turn, dq, q, v, y):
     return turn[PULL], height + 0.5 * num[0, LIFTED] * rise * rise, q
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def finish(num, mem, turn, dq, v, y):
     """There is no memory; nan, as only the work tells what is dissipated."""
     return nan

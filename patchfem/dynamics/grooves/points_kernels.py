@@ -5,27 +5,27 @@ normal force and slide along the flank, as in `contacts.shear_solve_kernels`. `c
 commit and state.
 """
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import LEAN
-from ..contacts.pressed_points_kernels import press_all, rub_commit, rub_force, rub_state, spring_back
-from ..contacts.shear_points_kernels import SLOPE
-from ..contacts.shear_solve_kernels import GRADIENT, STEP, descend, halfway, hessian
-from ..contacts.shear_solve_kernels import pulled as drawn
+from ...compiled.jit import njit
+from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ..dense_kernels import factor
 from ..dense_kernels import solve as solve_factored
+from ..interfaces.pressed_points_kernels import press_all, rub_commit, rub_force, rub_state, spring_back
+from ..interfaces.shear_points_kernels import SLOPE
+from ..interfaces.shear_solve_kernels import GRADIENT, STEP, descend, halfway, hessian
+from ..interfaces.shear_solve_kernels import pulled as drawn
 
 LOAD, KIND = 0, 5  # of contacts.arrays.Climbing.flank, as in `contact_kernels`
 PLACE, NORMAL = 11, 13  # of now_at
 TINY = 1e-13  # of the friction limit, to which pieces that give way are solved
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def begun(c, v, dt):
     """Begin a step of dt [s] at the speed v [m/s] along the flank."""
     halfway(v, dt, c)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def drag(ds, flat, end, dt, c):
     """(mean force [N] along the flank over the path ds [m] in dt [s], its slope [N/m]); c.pressed become shares of the
     normal force flat + f end at the end, on a slope `end`, where f is the force there."""
@@ -54,7 +54,7 @@ def drag(ds, flat, end, dt, c):
     return pulled, stiff(c) if gives else gain
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def load(c, normal):
     """Put the normal force [N] on the points."""
     c.now_at[NORMAL] = normal
@@ -62,10 +62,10 @@ def load(c, normal):
         c.pressed[1, j] = c.share[j] * normal
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def stiff(c):
     """Slope [N/m] of the force over the slide of the holder, of points behind shear modes that have been solved for."""
-    hess, p, total = c.hess[0], c.room[STEP], 0.0
+    hess, p, total = c.hess[0], c.workspace[STEP], 0.0
     for j in range(int(c.count[0])):
         total += c.points[SLOPE, j]
     if c.ready[0] == 0.0:
@@ -75,18 +75,18 @@ def stiff(c):
         c.ready[0] = 1.0
     drawn(SLOPE, c.psi, c.points, int(c.count[0]), p)
     p[0] = 0.0
-    return max(total - bent(hess, p, c.room[GRADIENT]), 0.01 * total)
+    return max(total - bent(hess, p, c.workspace[GRADIENT]), 0.01 * total)
 
 
-@njit(error_model="numpy", **LEAN)
-def bent(hess, p, room):
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def bent(hess, p, workspace):
     """p . hess^-1 p (n,) of a factor."""
     for k in range(p.size):
-        room[k] = p[k]
-    return solve_factored(hess, room)
+        workspace[k] = p[k]
+    return solve_factored(hess, workspace)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit(ds, along, v0, v1, dt, c):
     """Keep the step over the path ds [m] under the mean force `along` [N] between the speeds v0, v1 [m/s] along the
     flank; (energy dissipated [J], whether points and pieces agree)."""
@@ -100,7 +100,7 @@ def commit(ds, along, v0, v1, dt, c):
     return lost, fine
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def state(c, q):
     """(force along the flank [N], energy stored in the law [J], irreversible slip [m]) at the slide q [m]."""
     return rub_state(int(c.flank[KIND]), c, q)

@@ -84,7 +84,7 @@ class SampledRun(GroovesRun):
 
     def _sums_of(self) -> np.ndarray:
         """Work of the drive, viscous loss, its |work|, friction's own loss, steps and work of the slide [J]."""
-        y, own, n = self.motion_of.moving.y, self.motion_of.kept.tally, 2 * self.modes.omega.size
+        y, own, n = self.motion_of.moving.y, self.motion_of.kept.counters, 2 * self.modes.omega.size
         return np.array([y[-3], y[-2], own[POWER], y[n], own[DONE], y[-1]])
 
     def fork(self, drive):
@@ -113,17 +113,17 @@ class SampledRun(GroovesRun):
         if 0 < last < len(seen) - 1:  # the sums and the state are those of the last sample
             motion = self.motion_of = begun
             motion.until(times[last], times[:last + 1])
-        seen, work, slid = seen[:last + 1], np.diff(seen[:last + 1, -1]), np.diff(seen[:last + 1, 2 * n + 1])
+        seen, work, slip_path = seen[:last + 1], np.diff(seen[:last + 1, -1]), np.diff(seen[:last + 1, 2 * n + 1])
         part = rows[:last + 1]
         part[:, :2 * n + 2], part[:, 2 * n + 2], part[:, 2 * n + 3] = seen[:, 1:2 * n + 3], seen[:, 2 * n + 3], \
             seen[:, 2 * n + 4]
         part[:, 2 * n + 4], part[:, 2 * n + 5] = seen[:, 2 * n + 3], seen[:, 2 * n + 5]
-        part[:-1, 2 * n + 4] = np.divide(work, slid, out=seen[:-1, 2 * n + 3].copy(), where=slid != 0)
+        part[:-1, 2 * n + 4] = np.divide(work, slip_path, out=seen[:-1, 2 * n + 3].copy(), where=slip_path != 0)
         part[:-1, 2 * n + 6], part[:-1, 2 * n + 7] = work, work - np.diff(seen[:, 2 * n + 5])
         self.state[:] = motion.moving.y[:2 * n].reshape(2, n)
         sums = self._sums_of()
         self.ledger[[0, 1, 2, 3, 5, 8]] += sums - self.booked
-        self.ledger[4], self.booked = max(self.ledger[4], motion.kept.tally[STORED]), sums
+        self.ledger[4], self.booked = max(self.ledger[4], motion.kept.counters[STORED]), sums
         return last, status
 
     def _sampled(self, rows) -> np.ndarray:

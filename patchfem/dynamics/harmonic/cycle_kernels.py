@@ -7,11 +7,11 @@ elements. Plain twins are in the tests.
 
 import numpy as np
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import LEAN
+from ...compiled.jit import njit
+from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def slide_at(re, im, angle):
     """(value, first and second derivative) of Re sum X_k exp(i k angle)."""
     c, s = np.cos(angle), np.sin(angle)
@@ -26,7 +26,7 @@ def slide_at(re, im, angle):
     return value, rate, bend
 
 
-@njit(error_model="numpy", cache=True, **LEAN)
+@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def turning_points(re, im, rate, angle, place, cell):
     """Turning points of the slide with harmonics re + i im (H + 1,) whose rate at N uniform angles is known.
 
@@ -78,8 +78,8 @@ def turning_points(re, im, rate, angle, place, cell):
     return count, start
 
 
-@njit(error_model="numpy", cache=True, **LEAN)
-def jenkins_cycle(q, start, cells, turns, limit, stiff, full, square, room, force, slope, hold, stretch):
+@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
+def jenkins_cycle(q, start, cells, turns, limit, stiff, full, square, workspace, force, slope, hold, stretch):
     """Steady loop of t parallel Jenkins elements, limit (t,) rising, along samples q (N,) of one cycle.
 
     turns, cells (R,): places of the turning points and the sample before each; stiff, full, square (t + 1,): running
@@ -89,7 +89,7 @@ def jenkins_cycle(q, start, cells, turns, limit, stiff, full, square, room, forc
     """
     t, n, r = limit.size, q.size, turns.size
     depth = 1
-    end, mark, sign, base = room[0][0], room[0][1], room[1][0], room[1][1]
+    end, mark, sign, base = workspace[0][0], workspace[0][1], workspace[1][0], workspace[1][1]
     end[0], mark[0], sign[0], base[0] = t, -1, 0.0, 0.0
     p = 0
     g = 1.0 if q[0] > 0 else -1.0
@@ -120,7 +120,7 @@ def jenkins_cycle(q, start, cells, turns, limit, stiff, full, square, room, forc
                 at += 1
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _slide(q, g, p, depth, end, sign, base, limit):
     """Let the elements slip that must at slide q in direction g: (depth of the memory, number that slip)."""
     while depth > 0:
@@ -133,7 +133,7 @@ def _slide(q, g, p, depth, end, sign, base, limit):
     return depth, p
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _turn(q, g, p, depth, end, sign, base, mark, number):
     """Hang the slipping elements on a turning point."""
     if p > 0:

@@ -6,14 +6,14 @@ at the speed of the step; forces are those at the nodes, at their speed.
 
 from math import inf
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import LEAN
+from ...compiled.jit import njit
+from ...friction.flags_kernels import NJIT_NO_REFCOUNT
 from ...friction.laws import stretch_kernels as law
 
 TURNS = 60  # of the cycle until its end meets its start
 
 
-@njit(error_model="numpy", cache=True, **LEAN)
+@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def cycle(num, q, speed, dt, z, steps, force, slopes):
     """Periodic state of the law with numbers num (1, k) along slides q [m] and speeds [m/s] of M nodes, each dt (M,)
     [s] before the next.
@@ -42,7 +42,7 @@ def cycle(num, q, speed, dt, z, steps, force, slopes):
         force[i], slopes[0, i], slopes[1, i] = law.pull(num, 0, z[i], speed[i])
 
 
-@njit(error_model="numpy", cache=True, **LEAN)
+@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def tangents(steps, out):
     """Derivatives (M, p) of z at the nodes of the periodic state to p parameters, in place of what every step takes of
     them: the increment of the slide, in the last column that of the time; steps as of `cycle`."""

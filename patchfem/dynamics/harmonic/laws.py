@@ -142,8 +142,8 @@ class Jenkins(Law):
         _, places, cells, start = track.turning
         n, (stiff, full, square) = track.samples, self.sums
         force, slope, stretch, hold = np.empty(n), np.empty(n), np.empty(n), np.zeros((places.size, n))
-        room = np.empty((2, 2 * places.size + 3), np.int64), np.empty((2, 2 * places.size + 3))
-        kernels().jenkins_cycle(track.q, start, cells, places, self.limit_slide, stiff, full, square, room, force,
+        workspace = np.empty((2, 2 * places.size + 3), np.int64), np.empty((2, 2 * places.size + 3))
+        kernels().jenkins_cycle(track.q, start, cells, places, self.limit_slide, stiff, full, square, workspace, force,
                                 slope, hold, stretch)
         return Sampled(force, slope, None, hold, float(full[-1]), stretch)
 

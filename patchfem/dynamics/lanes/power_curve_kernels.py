@@ -8,8 +8,8 @@ Twin: many elements, from event to event (`dynamics.events`).
 
 import numpy as np
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import FAST, LEAN
+from ...compiled.jit import njit
+from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .names_kernels import FIRST_OF_LAW, LANES
 
 EXPONENT, SHARE = range(FIRST_OF_LAW, FIRST_OF_LAW + 2)  # numbers: chi + 1, q
@@ -19,7 +19,7 @@ FORETELLS = False  # its places need not be found
 ASKED = FOUND = HERE = 0  # as of `table_curve_kernels`
 
 
-@njit(error_model="numpy", forceinline=True, **LEAN)
+@njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def power(w, a):
     """w^a to 3e-13 for LEAST <= w <= 2 and 0 < a <= 1, by the bits of a number: no branch and no call, so that a
     compiler takes several lanes at once; no fast-math, as its roundings are meant."""
@@ -39,36 +39,36 @@ def power(w, a):
     return np.int64(np.float64(e).view(np.int64) + (np.float64(whole).view(np.int64) << 52)).view(np.float64)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def force(w, room, i, when):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def force(w, workspace, i, when):
     """(g, its slope) at w > 0."""
-    e, p = room[EXPONENT * LANES + i], room[SHARE * LANES + i] * power(w, room[EXPONENT * LANES + i])
+    e, p = workspace[EXPONENT * LANES + i], workspace[SHARE * LANES + i] * power(w, workspace[EXPONENT * LANES + i])
     return w * (1 - p / (e + 1)), 1 - p
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def slipped(w, g, room, i, when):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def slipped(w, g, workspace, i, when):
     """Mean slip of the sliders, each by what it carries at most, times that of all, where their force is g."""
-    e = room[EXPONENT * LANES + i]
+    e = workspace[EXPONENT * LANES + i]
     return e / (e + 2) * w * (w - g)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def work(w, g, room, i):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def work(w, g, workspace, i):
     """Integral of the force up to w, where it is g."""
-    return w * (w / 2 - (w - g) / (room[EXPONENT * LANES + i] + 2))
+    return w * (w / 2 - (w - g) / (workspace[EXPONENT * LANES + i] + 2))
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def find(room, i):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def find(workspace, i):
     """Find nothing."""
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def go_on(room, i, event):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def go_on(workspace, i, event):
     """Keep nothing."""
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def begin_at(w, room, i):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def begin_at(w, workspace, i):
     """Keep nothing."""

@@ -212,11 +212,11 @@ def march(law: str, cases: Cases, cycles: int, window: int, steps: int) -> March
     numbers, table, order = numbers_of(law, cases, steps), table_of(steps), np.arange(n)
     motion, history = begun_at(law, cases), np.zeros((n, cycles, 4))
     start, ended, shown = motion.copy(), np.zeros(n, np.int64), np.zeros((n, at.SHOWN))
-    room = room_of(numbers, motion)
-    loop.march(numbers, order, motion, table, cycles - window, history, ended, *room)
+    workspace = room_of(numbers, motion)
+    loop.march(numbers, order, motion, table, cycles - window, history, ended, *workspace)
     begun, read = motion.copy(), np.where(ended < cycles - window, min(ONCE, window), window)
     for count in np.unique(read).tolist():
-        loop.read(numbers, order[read == count], motion, table, count, history, ended, shown, np.empty((n, 0)), *room)
+        loop.read(numbers, order[read == count], motion, table, count, history, ended, shown, np.empty((n, 0)), *workspace)
     done = ended + read
     for case in np.flatnonzero(done < cycles):  # a motion that repeats goes on as it is
         history[case, done[case]:] = history[case, done[case] - 1]

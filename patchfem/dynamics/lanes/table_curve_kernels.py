@@ -10,8 +10,8 @@ that of other lanes, as a compiler takes several at once only where it knows the
 elements, from event to event (`dynamics.events`).
 """
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import FAST, LEAN
+from ...compiled.jit import njit
+from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .names_kernels import CURVE, LANES, WHERE
 
 YIELDS = 512  # of a case, the first of which is none and the last beyond all slides
@@ -29,74 +29,74 @@ FORETELLS = True
 ASKED, FOUND, HERE = range(3)  # where the numbers of a curve are: in its table, found ahead of a step, at its begin
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def walk(at, w, room, i):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def walk(at, w, workspace, i):
     """Note the number of the last yield up to w, which is not far from the number `at`."""
     first = TABLE + SIZE * i
-    while w >= room[first + COLUMNS * (at + 1)]:
+    while w >= workspace[first + COLUMNS * (at + 1)]:
         at += 1
-    while w < room[first + COLUMNS * at]:
+    while w < workspace[first + COLUMNS * at]:
         at -= 1
-    room[AT * LANES + i] = at
+    workspace[AT * LANES + i] = at
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def last(w, room, i):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def last(w, workspace, i):
     """Place in the room of the last yield up to w: that of the last time, or from the begin of its part on."""
-    k, first = int(room[AT * LANES + i]), TABLE + SIZE * i
-    if w < room[first + COLUMNS * k] or w >= room[first + COLUMNS * (k + 1)]:
-        part = (w - room[first + LOWEST]) * room[first + PER_PART]
-        k = int(room[first + BEGINS + int(min(part, PARTS - 1.0))]) if part > 0.0 else 0
-        walk(k, w, room, i)
-    return first + COLUMNS * int(room[AT * LANES + i])
+    k, first = int(workspace[AT * LANES + i]), TABLE + SIZE * i
+    if w < workspace[first + COLUMNS * k] or w >= workspace[first + COLUMNS * (k + 1)]:
+        part = (w - workspace[first + LOWEST]) * workspace[first + PER_PART]
+        k = int(workspace[first + BEGINS + int(min(part, PARTS - 1.0))]) if part > 0.0 else 0
+        walk(k, w, workspace, i)
+    return first + COLUMNS * int(workspace[AT * LANES + i])
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def find(room, i):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def find(workspace, i):
     """Find the curve of a lane at WHERE."""
-    walk(int(room[AT * LANES + i]), room[WHERE * LANES + i], room, i)
-    place = TABLE + SIZE * i + COLUMNS * int(room[AT * LANES + i])
-    room[FOUND_F * LANES + i], room[FOUND_S * LANES + i] = room[place + FORCE], room[place + SLOPE]
-    room[FOUND_B * LANES + i] = room[place + MOMENT]
+    walk(int(workspace[AT * LANES + i]), workspace[WHERE * LANES + i], workspace, i)
+    place = TABLE + SIZE * i + COLUMNS * int(workspace[AT * LANES + i])
+    workspace[FOUND_F * LANES + i], workspace[FOUND_S * LANES + i] = workspace[place + FORCE], workspace[place + SLOPE]
+    workspace[FOUND_B * LANES + i] = workspace[place + MOMENT]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def go_on(room, i, event):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def go_on(workspace, i, event):
     """Begin the next step where this one ended, unless it holds an event."""
-    f, b = room[HERE_F * LANES + i], room[HERE_B * LANES + i]
-    room[HERE_F * LANES + i] = f if event else room[FOUND_F * LANES + i]
-    room[HERE_B * LANES + i] = b if event else room[FOUND_B * LANES + i]
+    f, b = workspace[HERE_F * LANES + i], workspace[HERE_B * LANES + i]
+    workspace[HERE_F * LANES + i] = f if event else workspace[FOUND_F * LANES + i]
+    workspace[HERE_B * LANES + i] = b if event else workspace[FOUND_B * LANES + i]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def begin_at(w, room, i):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def begin_at(w, workspace, i):
     """Begin the next step at w."""
-    at = last(w, room, i)
-    room[HERE_F * LANES + i], room[HERE_B * LANES + i] = room[at + FORCE], room[at + MOMENT]
+    at = last(w, workspace, i)
+    workspace[HERE_F * LANES + i], workspace[HERE_B * LANES + i] = workspace[at + FORCE], workspace[at + MOMENT]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def force(w, room, i, when):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def force(w, workspace, i, when):
     """(g, its slope) at w > 0."""
     if when == FOUND:
-        return room[FOUND_F * LANES + i] + room[FOUND_S * LANES + i] * w, room[FOUND_S * LANES + i]
-    at = last(w, room, i)
-    return room[at + FORCE] + room[at + SLOPE] * w, room[at + SLOPE]
+        return workspace[FOUND_F * LANES + i] + workspace[FOUND_S * LANES + i] * w, workspace[FOUND_S * LANES + i]
+    at = last(w, workspace, i)
+    return workspace[at + FORCE] + workspace[at + SLOPE] * w, workspace[at + SLOPE]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def slipped(w, g, room, i, when):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def slipped(w, g, workspace, i, when):
     """Mean slip of the sliders, each by what it carries at most, times that of all."""
     if when == FOUND:
-        return room[FOUND_F * LANES + i] * w - room[FOUND_B * LANES + i]
+        return workspace[FOUND_F * LANES + i] * w - workspace[FOUND_B * LANES + i]
     if when == HERE:
-        return room[HERE_F * LANES + i] * w - room[HERE_B * LANES + i]
-    at = last(w, room, i)
-    return room[at + FORCE] * w - room[at + MOMENT]
+        return workspace[HERE_F * LANES + i] * w - workspace[HERE_B * LANES + i]
+    at = last(w, workspace, i)
+    return workspace[at + FORCE] * w - workspace[at + MOMENT]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def work(w, g, room, i):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def work(w, g, workspace, i):
     """Integral of the force up to w, where it is g."""
-    at = last(w, room, i)
-    return (w * (g + room[at + FORCE]) - room[at + MOMENT]) / 2
+    at = last(w, workspace, i)
+    return (w * (g + workspace[at + FORCE]) - workspace[at + MOMENT]) / 2

@@ -7,8 +7,8 @@ begins at |x - place| = LENGTH. Twin: a run from event to event (`dynamics.event
 
 from math import sqrt
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import FAST, LEAN
+from ...compiled.jit import njit
+from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .names_kernels import (
     A11,
     A12,
@@ -54,12 +54,31 @@ from .rigid_kernels import (
     furthest,
     path,
     resume,
-    slid,
+    slip_path,
     sticking,
 )
 
-__all__ = ["KEPT", "PROVEN", "RESTS", "TURNS_HELD", "advance", "ahead", "at_turn", "begin", "felt", "folds", "foretell",
-           "furthest", "held", "path", "resume", "rise", "settles", "slid", "sticking"]
+__all__ = [
+    "KEPT",
+    "PROVEN",
+    "RESTS",
+    "TURNS_HELD",
+    "advance",
+    "ahead",
+    "at_turn",
+    "begin",
+    "folds",
+    "foretell",
+    "friction_force",
+    "furthest",
+    "held",
+    "path",
+    "resume",
+    "rise",
+    "settles",
+    "slip_path",
+    "sticking",
+]
 
 RESTS = False  # a stick moves its spring
 TURNS_HELD = False
@@ -67,69 +86,69 @@ PROVEN = 1e-7  # as of `rigid_kernels`
 LEAST = 1e-3  # of the length over which it yields: slip of a cycle that sets the stretch anew
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def settles(room, i):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def settles(workspace, i):
     """Whether the last cycle slips, so that no earlier one tells its stretch: while a motion settles, a yield or a
     reversal may move across the end of a cycle, where the stretch is no longer what the map of the cycle before gives,
     and without a slip it is kept for good."""
-    return room[PATH * LANES + i] - room[(PAST + len(STATES)) * LANES + i] > LEAST * room[LENGTH * LANES + i]
+    return workspace[PATH * LANES + i] - workspace[(PAST + len(STATES)) * LANES + i] > LEAST * workspace[LENGTH * LANES + i]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def felt(x, v, way, place, sine, room, i):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def friction_force(x, v, way, place, sine, workspace, i):
     """Friction as an acceleration in the drive's angle [m], > 0 against positive slip."""
-    return room[K * LANES + i] * (x - place) if way == 0.0 else way * room[GK * LANES + i]
+    return workspace[K * LANES + i] * (x - place) if way == 0.0 else way * workspace[GK * LANES + i]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def rise(v, a, way, place, room, i, when):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def rise(v, a, way, place, workspace, i, when):
     """Rate of the friction at a speed v and an acceleration a; what holds on after an event moves there in its slip."""
-    return room[K * LANES + i] * v if way == 0.0 and when != 2 else 0.0
+    return workspace[K * LANES + i] * v if way == 0.0 and when != 2 else 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def at_turn(x, way, place, turned, room, i):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def at_turn(x, way, place, turned, workspace, i):
     """Friction at a turn of the slide, before which it may have slipped."""
-    most = room[GK * LANES + i]
-    return min(max(felt(x, 0.0, way, place, 0.0, room, i), -most), most)
+    most = workspace[GK * LANES + i]
+    return min(max(friction_force(x, 0.0, way, place, 0.0, workspace, i), -most), most)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def held(begin, end, way, room, i, h):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def held(begin, end, way, workspace, i, h):
     """As of `rigid_kernels`; a stick whose place moves begins with a slip that turns, whose speed falls as a line."""
     slip, speed = abs(end[3] - begin[3]) if way == 0.0 else 0.0, abs(begin[1]) * h
     slips = min(2 * slip / speed, 1.0) if speed > 0.0 else 0.0
     return 1.0 - slips if way == 0.0 else 0.0, 0.0 if slips > 0.0 else 2.0, end[3]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def linear(room, i, s0, c0):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def linear(workspace, i, s0, c0):
     """(x, x') after a step in the state in which it begins."""
-    x, v, way, place = room[X * LANES + i], room[V * LANES + i], room[WAY * LANES + i], room[PLACE * LANES + i]
-    pull, hold = way * room[GK * LANES + i], room[K * LANES + i] * place
-    xs = room[A11 * LANES + i] * x + room[A12 * LANES + i] * v + room[SX * LANES + i] * s0 + room[CX * LANES + i] * c0 \
-        - pull * room[RX * LANES + i]
-    vs = room[A21 * LANES + i] * x + room[A22 * LANES + i] * v + room[SV * LANES + i] * s0 + room[CV * LANES + i] * c0 \
-        - pull * room[RV * LANES + i]
-    xh = room[B11 * LANES + i] * x + room[B12 * LANES + i] * v + room[TX * LANES + i] * s0 + room[UX * LANES + i] * c0 \
-        + hold * room[QX * LANES + i]
-    vh = room[B21 * LANES + i] * x + room[B22 * LANES + i] * v + room[TV * LANES + i] * s0 + room[UV * LANES + i] * c0 \
-        + hold * room[QV * LANES + i]
+    x, v, way, place = workspace[X * LANES + i], workspace[V * LANES + i], workspace[WAY * LANES + i], workspace[PLACE * LANES + i]
+    pull, hold = way * workspace[GK * LANES + i], workspace[K * LANES + i] * place
+    xs = workspace[A11 * LANES + i] * x + workspace[A12 * LANES + i] * v + workspace[SX * LANES + i] * s0 + workspace[CX * LANES + i] * c0 \
+        - pull * workspace[RX * LANES + i]
+    vs = workspace[A21 * LANES + i] * x + workspace[A22 * LANES + i] * v + workspace[SV * LANES + i] * s0 + workspace[CV * LANES + i] * c0 \
+        - pull * workspace[RV * LANES + i]
+    xh = workspace[B11 * LANES + i] * x + workspace[B12 * LANES + i] * v + workspace[TX * LANES + i] * s0 + workspace[UX * LANES + i] * c0 \
+        + hold * workspace[QX * LANES + i]
+    vh = workspace[B21 * LANES + i] * x + workspace[B22 * LANES + i] * v + workspace[TV * LANES + i] * s0 + workspace[UV * LANES + i] * c0 \
+        + hold * workspace[QV * LANES + i]
     return xh if way == 0.0 else xs, vh if way == 0.0 else vs
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def ahead(room, i, s0, c0, s1, c1, reads):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def ahead(workspace, i, s0, c0, s1, c1, reads):
     """(x, x', place after a step without a stop, a yield or a turn in it; whether there is one); reads: as of
     `rigid_kernels`."""
-    v, way, place = room[V * LANES + i], room[WAY * LANES + i], room[PLACE * LANES + i]
-    x1, v1 = linear(room, i, s0, c0)
-    length, held = room[LENGTH * LANES + i], way == 0.0
+    v, way, place = workspace[V * LANES + i], workspace[WAY * LANES + i], workspace[PLACE * LANES + i]
+    x1, v1 = linear(workspace, i, s0, c0)
+    length, held = workspace[LENGTH * LANES + i], way == 0.0
     yields = held and abs(x1 - place) > length
     return x1, v1, place if held else x1 - way * length, yields or v * v1 < 0.0 or (reads and v1 == 0.0)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def bent(r, damp, stiff, one, two, three):
     """(Slide, speed) an angle r after rest of d'' + damp d' + stiff d = one r + two r^2 / 2 + three r^3 / 6."""
     r2, e2 = r * r, damp * damp - stiff
@@ -141,7 +160,7 @@ def bent(r, damp, stiff, one, two, three):
         r2 * (one * of_one_v + r * (two * of_two_v + r * three * of_three_v))
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def last_slip(v, a, j, spring, most):
     """Angle of a slip that begins at a speed v and turns within `most`: the speed of the stick goes on as
     v + a r + j r^2 / 2, and the slip adds the spring's lack of pull."""
@@ -154,7 +173,7 @@ def last_slip(v, a, j, spring, most):
     return r
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def held_on(d, dv, damp, stiff, hold, r):
     """(Slide, speed) an angle r after (d, dv) of d'' + damp d' + stiff d = hold."""
     a = hold - damp * dv - stiff * d
@@ -163,19 +182,19 @@ def held_on(d, dv, damp, stiff, hold, r):
     return d + r * (dv + r * (a / 2 + r * (j / 6 + r * k / 24))), dv + r * (a + r * (j / 2 + r * k / 6))
 
 
-@njit(error_model="numpy", **LEAN)
-def advance(room, i, s0, c0, s1, c1, h):
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def advance(workspace, i, s0, c0, s1, c1, h):
     """(x, v, way, place at the end of a step h; share u of the step up to an event; x, v and place there; x where the
     slide turns, that of the end without a turn; kink: jump of the acceleration at the event, none here).
 
     way: sign of the slip, 0 in a stick; s0, c0, s1, c1: sine and cosine of the drive at both ends.
     """
-    x, v, way, place = room[X * LANES + i], room[V * LANES + i], room[WAY * LANES + i], room[PLACE * LANES + i]
-    damp, square, push = room[D * LANES + i], room[W * LANES + i], room[P * LANES + i]
-    spring, length = room[K * LANES + i], room[LENGTH * LANES + i]
-    xs, vs = linear(room, i, s0, c0)
-    a0 = push * s0 - damp * v - square * x - felt(x, v, way, place, s0, room, i)
-    a1 = push * s1 - damp * vs - square * xs - felt(xs, vs, way, place, s1, room, i)
+    x, v, way, place = workspace[X * LANES + i], workspace[V * LANES + i], workspace[WAY * LANES + i], workspace[PLACE * LANES + i]
+    damp, square, push = workspace[D * LANES + i], workspace[W * LANES + i], workspace[P * LANES + i]
+    spring, length = workspace[K * LANES + i], workspace[LENGTH * LANES + i]
+    xs, vs = linear(workspace, i, s0, c0)
+    a0 = push * s0 - damp * v - square * x - friction_force(x, v, way, place, s0, workspace, i)
+    a1 = push * s1 - damp * vs - square * xs - friction_force(xs, vs, way, place, s1, workspace, i)
     # the speed as a cubic over the step, the slide as its integral
     m0, m1 = h * a0, h * a1
     c2, c3 = 3 * (vs - v) - 2 * m0 - m1, m0 + m1 - 2 * (vs - v)

@@ -35,7 +35,7 @@ def keep(contact, *others) -> Kept | None:
 
 def _tallies(contact) -> np.ndarray:
     """The tallies (m, 16) of the lists of a contact."""
-    return contact.tallies if hasattr(contact, "tallies") else contact.tally[None]
+    return contact.tallies if hasattr(contact, "tallies") else contact.counters[None]
 
 
 def full(contact) -> bool:
@@ -55,12 +55,12 @@ def lengthened(contact, kept: Kept, place: str, *others):
         array[...] = old
     found = contact._replace(**{name: array.copy() for name, array in kept.fields.items()})
     tallies = _tallies(found)
-    room = min(2 * have, MOST_STRIPS) // len(tallies)
-    wider = np.zeros((rows, room * len(tallies)))
-    for j, (tally, entries) in enumerate(zip(tallies, kept.entries)):
-        tally[12], tally[13] = j * room, (j + 1) * room
-        tally[0], tally[1] = j * room, j * room + entries.shape[1]
-        wider[:, j * room:j * room + entries.shape[1]] = entries
+    workspace = min(2 * have, MOST_STRIPS) // len(tallies)
+    wider = np.zeros((rows, workspace * len(tallies)))
+    for j, (counters, entries) in enumerate(zip(tallies, kept.entries)):
+        counters[12], counters[13] = j * workspace, (j + 1) * workspace
+        counters[0], counters[1] = j * workspace, j * workspace + entries.shape[1]
+        wider[:, j * workspace:j * workspace + entries.shape[1]] = entries
     return found._replace(bondlist=wider)
 
 

@@ -2,13 +2,13 @@
 
 import numpy as np
 
-from ..contacts import arrays
-from ..contacts.dispatch import COULOMB, number_of
+from ..interfaces import arrays
+from ..interfaces.dispatch import COULOMB, number_of
 
 GOAL = 1e-11  # residual of the step solve over the friction limit
 
 
-def faces_of(model, prop, plant, mass: float):
+def faces_of(model, prop, modal_system, mass: float):
     """Fresh `arrays.Faces` of a march, from the Propagator and the ModalArrays of its modes, mass in kg;
     `arrays.Single` of a model without joints."""
     if not model.joints:
@@ -33,7 +33,7 @@ def faces_of(model, prop, plant, mass: float):
     each[6] = [one.limit if one.bounded else np.inf for one in elements]
     each[7] = [GOAL * (one.limit or max(scale, 1e-300)) for one in elements]
     modal = np.zeros((5, n))
-    modal[0] = plant.push[0] / mass
+    modal[0] = modal_system.push[0] / mass
     return arrays.Faces(
         np.ascontiguousarray(prop.rows, float), np.array([prop.beta, gamma]),
         np.array([ports, [one.potential is None for one in model.joints], mates], np.int64), num, mem, each,

@@ -9,13 +9,13 @@ with any contact and any laws: `instances` makes an instance per set of them. j:
 
 import numpy as np
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import INNER
+from ...compiled.jit import njit
+from ...friction.flags_kernels import NJIT_INTERNAL
 from ...friction.laws import elastic_plastic_kernels as law
 from ...friction.laws import plane_kernels as plane
 from ...friction.laws.coulomb_kernels import stick
-from ..contacts import element_kernels as contact
-from ..contacts import element_solve_kernels as solver
+from ..interfaces import element_kernels as contact
+from ..interfaces import element_solve_kernels as solver
 from ..modal_kernels import ended, free_rate, free_slide
 from . import parts_kernels as parts
 from . import stops_kernels as stops
@@ -62,7 +62,7 @@ ROUND = 4e-15  # of a slide over its give, and of a force: no residual is smalle
 EACH = 5  # columns of an element in a row: slide, speed, force, slip, mean force of the step that follows
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def sampled(q, v, motion, row, c, j):
     """(force, energy of friction, slip, energy of springs) at a sample: of the contact, or else of the first element;
     slide, speed, force and slip of every element into its row."""
@@ -90,22 +90,22 @@ def sampled(q, v, motion, row, c, j):
     return first, energy, slip, springs
 
 
-@njit(error_model="numpy", **INNER)
-def held(motion, plant, drive, force, row, j):
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def held(motion, modal_system, drive, force, row, j):
     """Write the forces of the set-valued elements at a sample into their memory and the row: kinetic friction of those
     that slide, of those that rest what leaves them no acceleration. Returns the force [N] of the first element where it
     is one of them and no contact is there, else `force`; drive [m s-2]."""
-    s, m, accel, count = j.stops, 2 * motion.shape[1] + 7, plant.room[0], j.of.shape[1]
+    s, m, accel, count = j.stops, 2 * motion.shape[1] + 7, modal_system.workspace[0], j.of.shape[1]
     for i in range(s.names.size):
         e, way = s.element[i], s.field[WAY, i]
         limit = j.num[e, 1] if abs(way) == 2.0 else j.num[e, 2]
         j.mem[e, 0] = np.sign(way) * limit
         row[m + EACH * e + 2] = j.mem[e, 0]
     for k in range(accel.size):
-        accel[k] = j.modal[BESIDE, k] - plant.slide[k] * j.own[NOW_OWN] / plant.mass
+        accel[k] = j.modal[BESIDE, k] - modal_system.slide[k] * j.own[NOW_OWN] / modal_system.mass
         for e in range(count):
-            accel[k] -= j.rows[j.of[PORT, e], k] * row[m + EACH * e + 2] / plant.mass
-    for i in range(stops.reactions(motion, plant, drive, accel, plant.room[1:], s)):
+            accel[k] -= j.rows[j.of[PORT, e], k] * row[m + EACH * e + 2] / modal_system.mass
+    for i in range(stops.reactions(motion, modal_system, drive, accel, modal_system.workspace[1:], s)):
         e = s.element[s.names[i]]
         j.mem[e, 0] = min(max(s.field[FOUND, i], -j.num[e, 1]), j.num[e, 1])
         row[m + EACH * e + 2] = j.mem[e, 0]
@@ -115,18 +115,18 @@ def held(motion, plant, drive, force, row, j):
         return row[m + 2] if j.num[0, 0] == HOLDS else force
 
 
-@njit(error_model="numpy", forceinline=True, **INNER)
-def begun(motion, plant, table, at, dt, j):
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
+def begun(motion, modal_system, table, at, dt, j):
     """Free slides, and where elements are set-valued free rates, of all ports in the step; the lengths of its bonds."""
     for p in range(j.port.shape[1]):
-        j.port[FREE, p] = free_slide(motion, plant.reach, p, table, at)
+        j.port[FREE, p] = free_slide(motion, modal_system.reach, p, table, at)
         if STOPS:
-            j.port[RATE, p] = free_rate(motion, j.rows[p], plant.free, plant.dense, table, at)
+            j.port[RATE, p] = free_rate(motion, j.rows[p], modal_system.free, modal_system.dense, table, at)
     for e in range(j.of.shape[1]):
         j.each[EPS, e] = law.middle(j.num, j.mem, e, j.each[PACE, e], dt)
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def elsewhere(mine, port, j):
     """Slide [m] that the forces of all others take from a port; mine: the element, -1 for the contact on port 0."""
     out = 0.0
@@ -136,7 +136,7 @@ def elsewhere(mine, port, j):
     return out + j.gives[BETA, port, 0] * j.own[FORCE_OWN] if mine >= 0 else out
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def turned(e, turn, j, dt):
     """Solve element e with all others held: (change of its force over its goal [1], iterations).
 
@@ -162,7 +162,7 @@ def turned(e, turn, j, dt):
     return change if tries >= 0 else np.inf, abs(tries)
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def turned_in_plane(e, turn, j):
     """`turned` of both directions of the element whose first one is e."""
     f = j.of[MATE, e]
@@ -181,7 +181,7 @@ def turned_in_plane(e, turn, j):
     return change if tries >= 0 else np.inf, abs(tries)
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def turned_contact(q, v, dt, c, j):
     """Solve the contact on port 0 with all elements held: (its slide, change of its force over its goal, iterations).
     """
@@ -193,11 +193,11 @@ def turned_contact(q, v, dt, c, j):
     return dq, change if tries >= 0 else np.inf, abs(tries)
 
 
-@njit(error_model="numpy", **INNER)
-def agreed(q, v, plant, c, j):
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def solve_coupled_forces(q, v, modal_system, c, j):
     """Forces of contact and elements over a step, in j.own and j.each: (slide of the contact, iterations), < 0
     where they do not agree. Every element takes its turn, a set-valued one by the mean force alone."""
-    count, dt, iterations, last_worst, dq = j.of.shape[1], plant.dt, 0, np.inf, 0.0
+    count, dt, iterations, last_worst, dq = j.of.shape[1], modal_system.dt, 0, np.inf, 0.0
     for turn in range(TURNS):
         worst = 0.0
         if THERE:
@@ -211,15 +211,15 @@ def agreed(q, v, plant, c, j):
             return dq, iterations
         if SEVERAL:
             if turn > 1:
-                iterations += together_now(turn, worst, last_worst, plant, j)
+                iterations += together_now(turn, worst, last_worst, modal_system, j)
         else:
             return dq, iterations if worst < np.inf else -iterations
         last_worst = worst
     return dq, -iterations
 
 
-@njit(error_model="numpy", **INNER)
-def together_now(turn, worst, last_worst, plant, j):
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def together_now(turn, worst, last_worst, modal_system, j):
     """A step on the forces of all elements at once, where there is no contact: of laws with a slope to their minimum,
     of others where the turns get there too slowly. Iterations."""
     if THERE:
@@ -227,14 +227,14 @@ def together_now(turn, worst, last_worst, plant, j):
     elif SMOOTH:
         if PLANE:  # its force has no potential
             pass
-        elif j.stops.names.size == 0 and plant.dense.size == 0:
-            return abs(together.solve_smooth(j, plant.dt))
+        elif j.stops.names.size == 0 and modal_system.dense.size == 0:
+            return abs(together.solve_smooth(j, modal_system.dt))
     if turn > 4 and worst > 0.2 * last_worst:
-        together.newton_turn(j, plant.dt, False)
+        together.newton_turn(j, modal_system.dt, False)
     return 0
 
 
-@njit(error_model="numpy", forceinline=True, **INNER)
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def between(j):
     """Free slides and speeds of the set-valued elements under the forces of all others, into j.stops.field."""
     s = j.stops
@@ -249,7 +249,7 @@ def between(j):
         s.field[FREE, i], s.field[RATE, i] = slide, speed
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def taken(j):
     """Forces and slides of the set-valued elements into j.each; the largest change of a force over its
     goal."""
@@ -261,33 +261,33 @@ def taken(j):
     return worst
 
 
-@njit(error_model="numpy", **INNER)
-def still(motion, plant, table, at, j):
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def still(motion, modal_system, table, at, j):
     """Whether all set-valued elements rest through the step and at its end, held by static friction."""
     if not stops.stays(j.stops):
         return False
-    end, accel = j.modal[ROOM:ROOM + 2], plant.room[0]
-    pushed(plant, j, accel)
+    end, accel = j.modal[ROOM:ROOM + 2], modal_system.workspace[0]
+    pushed(modal_system, j, accel)
     for i in range(j.stops.names.size):
         e = j.stops.element[i]
         for k in range(accel.size):
-            accel[k] -= j.rows[j.of[PORT, e], k] * (j.stops.field[MEAN, i] - j.each[PULL, e]) / plant.mass
-    ended(motion, plant.free, plant.push, plant.dense, table, at, accel, end)
+            accel[k] -= j.rows[j.of[PORT, e], k] * (j.stops.field[MEAN, i] - j.each[PULL, e]) / modal_system.mass
+    ended(motion, modal_system.free, modal_system.push, modal_system.dense, table, at, accel, end)
     for i in range(j.stops.names.size):
         e = j.stops.element[i]
         for k in range(accel.size):
-            accel[k] += j.rows[j.of[PORT, e], k] * j.stops.field[MEAN, i] / plant.mass
-    return stops.stays_to_the_end(end, plant, table[at, 8 * accel.size + 2], accel, plant.room[1:], j.stops)
+            accel[k] += j.rows[j.of[PORT, e], k] * j.stops.field[MEAN, i] / modal_system.mass
+    return stops.stays_to_the_end(end, modal_system, table[at, 8 * accel.size + 2], accel, modal_system.workspace[1:], j.stops)
 
 
-@njit(error_model="numpy", **INNER)
-def passed(q, v, motion, plant, table, at, c, j):
-    """As `agreed`, with the stops and releases of the set-valued elements inside the step, and their blows.
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def passed(q, v, motion, modal_system, table, at, c, j):
+    """As `solve_coupled_forces`, with the stops and releases of the set-valued elements inside the step, and their blows.
 
     (slide of the contact, iterations, True), False where no such step is found or it would give energy. Which of them
     stop and go is settled in the first turns; then the slides that follow from it are kept.
     """
-    s, iterations, last_worst, dq, dt = j.stops, 0, np.inf, 0.0, plant.dt
+    s, iterations, last_worst, dq, dt = j.stops, 0, np.inf, 0.0, modal_system.dt
     for i in range(s.names.size):
         s.field[START, i] = j.each[PACE, s.element[i]]
     for turn in range(FEW):
@@ -302,7 +302,7 @@ def passed(q, v, motion, plant, table, at, c, j):
                     worst = max(worst, change)
                     iterations += tries
         between(j)
-        if turn < FEW // 2 and not (still(motion, plant, table, at, j) or stops.watched(dt, s)):
+        if turn < FEW // 2 and not (still(motion, modal_system, table, at, j) or stops.watched(dt, s)):
             return dq, iterations, False
         if not stops.met(s):
             return dq, iterations, False
@@ -317,7 +317,7 @@ def passed(q, v, motion, plant, table, at, c, j):
     return dq, iterations, False
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def settles_at_once(j):
     """Whether all that rubs is set-valued, which is solved as one."""
     if THERE:
@@ -326,7 +326,7 @@ def settles_at_once(j):
         return j.stops.names.size == j.of.shape[1]
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def newton_of_stops(j, dt):
     """A Newton step on the forces of all elements beside the stops that are known, where there is no contact."""
     if SMOOTH:
@@ -336,33 +336,33 @@ def newton_of_stops(j, dt):
             together.newton_turn(j, dt, True)
 
 
-@njit(error_model="numpy", **INNER)
-def solved(q, v, motion, plant, table, at, c, j):
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def solved(q, v, motion, modal_system, table, at, c, j):
     """Forces of contact and elements over a step whose free slides stand in j: (slide of the contact, iterations),
     below 0 where they do not agree. Blows of set-valued elements stand in j.stops, or are left to `blown`."""
     if STOPS:
-        dq, tried, found = passed(q, v, motion, plant, table, at, c, j)
+        dq, tried, found = passed(q, v, motion, modal_system, table, at, c, j)
         if found:
             j.own[KNOWN] = 1.0
             return dq, tried
-        dq, iterations = agreed(q, v, plant, c, j)
+        dq, iterations = solve_coupled_forces(q, v, modal_system, c, j)
         j.own[KNOWN] = 0.0
         return dq, iterations + tried if iterations >= 0 else iterations - tried
     else:
-        return agreed(q, v, plant, c, j)
+        return solve_coupled_forces(q, v, modal_system, c, j)
 
 
-@njit(error_model="numpy", **INNER)
-def pushed(plant, j, accel):
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def pushed(modal_system, j, accel):
     """Modal accelerations (n,) [m s-2] of all forces into `accel`."""
     for k in range(accel.size):
-        accel[k] = j.modal[BESIDE, k] - plant.slide[k] * j.own[FORCE_OWN] / plant.mass
+        accel[k] = j.modal[BESIDE, k] - modal_system.slide[k] * j.own[FORCE_OWN] / modal_system.mass
     for e in range(j.of.shape[1]):
         for k in range(accel.size):
-            accel[k] -= j.rows[j.of[PORT, e], k] * j.each[PULL, e] / plant.mass
+            accel[k] -= j.rows[j.of[PORT, e], k] * j.each[PULL, e] / modal_system.mass
 
 
-@njit(error_model="numpy", forceinline=True, **INNER)
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def worked(dq, row, j):
     """Friction work of the step [J]; its mean forces go into the row of its first sample. dq [m]: slide of the contact.
     """
@@ -378,7 +378,7 @@ def worked(dq, row, j):
     return work
 
 
-@njit(error_model="numpy", forceinline=True, **INNER)
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def blown(motion, mass, j):
     """Strike the modes by the blows of the set-valued elements, in place; the energy that they take [J]. Where no stops
     were found those are brought to rest that did not slide."""
@@ -390,35 +390,35 @@ def blown(motion, mass, j):
     return stops.struck(motion, mass, s)
 
 
-@njit(error_model="numpy", **INNER)
-def committed(q, v, dq, motion, plant, c, j):
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def committed(q, v, dq, motion, modal_system, c, j):
     """Move the memories of contact and elements by the step: (energy dissipated [J], False where one is full)."""
     lost, ok = 0.0, True
     if THERE:
         speed = 0.0
-        for k in range(plant.slide.size):
-            speed += plant.slide[k] * motion[1, k]
-        lost, ok = contact.commit(dq, j.own[FORCE_OWN], q, v, speed, plant.dt, c)
+        for k in range(modal_system.slide.size):
+            speed += modal_system.slide[k] * motion[1, k]
+        lost, ok = contact.commit(dq, j.own[FORCE_OWN], q, v, speed, modal_system.dt, c)
         j.own[STEP_OWN] = dq
     for e in range(j.of.shape[1]):
         speed = 0.0
-        for k in range(plant.slide.size):
+        for k in range(modal_system.slide.size):
             speed += j.rows[j.of[PORT, e], k] * motion[1, k]
         if PLANE:
             if j.of[MATE, e] == e:
-                lost += law.commit(j.num, j.mem, e, j.each[STEP, e], j.each[PULL, e], j.each[PACE, e], speed, plant.dt,
+                lost += law.commit(j.num, j.mem, e, j.each[STEP, e], j.each[PULL, e], j.each[PACE, e], speed, modal_system.dt,
                                    j.each[EPS, e])
             elif j.of[MATE, e] > e:
                 lost += plane.commit(j.num, j.mem, e, j.of[MATE, e], j.each[STEP, e], j.each[STEP, j.of[MATE, e]])
         else:
-            lost += law.commit(j.num, j.mem, e, j.each[STEP, e], j.each[PULL, e], j.each[PACE, e], speed, plant.dt,
+            lost += law.commit(j.num, j.mem, e, j.each[STEP, e], j.each[PULL, e], j.each[PACE, e], speed, modal_system.dt,
                                j.each[EPS, e])
         j.each[WENT_BEFORE, e] = j.each[WENT, e]
         j.each[WENT, e] = j.each[STEP, e]
     return lost, ok
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def limited(load0, load1, mu, j):
     """The set-valued elements under a load that goes from load0 to load1 [N] in the step; mu (2,): static and kinetic
     coefficient."""
@@ -430,7 +430,7 @@ def limited(load0, load1, mu, j):
             j.num[e, 1 + k] = 0.5 * mu[k] * (load0 + load1)
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def capped(j):
     """No force of a set-valued element at a sample above what its load bears."""
     for i in range(j.stops.names.size):
@@ -438,8 +438,8 @@ def capped(j):
         j.mem[e, 0] = min(max(j.mem[e, 0], -j.num[e, 1]), j.num[e, 1])
 
 
-@njit(error_model="numpy", **INNER)
-def slid(used, j):
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def slip_path(used, j):
     """Let the one set-valued element slide through the step under a mean force [N], without a blow; its slide [m]."""
     f = j.stops.field
     j.each[PULL, 0], j.each[STEP, 0], j.own[KNOWN] = used, j.port[FREE, 0] - j.gives[BETA, 0, 0] * used, 1.0

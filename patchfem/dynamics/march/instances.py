@@ -7,10 +7,10 @@ function as an argument is never found on disk again, so `compiled.instance` wri
 from functools import cache
 
 from ... import compiled
-from ..contacts.dispatch import COULOMB, law_of
+from ..interfaces.dispatch import COULOMB, law_of
 
 HERE = "dynamics.march"
-SHEARED_LISTS = "dynamics.contacts.shear_list_kernels"  # lists of bonds behind shear modes
+SHEARED_LISTS = "dynamics.interfaces.shear_list_kernels"  # lists of bonds behind shear modes
 STEADY, WHOLE, POINTS = "", "whole", "points"  # loads: that stays; that changes, borne as a whole or point by point
 
 
@@ -19,12 +19,12 @@ def contact_of(kind: tuple):
     """The compiled contact of a ContactModel's kind (contact, law)."""
     contact, law = kind
     if contact == SHEARED_LISTS:
-        return compiled.instance(contact, {"solver": compiled.instance("dynamics.contacts.shear_solve_kernels", {
-            "law": compiled.load("dynamics.contacts.shear_lists_kernels")})})
+        return compiled.instance(contact, {"solver": compiled.instance("dynamics.interfaces.shear_solve_kernels", {
+            "law": compiled.load("dynamics.interfaces.shear_lists_kernels")})})
     if not law:
         return compiled.load(contact)
     law = compiled.load(law)
-    solver = compiled.instance("dynamics.contacts.element_solve_kernels", {"law": law})
+    solver = compiled.instance("dynamics.interfaces.element_solve_kernels", {"law": law})
     return compiled.instance(contact, {"law": law, "solver": solver})
 
 
@@ -45,7 +45,7 @@ def loop_of(kind: tuple, laws: tuple = (), load: str = STEADY, there: bool = Tru
         law = law_of(laws)
         named["faces"] = compiled.instance(f"{HERE}.faces_kernels", {
             "law": law, "contact": contact, "parts": parts,
-            "solver": compiled.instance("dynamics.contacts.element_solve_kernels", {"law": law}),
+            "solver": compiled.instance("dynamics.interfaces.element_solve_kernels", {"law": law}),
             "together": compiled.instance(f"{HERE}.together_kernels", {"law": law, "parts": parts})})
     if load != STEADY:
         named["pressing"] = compiled.instance(f"{HERE}.pressing_kernels",

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...friction.protocol import Element
-from ..contacts.dispatch import COULOMB
+from ..interfaces.dispatch import COULOMB
 from .models import IDLE, ContactModel, Joint, free_model
 
 
@@ -25,7 +25,7 @@ def interlock(port: int, stiffness: float, wavelength: float) -> Joint:
 
 
 def _spring(port: int, numbers, potential) -> Joint:
-    law = "dynamics.contacts.spring_kernels"
+    law = "dynamics.interfaces.spring_kernels"
     return Joint(port, Element(law, np.array(numbers), np.zeros(0), 0.0, 0.0, False), potential)
 
 

@@ -96,17 +96,17 @@ def march(modes: ModalBasis, drive: BaseSine, cases: list, cycles: int, steps: i
     kernels, prop = load(KERNELS), propagator(modes, drive, steps)
     rig, table, n, parts = _rig(kernels, modes, prop), _table(kernels, modes, drive, steps, prop), len(cases), []
     for first in range(0, n, kernels.LANES):
-        room, few = _room(kernels, cases[first:first + kernels.LANES]), min(kernels.LANES, n - first)
+        workspace, few = _room(kernels, cases[first:first + kernels.LANES]), min(kernels.LANES, n - first)
         history, work = np.zeros((cycles, 4, kernels.LANES)), np.zeros(kernels.LANES)
         samples = np.zeros((window * steps + 1, kernels.KEPT, kernels.LANES))
-        kernels.march(room.ravel(), rig, table, history, samples, work)
-        parts.append((room[:, :few], history[:, :, :few], samples[:, :, :few], work[:few]))
-    room, history, samples, work = (np.concatenate(one, axis=-1) for one in zip(*parts))
+        kernels.march(workspace.ravel(), rig, table, history, samples, work)
+        parts.append((workspace[:, :few], history[:, :, :few], samples[:, :, :few], work[:few]))
+    workspace, history, samples, work = (np.concatenate(one, axis=-1) for one in zip(*parts))
     m, r, names = modes.omega.size, kernels.RIG, ("WORK_IN", "VISCOUS", "POWER", "LOST", "PEAK", "BOOKED", "SAMPLED",
                                                  "PASSED", "GONE", "CREATED")
-    book = {name.lower(): room[getattr(kernels, name)] for name in names}
-    moving = (room[kernels.V:kernels.V + m]**2 + (modes.omega[:, None] * room[:m])**2).sum(axis=0)
-    book["stored"] = 0.5 * modes.mass * moving + room[kernels.ENERGY]
+    book = {name.lower(): workspace[getattr(kernels, name)] for name in names}
+    moving = (workspace[kernels.V:kernels.V + m]**2 + (modes.omega[:, None] * workspace[:m])**2).sum(axis=0)
+    book["stored"] = 0.5 * modes.mass * moving + workspace[kernels.ENERGY]
     return Marched(history[:, :2].transpose(2, 0, 1), (history[:, 2] + 1j * history[:, 3]).T, book, samples[:, :m],
                    samples[:, r:r + m], samples[:, 2 * r], samples[:, 2 * r + 1], book["booked"] - work,
-                   room[kernels.FAR], room[kernels.BAD])
+                   workspace[kernels.FAR], workspace[kernels.BAD])

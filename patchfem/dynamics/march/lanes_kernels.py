@@ -9,8 +9,8 @@ case on a core with vectors of eight numbers.
 
 from math import sqrt
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import FAST, LEAN
+from ...compiled.jit import njit
+from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
 LANES, POINTS, MODES, RIG = 32, 6, 2, 2  # MODES of the pieces, RIG of the rig
 # what moves: coordinates and rates of the rig, coordinates of the pieces, stretch and square of the points
@@ -42,7 +42,7 @@ CURVED = 1e-9  # of the friction limit, which the forces may bend in it
 SHORT, LONG = 0.5, 40.0  # bond lengths of a slide that the series takes; from which on nothing is left of a bond
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def shape(x, far):
     """(f1, f2, exp(-x)) of `point_kernels.shape`, by the series of half of x <= SHORT: f2(2 y) = f2(y)/2 + f1(y)^2/4;
     far: whether x may be larger, exp(-x) then comes from a 256th of it."""
@@ -69,12 +69,12 @@ def shape(x, far):
     return f1, f2, e
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def felt(s, room, i, j, y, over, far):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def friction_force(s, workspace, i, j, y, over, far):
     """Residual and lower half of the Hessian `s` (9) at the step y (3) with what the point j adds."""
     g0, g1, g2, h00, h01, h02, h11, h12, h22 = s
-    a, b = room[(SHAPE + j) * LANES + i], room[(SHAPE + POINTS + j) * LANES + i]
-    limit, stretch = room[(OF_POINT + j) * LANES + i], room[(STRETCH + j) * LANES + i]
+    a, b = workspace[(SHAPE + j) * LANES + i], workspace[(SHAPE + POINTS + j) * LANES + i]
+    limit, stretch = workspace[(OF_POINT + j) * LANES + i], workspace[(STRETCH + j) * LANES + i]
     xi = y[0] - a * y[1] - b * y[2]
     way, x = 1.0 if xi > 0.0 else -1.0, abs(xi) * over
     f1, f2, _ = shape(x, far)
@@ -84,21 +84,21 @@ def felt(s, room, i, j, y, over, far):
             h11 + a * a * slope, h12 + a * b * slope, h22 + b * b * slope)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def turn(room, i, beta, far):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def turn(workspace, i, beta, far):
     """A turn of Newton's method in a lane; where the last step went too far, half of it is taken back."""
-    y0, y1, y2 = room[Y * LANES + i], room[(Y + 1) * LANES + i], room[(Y + 2) * LANES + i]
-    p0, p1, p2 = room[P * LANES + i], room[(P + 1) * LANES + i], room[(P + 2) * LANES + i]
-    length, fall, done = room[LENGTH * LANES + i], room[FALL * LANES + i], room[DONE * LANES + i]
-    over, one, two, y = 1 / length, 0.5 * room[KAPPA * LANES + i], 0.5 * room[(KAPPA + 1) * LANES + i], (y0, y1, y2)
-    s = ((y0 - room[FREE * LANES + i]) / beta, one * (2 * room[B * LANES + i] + y1),
-         two * (2 * room[(B + 1) * LANES + i] + y2), 1 / beta, 0.0, 0.0, one, 0.0, two)
-    s = felt(s, room, i, 0, y, over, far)  # one after the other: a loop over them is not taken in several lanes at once
-    s = felt(s, room, i, 1, y, over, far)
-    s = felt(s, room, i, 2, y, over, far)
-    s = felt(s, room, i, 3, y, over, far)
-    s = felt(s, room, i, 4, y, over, far)
-    g0, g1, g2, h00, h01, h02, h11, h12, h22 = felt(s, room, i, 5, y, over, far)
+    y0, y1, y2 = workspace[Y * LANES + i], workspace[(Y + 1) * LANES + i], workspace[(Y + 2) * LANES + i]
+    p0, p1, p2 = workspace[P * LANES + i], workspace[(P + 1) * LANES + i], workspace[(P + 2) * LANES + i]
+    length, fall, done = workspace[LENGTH * LANES + i], workspace[FALL * LANES + i], workspace[DONE * LANES + i]
+    over, one, two, y = 1 / length, 0.5 * workspace[KAPPA * LANES + i], 0.5 * workspace[(KAPPA + 1) * LANES + i], (y0, y1, y2)
+    s = ((y0 - workspace[FREE * LANES + i]) / beta, one * (2 * workspace[B * LANES + i] + y1),
+         two * (2 * workspace[(B + 1) * LANES + i] + y2), 1 / beta, 0.0, 0.0, one, 0.0, two)
+    s = friction_force(s, workspace, i, 0, y, over, far)  # one after the other: a loop over them is not taken in several lanes at once
+    s = friction_force(s, workspace, i, 1, y, over, far)
+    s = friction_force(s, workspace, i, 2, y, over, far)
+    s = friction_force(s, workspace, i, 3, y, over, far)
+    s = friction_force(s, workspace, i, 4, y, over, far)
+    g0, g1, g2, h00, h01, h02, h11, h12, h22 = friction_force(s, workspace, i, 5, y, over, far)
     back = g0 * p0 + g1 * p1 + g2 * p2 > 0.5 * fall
     r00 = 1 / h00
     l1, l2 = h01 * r00, h02 * r00
@@ -108,27 +108,27 @@ def turn(room, i, beta, far):
     n2 = -(g2 - l2 * g0 - l3 * r1) / (h22 - l2 * h02 - l3 * m)
     n1 = -r1 * r11 - l3 * n2
     n0 = -g0 * r00 - l1 * n1 - l2 * n2
-    one, two, slopes = room[REACH * LANES + i], room[(REACH + 1) * LANES + i], h00 - 1 / beta
+    one, two, slopes = workspace[REACH * LANES + i], workspace[(REACH + 1) * LANES + i], h00 - 1 / beta
     size, least = abs(n0) + one * abs(n1) + two * abs(n2), abs(y0) - one * abs(y1) - two * abs(y2)
     # where no point turns over in this step, what the forces bend in it is told by their slopes, which a drag has not
-    near = size <= NEAR * length or (least > size and slopes * size * size <= CURVED * room[LIMIT * LANES + i] * length)
+    near = size <= NEAR * length or (least > size and slopes * size * size <= CURVED * workspace[LIMIT * LANES + i] * length)
     on = 0.0 if done > 0.0 else 1.0
-    room[Y * LANES + i] = y0 + on * (-0.5 * p0 if back else n0)
-    room[(Y + 1) * LANES + i] = y1 + on * (-0.5 * p1 if back else n1)
-    room[(Y + 2) * LANES + i] = y2 + on * (-0.5 * p2 if back else n2)
-    room[P * LANES + i], room[(P + 1) * LANES + i] = 0.5 * p0 if back else n0, 0.5 * p1 if back else n1
-    room[(P + 2) * LANES + i] = 0.5 * p2 if back else n2
-    room[FALL * LANES + i] = 0.5 * fall if back else -(g0 * n0 + g1 * n1 + g2 * n2)
-    room[DONE * LANES + i] = 1.0 if done > 0.0 or (near and not back) else 0.0
+    workspace[Y * LANES + i] = y0 + on * (-0.5 * p0 if back else n0)
+    workspace[(Y + 1) * LANES + i] = y1 + on * (-0.5 * p1 if back else n1)
+    workspace[(Y + 2) * LANES + i] = y2 + on * (-0.5 * p2 if back else n2)
+    workspace[P * LANES + i], workspace[(P + 1) * LANES + i] = 0.5 * p0 if back else n0, 0.5 * p1 if back else n1
+    workspace[(P + 2) * LANES + i] = 0.5 * p2 if back else n2
+    workspace[FALL * LANES + i] = 0.5 * fall if back else -(g0 * n0 + g1 * n1 + g2 * n2)
+    workspace[DONE * LANES + i] = 1.0 if done > 0.0 or (near and not back) else 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def moved(s, room, i, j, y, over, far):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def moved(s, workspace, i, j, y, over, far):
     """Move the point j by the step y (3); `s`: its work over the limit, the rise of its square, force and square with
     what it adds."""
     worked, rise, force, square = s
-    a, b = room[(SHAPE + j) * LANES + i], room[(SHAPE + POINTS + j) * LANES + i]
-    limit, stretch, old = room[(OF_POINT + j) * LANES + i], room[(STRETCH + j) * LANES + i], room[
+    a, b = workspace[(SHAPE + j) * LANES + i], workspace[(SHAPE + POINTS + j) * LANES + i]
+    limit, stretch, old = workspace[(OF_POINT + j) * LANES + i], workspace[(STRETCH + j) * LANES + i], workspace[
         (SQUARE + j) * LANES + i]
     xi = y[0] - a * y[1] - b * y[2]
     way, x = 1.0 if xi > 0.0 else -1.0, abs(xi) * over
@@ -137,166 +137,166 @@ def moved(s, room, i, j, y, over, far):
     new = e * (old + 2 * way * stretch * x + x * x) + (2 - e * (far_x * far_x + 2 * far_x + 2))
     new = new if x < LONG else 2.0
     one = stretch * e + way * (1 - e)
-    room[(STRETCH + j) * LANES + i], room[(SQUARE + j) * LANES + i] = one, new
+    workspace[(STRETCH + j) * LANES + i], workspace[(SQUARE + j) * LANES + i] = one, new
     return worked + limit * (stretch * f1 + way * x * f2) * xi, rise + limit * (new - old), force + limit * one, \
         square + limit * new
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def commit(room, i, beta, far):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def commit(workspace, i, beta, far):
     """Move the points and the pieces of a lane by its solved step and add to their sums."""
-    y0, y1, y2 = room[Y * LANES + i], room[(Y + 1) * LANES + i], room[(Y + 2) * LANES + i]
-    length, used = room[LENGTH * LANES + i], (room[FREE * LANES + i] - y0) / beta
-    over, y, b1, b2 = 1 / length, (y0, y1, y2), room[B * LANES + i] + y1, room[(B + 1) * LANES + i] + y2
-    s = moved((0.0, 0.0, 0.0, 0.0), room, i, 0, y, over, far)
-    s = moved(s, room, i, 1, y, over, far)
-    s = moved(s, room, i, 2, y, over, far)
-    s = moved(s, room, i, 3, y, over, far)
-    s = moved(s, room, i, 4, y, over, far)
-    worked, rise, force, square = moved(s, room, i, 5, y, over, far)
-    energy = 0.5 * (length * square + room[KAPPA * LANES + i] * b1 * b1 + room[(KAPPA + 1) * LANES + i] * b2 * b2)
-    work, q = used * y0, room[PLACE * LANES + i]
-    gone, noise = work - (energy - room[ENERGY * LANES + i]), room[LIMIT * LANES + i] * (
+    y0, y1, y2 = workspace[Y * LANES + i], workspace[(Y + 1) * LANES + i], workspace[(Y + 2) * LANES + i]
+    length, used = workspace[LENGTH * LANES + i], (workspace[FREE * LANES + i] - y0) / beta
+    over, y, b1, b2 = 1 / length, (y0, y1, y2), workspace[B * LANES + i] + y1, workspace[(B + 1) * LANES + i] + y2
+    s = moved((0.0, 0.0, 0.0, 0.0), workspace, i, 0, y, over, far)
+    s = moved(s, workspace, i, 1, y, over, far)
+    s = moved(s, workspace, i, 2, y, over, far)
+    s = moved(s, workspace, i, 3, y, over, far)
+    s = moved(s, workspace, i, 4, y, over, far)
+    worked, rise, force, square = moved(s, workspace, i, 5, y, over, far)
+    energy = 0.5 * (length * square + workspace[KAPPA * LANES + i] * b1 * b1 + workspace[(KAPPA + 1) * LANES + i] * b2 * b2)
+    work, q = used * y0, workspace[PLACE * LANES + i]
+    gone, noise = work - (energy - workspace[ENERGY * LANES + i]), workspace[LIMIT * LANES + i] * (
         1e-12 * abs(y0) + 1e-15 * abs(q))
-    room[B * LANES + i], room[(B + 1) * LANES + i], room[USED * LANES + i] = b1, b2, used
-    room[LOST * LANES + i] += worked - 0.5 * length * rise
-    room[BOOKED * LANES + i] += work
-    room[PASSED * LANES + i] += abs(work)
-    room[SAMPLED * LANES + i] += 0.5 * (room[FORCE * LANES + i] + force) * y0
-    room[GONE * LANES + i] += gone if gone > -noise else 0.0
-    room[CREATED * LANES + i] -= gone if gone < -noise else 0.0
-    room[FORCE * LANES + i], room[ENERGY * LANES + i] = force, energy
+    workspace[B * LANES + i], workspace[(B + 1) * LANES + i], workspace[USED * LANES + i] = b1, b2, used
+    workspace[LOST * LANES + i] += worked - 0.5 * length * rise
+    workspace[BOOKED * LANES + i] += work
+    workspace[PASSED * LANES + i] += abs(work)
+    workspace[SAMPLED * LANES + i] += 0.5 * (workspace[FORCE * LANES + i] + force) * y0
+    workspace[GONE * LANES + i] += gone if gone > -noise else 0.0
+    workspace[CREATED * LANES + i] -= gone if gone < -noise else 0.0
+    workspace[FORCE * LANES + i], workspace[ENERGY * LANES + i] = force, energy
     # the next guess, as the last three steps went on
     for k in range(3):
-        here, last = room[(Y + k) * LANES + i], room[(LAST + k) * LANES + i]
-        room[(Y + k) * LANES + i] = 3 * (here - last) + room[(BEFORE + k) * LANES + i]
-        room[(BEFORE + k) * LANES + i], room[(LAST + k) * LANES + i] = last, here
+        here, last = workspace[(Y + k) * LANES + i], workspace[(LAST + k) * LANES + i]
+        workspace[(Y + k) * LANES + i] = 3 * (here - last) + workspace[(BEFORE + k) * LANES + i]
+        workspace[(BEFORE + k) * LANES + i], workspace[(LAST + k) * LANES + i] = last, here
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def flow(room, i, k, mode, push):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def flow(workspace, i, k, mode, push):
     """Move a mode of the rig of a lane by a step, and add what it shows and takes."""
     zz, zv, vz, vv, by_z, by_v, loss_zz, loss_zv, loss_vv, loss_zf, loss_vf, loss_ff, slide, output, rate = mode
     more_z, more_v, work_z, work_v, work_f, lost_z, lost_v, lost_f = push
-    z, v, f, drive = room[(Z + k) * LANES + i], room[(V + k) * LANES + i], slide * room[USED * LANES + i], \
-        room[PUSH * LANES + i]
+    z, v, f, drive = workspace[(Z + k) * LANES + i], workspace[(V + k) * LANES + i], slide * workspace[USED * LANES + i], \
+        workspace[PUSH * LANES + i]
     z1, v1 = zz * z + zv * v - by_z * f + drive * more_z, vz * z + vv * v - by_v * f + drive * more_v
-    room[WORK * LANES + i] += drive * (work_z * z + work_v * v - work_f * f)
-    room[LOSS_NOW * LANES + i] += drive * (lost_z * z + lost_v * v - lost_f * f) \
+    workspace[WORK * LANES + i] += drive * (work_z * z + work_v * v - work_f * f)
+    workspace[LOSS_NOW * LANES + i] += drive * (lost_z * z + lost_v * v - lost_f * f) \
         + (loss_zz * z + loss_zv * v - loss_zf * f) * z + (loss_vv * v - loss_vf * f) * v + loss_ff * f * f
-    room[(Z + k) * LANES + i], room[(V + k) * LANES + i] = z1, v1
-    room[PLACE * LANES + i] += slide * z1
-    room[OUT * LANES + i] += output * z1
-    room[RATE * LANES + i] += output * v1
-    room[MOVING * LANES + i] += v1 * v1 + rate * z1 * z1
+    workspace[(Z + k) * LANES + i], workspace[(V + k) * LANES + i] = z1, v1
+    workspace[PLACE * LANES + i] += slide * z1
+    workspace[OUT * LANES + i] += output * z1
+    workspace[RATE * LANES + i] += output * v1
+    workspace[MOVING * LANES + i] += v1 * v1 + rate * z1 * z1
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def opened(room, i, work, lost, cosine, sine):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def opened(workspace, i, work, lost, cosine, sine):
     """Begin the sums of a step of a lane over the modes, with what the drive alone gives and takes of 1 m s-2."""
-    out, square = room[OUT * LANES + i], room[PUSH * LANES + i] * room[PUSH * LANES + i]
-    room[COS * LANES + i] += out * cosine
-    room[SIN * LANES + i] += out * sine
-    room[OUT0 * LANES + i], room[RATE0 * LANES + i] = out, room[RATE * LANES + i]
-    room[WORK * LANES + i], room[LOSS_NOW * LANES + i] = square * work, square * lost
-    room[PLACE * LANES + i] = room[OUT * LANES + i] = room[RATE * LANES + i] = room[MOVING * LANES + i] = 0.0
+    out, square = workspace[OUT * LANES + i], workspace[PUSH * LANES + i] * workspace[PUSH * LANES + i]
+    workspace[COS * LANES + i] += out * cosine
+    workspace[SIN * LANES + i] += out * sine
+    workspace[OUT0 * LANES + i], workspace[RATE0 * LANES + i] = out, workspace[RATE * LANES + i]
+    workspace[WORK * LANES + i], workspace[LOSS_NOW * LANES + i] = square * work, square * lost
+    workspace[PLACE * LANES + i] = workspace[OUT * LANES + i] = workspace[RATE * LANES + i] = workspace[MOVING * LANES + i] = 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def closed(room, i, half_mass):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def closed(workspace, i, half_mass):
     """Add a step of a lane to the sums of its run and cycle."""
-    place, out, work = room[PLACE * LANES + i], room[OUT * LANES + i], room[WORK * LANES + i]
-    room[WORK_IN * LANES + i] += work
-    room[POWER * LANES + i] += abs(work)
-    room[VISCOUS * LANES + i] += room[LOSS_NOW * LANES + i]
-    held = room[ENERGY * LANES + i] + half_mass * room[MOVING * LANES + i]
-    room[PEAK * LANES + i] = max(room[PEAK * LANES + i], held)
-    room[FAR * LANES + i] = max(room[FAR * LANES + i], abs(place))
-    room[LOW * LANES + i], room[HIGH * LANES + i] = min(room[LOW * LANES + i], out), max(room[HIGH * LANES + i], out)
-    room[SLIP * LANES + i] = place - room[MEAN * LANES + i] * room[B * LANES + i] \
-        - room[(MEAN + 1) * LANES + i] * room[(B + 1) * LANES + i] \
-        - room[LENGTH * LANES + i] * room[FORCE * LANES + i] / room[LIMIT * LANES + i]
+    place, out, work = workspace[PLACE * LANES + i], workspace[OUT * LANES + i], workspace[WORK * LANES + i]
+    workspace[WORK_IN * LANES + i] += work
+    workspace[POWER * LANES + i] += abs(work)
+    workspace[VISCOUS * LANES + i] += workspace[LOSS_NOW * LANES + i]
+    held = workspace[ENERGY * LANES + i] + half_mass * workspace[MOVING * LANES + i]
+    workspace[PEAK * LANES + i] = max(workspace[PEAK * LANES + i], held)
+    workspace[FAR * LANES + i] = max(workspace[FAR * LANES + i], abs(place))
+    workspace[LOW * LANES + i], workspace[HIGH * LANES + i] = min(workspace[LOW * LANES + i], out), max(workspace[HIGH * LANES + i], out)
+    workspace[SLIP * LANES + i] = place - workspace[MEAN * LANES + i] * workspace[B * LANES + i] \
+        - workspace[(MEAN + 1) * LANES + i] * workspace[(B + 1) * LANES + i] \
+        - workspace[LENGTH * LANES + i] * workspace[FORCE * LANES + i] / workspace[LIMIT * LANES + i]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def begun(room, i, rig, row):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def begun(workspace, i, rig, row):
     """Set the free slide of a step, from the motion at its start."""
-    free = room[PUSH * LANES + i] * row[PORT]
+    free = workspace[PUSH * LANES + i] * row[PORT]
     for k in range(RIG):
-        free += rig[REACH_Z, k] * room[(Z + k) * LANES + i] + rig[REACH_V, k] * room[(V + k) * LANES + i]
-    room[FREE * LANES + i] = free
-    room[DONE * LANES + i] = room[FALL * LANES + i] = 0.0
-    room[P * LANES + i] = room[(P + 1) * LANES + i] = room[(P + 2) * LANES + i] = 0.0
+        free += rig[REACH_Z, k] * workspace[(Z + k) * LANES + i] + rig[REACH_V, k] * workspace[(V + k) * LANES + i]
+    workspace[FREE * LANES + i] = free
+    workspace[DONE * LANES + i] = workspace[FALL * LANES + i] = 0.0
+    workspace[P * LANES + i] = workspace[(P + 1) * LANES + i] = workspace[(P + 2) * LANES + i] = 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def beyond(room, lengths):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def beyond(workspace, lengths):
     """Number of lanes in which a point may slide farther than so many bond lengths in the step, or as far as nan."""
     near = 0.0
     for i in range(LANES):
-        far = abs(room[Y * LANES + i]) + room[REACH * LANES + i] * abs(room[(Y + 1) * LANES + i]) \
-            + room[(REACH + 1) * LANES + i] * abs(room[(Y + 2) * LANES + i])
-        near += 1.0 if far <= lengths * room[LENGTH * LANES + i] else 0.0
+        far = abs(workspace[Y * LANES + i]) + workspace[REACH * LANES + i] * abs(workspace[(Y + 1) * LANES + i]) \
+            + workspace[(REACH + 1) * LANES + i] * abs(workspace[(Y + 2) * LANES + i])
+        near += 1.0 if far <= lengths * workspace[LENGTH * LANES + i] else 0.0
     return LANES - near
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def left(room):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def left(workspace):
     """Number of lanes whose step is not solved."""
     done = 0.0
     for i in range(LANES):
-        done += room[DONE * LANES + i]
+        done += workspace[DONE * LANES + i]
     return LANES - done
 
 
-@njit(error_model="numpy", forceinline=True, **LEAN)
-def turned(room, dt):
+@njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
+def turned(workspace, dt):
     """Take the extremes of the output inside a step into those of the cycle, by the cubic through values and rates as
     `passing_kernels.shown` has it."""
     turns = 0.0
     for i in range(LANES):
-        turns += 1.0 if room[RATE0 * LANES + i] * room[RATE * LANES + i] < 0.0 else 0.0
+        turns += 1.0 if workspace[RATE0 * LANES + i] * workspace[RATE * LANES + i] < 0.0 else 0.0
     for i in range(LANES if turns > 0.0 else 0):
-        if room[RATE0 * LANES + i] * room[RATE * LANES + i] < 0.0:
-            a, b = room[OUT0 * LANES + i], room[OUT * LANES + i]
-            p, r = room[RATE0 * LANES + i] * dt, room[RATE * LANES + i] * dt
+        if workspace[RATE0 * LANES + i] * workspace[RATE * LANES + i] < 0.0:
+            a, b = workspace[OUT0 * LANES + i], workspace[OUT * LANES + i]
+            p, r = workspace[RATE0 * LANES + i] * dt, workspace[RATE * LANES + i] * dt
             big, mid = 2 * (a - b) + p + r, 3 * (b - a) - 2 * p - r
             root = sqrt(max(mid * mid - 3 * big * p, 0.0))
             for sign in (1.0, -1.0):
                 s = -p / (mid + sign * root)
                 if 0.0 <= s <= 1.0:
                     value = a + p * s + mid * s * s + big * s * s * s
-                    room[LOW * LANES + i] = min(room[LOW * LANES + i], value)
-                    room[HIGH * LANES + i] = max(room[HIGH * LANES + i], value)
+                    workspace[LOW * LANES + i] = min(workspace[LOW * LANES + i], value)
+                    workspace[HIGH * LANES + i] = max(workspace[HIGH * LANES + i], value)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
-def step(room, rig, row):
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def step(workspace, rig, row):
     """Move all lanes by a step."""
     beta = rig[RIGS, 0]
     for i in range(LANES):
-        begun(room, i, rig, row)
+        begun(workspace, i, rig, row)
     for _ in range(MOST):
-        if beyond(room, SHORT) == 0.0:
+        if beyond(workspace, SHORT) == 0.0:
             for i in range(LANES):
-                turn(room, i, beta, False)
+                turn(workspace, i, beta, False)
         else:
             for i in range(LANES):
-                turn(room, i, beta, True)
-        if left(room) == 0.0:
+                turn(workspace, i, beta, True)
+        if left(workspace) == 0.0:
             break
-    if left(room) > 0.0:
+    if left(workspace) > 0.0:
         for i in range(LANES):
-            room[BAD * LANES + i] += 1.0 - room[DONE * LANES + i]
-    if beyond(room, SHORT) == 0.0:
+            workspace[BAD * LANES + i] += 1.0 - workspace[DONE * LANES + i]
+    if beyond(workspace, SHORT) == 0.0:
         for i in range(LANES):
-            commit(room, i, beta, False)
+            commit(workspace, i, beta, False)
     else:
         for i in range(LANES):
-            commit(room, i, beta, True)
+            commit(workspace, i, beta, True)
     work, lost, cosine, sine, half_mass = row[REST], row[REST + 1], row[WAVE], row[WAVE + 1], 0.5 * rig[RIGS, 1]
     for i in range(LANES):
-        opened(room, i, work, lost, cosine, sine)
+        opened(workspace, i, work, lost, cosine, sine)
     for k in range(RIG):
         mode = (rig[ZZ, k], rig[ZV, k], rig[VZ, k], rig[VV, k], rig[BY_Z, k], rig[BY_V, k], rig[LOSS, k],
                 rig[LOSS + 1, k], rig[LOSS + 2, k], rig[LOSS + 3, k], rig[LOSS + 4, k], rig[LOSS + 5, k],
@@ -304,23 +304,23 @@ def step(room, rig, row):
         push = (row[BY_DRIVE + k], row[BY_DRIVE + RIG + k], row[WORKS + k], row[WORKS + RIG + k],
                 row[WORKS + 2 * RIG + k], row[LOSSES + k], row[LOSSES + RIG + k], row[LOSSES + 2 * RIG + k])
         for i in range(LANES):
-            flow(room, i, k, mode, push)
+            flow(workspace, i, k, mode, push)
     for i in range(LANES):
-        closed(room, i, half_mass)
-    turned(room, rig[RIGS, 2])
+        closed(workspace, i, half_mass)
+    turned(workspace, rig[RIGS, 2])
 
 
-@njit(error_model="numpy", forceinline=True, **LEAN)
-def keep(room, sample):
+@njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
+def keep(workspace, sample):
     """Write the sample (KEPT, LANES) of all lanes."""
     for i in range(LANES):
         for k in range(2 * RIG):
-            sample[k, i] = room[k * LANES + i]
-        sample[2 * RIG, i], sample[2 * RIG + 1, i] = room[FORCE * LANES + i], room[SLIP * LANES + i]
+            sample[k, i] = workspace[k * LANES + i]
+        sample[2 * RIG, i], sample[2 * RIG + 1, i] = workspace[FORCE * LANES + i], workspace[SLIP * LANES + i]
 
 
-@njit(error_model="numpy", cache=True, nogil=True, **LEAN)
-def march(room, rig, table, history, samples, work):
+@njit(error_model="numpy", cache=True, nogil=True, **NJIT_NO_REFCOUNT)
+def march(workspace, rig, table, history, samples, work):
     """March all lanes over cycles, the last of which are kept.
 
     room (NUMBERS * LANES,): of the lanes; rig (RIGS + 1, 3): of the rig that they share; table (s, COLUMNS): of the
@@ -331,15 +331,15 @@ def march(room, rig, table, history, samples, work):
     first = cycles - (samples.shape[0] - 1) // steps
     for c in range(cycles):
         for i in range(LANES):
-            room[LOW * LANES + i] = room[HIGH * LANES + i] = room[OUT * LANES + i]
-            room[COS * LANES + i] = room[SIN * LANES + i] = 0.0
+            workspace[LOW * LANES + i] = workspace[HIGH * LANES + i] = workspace[OUT * LANES + i]
+            workspace[COS * LANES + i] = workspace[SIN * LANES + i] = 0.0
             if c == first:
-                work[i] = room[BOOKED * LANES + i]
+                work[i] = workspace[BOOKED * LANES + i]
         for s in range(steps):
             if c >= first:
-                keep(room, samples[(c - first) * steps + s])
-            step(room, rig, table[s])
+                keep(workspace, samples[(c - first) * steps + s])
+            step(workspace, rig, table[s])
         for i in range(LANES):
-            history[c, 0, i], history[c, 1, i] = room[LOW * LANES + i], room[HIGH * LANES + i]
-            history[c, 2, i], history[c, 3, i] = 2 * room[COS * LANES + i] / steps, -2 * room[SIN * LANES + i] / steps
-    keep(room, samples[samples.shape[0] - 1])
+            history[c, 0, i], history[c, 1, i] = workspace[LOW * LANES + i], workspace[HIGH * LANES + i]
+            history[c, 2, i], history[c, 3, i] = 2 * workspace[COS * LANES + i] / steps, -2 * workspace[SIN * LANES + i] / steps
+    keep(workspace, samples[samples.shape[0] - 1])

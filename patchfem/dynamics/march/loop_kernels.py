@@ -8,9 +8,9 @@ instance of it per contact, of a module with solve, given, commit and state as t
 and what a rig does not have is not compiled.
 """
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import LEAN
-from ..contacts import element_kernels as contact
+from ...compiled.jit import njit
+from ...friction.flags_kernels import NJIT_NO_REFCOUNT
+from ..interfaces import element_kernels as contact
 from ..modal_kernels import free_slide, move, note, push_back, sample, stored, tell
 from . import faces_kernels as faces
 from . import parts_kernels as parts
@@ -20,14 +20,14 @@ MANY, STOPS, PRESSED, LISTED = parts.MANY, parts.STOPS, parts.PRESSED, parts.LIS
 UNFIT = 4  # status where no contact set fits
 
 
-@njit(error_model="numpy", forceinline=True, **LEAN)
-def seen(i, last, drive, motion, plant, row, c, j, n):
+@njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
+def seen(i, last, drive, motion, modal_system, row, c, j, n):
     """Sample i as (slide, its rate, output; force, energy and slip of the interface; energy of what stands beside it),
     written into its row; drive: acceleration of the step before."""
-    q, v, out = sample(row, motion, plant.slide, plant.output)
+    q, v, out = sample(row, motion, modal_system.slide, modal_system.output)
     force, energy, slip, beside = 0.0, 0.0, 0.0, 0.0
     if PRESSED:
-        beside = pressing.pressed(i, last, motion, plant.mass, c, j, n, row)
+        beside = pressing.pressed(i, last, motion, modal_system.mass, c, j, n, row)
         if n.slot[0] < 0:
             return q, v, out, force, energy, slip, beside
     if MANY:
@@ -35,14 +35,14 @@ def seen(i, last, drive, motion, plant, row, c, j, n):
         beside += springs
         if STOPS:
             if i > 0:
-                force = faces.held(motion, plant, drive, force, row, j)
+                force = faces.held(motion, modal_system, drive, force, row, j)
     else:
         force, energy, slip = contact.state(c, q, v)
     return q, v, out, force, energy, slip, beside
 
 
-@njit(error_model="numpy", cache=True, **LEAN)
-def march(first, steps, motion, plant, table, c, j, n, travel, ledger, rows):
+@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
+def march(first, steps, motion, modal_system, table, c, j, n, travel, ledger, rows):
     """March `steps` steps, the first by row `first` of the table (in turns); 0.1-0.3 us a step, a few ns per point.
 
     motion (2, n): coordinates and rates; table: of `propagator.Propagator`; c: the contact on port 0; j: Faces, or
@@ -56,52 +56,52 @@ def march(first, steps, motion, plant, table, c, j, n, travel, ledger, rows):
     Returns (steps done, status): 0 finished, 1 travel exceeded, 2 memory of the contact full, 3 not finite, 4 no
     contact set fits.
     """
-    slide, dt, around, size = plant.slide, plant.dt, table.shape[0], 2 * plant.slide.size
-    accel, spare, beta = plant.room[0], plant.room[1:], plant.beta
+    slide, dt, around, size = modal_system.slide, modal_system.dt, table.shape[0], 2 * modal_system.slide.size
+    accel, scratch, beta = modal_system.workspace[0], modal_system.workspace[1:], modal_system.beta
     if PRESSED:
         n.few[:] = 0.0
         n.few[0] = n.sets.base[0]
     for i in range(steps + 1):
         drive = table[(first + i - 1) % around, 4 * size + 2] if STOPS else 0.0
-        q, v, out, force, energy, slip, beside = seen(i, i == steps, drive, motion, plant, rows[i], c, j, n)
+        q, v, out, force, energy, slip, beside = seen(i, i == steps, drive, motion, modal_system, rows[i], c, j, n)
         if PRESSED:
             if n.slot[0] < 0:
                 return i, UNFIT
         status = note(rows[i, :size + 6], force, energy, slip, out, travel,
-                      energy + (beside + stored(motion, plant.omega, plant.mass)), ledger)
+                      energy + (beside + stored(motion, modal_system.omega, modal_system.mass)), ledger)
         if status:
             return i, status
         if i == steps:
             break
         at = (first + i) % around
         if PRESSED:
-            dq, used, count = pressing.agreed(i, q, v, motion, plant, table, at, c, j, n)
+            dq, used, count = pressing.solve_coupled_forces(i, q, v, motion, modal_system, table, at, c, j, n)
             if n.slot[0] < 0:
                 return i, UNFIT
         elif MANY:
-            faces.begun(motion, plant, table, at, dt, j)
-            dq, count = faces.solved(q, v, motion, plant, table, at, c, j)
+            faces.begun(motion, modal_system, table, at, dt, j)
+            dq, count = faces.solved(q, v, motion, modal_system, table, at, c, j)
         else:
-            free = free_slide(motion, plant.reach, 0, table, at)
+            free = free_slide(motion, modal_system.reach, 0, table, at)
             dq, _, count = contact.solve(free, beta, q, v, dt, c, j.goal[0])
             used = (free - dq) / beta
         if MANY:
-            faces.pushed(plant, j, accel)
+            faces.pushed(modal_system, j, accel)
             work = faces.worked(dq, rows[i], j)
         else:
-            push_back(used, slide, plant.mass, accel)
+            push_back(used, slide, modal_system.mass, accel)
             rows[i, size + 4], work = used, used * dq
             if PRESSED:
-                pressing.pushed(n, plant.mass, accel)
-        move(motion, plant.free, plant.push, plant.loss, plant.dense, plant.dense_loss, table, at, accel, spare, ledger)
+                pressing.pushed(n, modal_system.mass, accel)
+        move(motion, modal_system.free, modal_system.push, modal_system.loss, modal_system.dense, modal_system.dense_loss, table, at, accel, scratch, ledger)
         if STOPS:
-            blow = faces.blown(motion, plant.mass, j)
+            blow = faces.blown(motion, modal_system.mass, j)
             work += blow
             ledger[3] += blow
         tell(count, work, ledger)
         rows[i, size + 6] = work
         if MANY:
-            lost, ok = faces.committed(q, v, dq, motion, plant, c, j)
+            lost, ok = faces.committed(q, v, dq, motion, modal_system, c, j)
         else:
             after = 0.0
             for k in range(slide.size):
@@ -116,7 +116,7 @@ def march(first, steps, motion, plant, table, c, j, n, travel, ledger, rows):
     return steps, 0
 
 
-@njit(error_model="numpy", cache=True, **LEAN)
+@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def follow(path, dt, c, goal, lost, forces):
     """Resultant along a slide path (k,) [m] that is given, with steps of dt [s].
 

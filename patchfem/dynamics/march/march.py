@@ -12,13 +12,13 @@ from ...compiled import load
 from ...core import BaseSine, ModalBasis, Outcome, Response, say
 from ...friction.path_work import sampled_work
 from ...structure.drive_sizes import even_samples
-from ..contacts import arrays
-from ..contacts.arrays import ModalArrays
+from ..checkpoint import Samples, slot_of
 from ..cycles import extremes_of, phasors_of, thinned
 from ..integrated import histories
+from ..interfaces import arrays
+from ..interfaces.arrays import ModalArrays
+from ..periodicity import APART, ahead, looked_at, until_look
 from ..propagator import propagator
-from ..repeats import APART, ahead, looked_at, until_look
-from ..resume import Samples, slot_of
 from .capacity import keep, lengthened
 from .faces import GOAL, faces_of
 from .models import ContactModel, free_model, load_kernels
@@ -136,16 +136,16 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
         samples.again = True
     extremes, phasors = samples.extremes, samples.phasors
     # room: for how many more samples of cycles before the window; picked: first step of a cycle -> those worth keeping
-    room, whole, picked, even = samples.room, whole or bool(asked), {}, even_samples(drive, cycles, wanted=even)
+    workspace, whole, picked, even = samples.workspace, whole or bool(asked), {}, even_samples(drive, cycles, wanted=even)
     # a fraction of a cycle comes first, the window is whole
     size = (total - run.done) % steps_per_cycle or steps_per_cycle
     while run.done < total and run.outcome is None:
         stop = min((mark for mark in asked if mark > run.done), default=total)
         for first, rows, works in run.cycles(size, stop, frames if stop == total else 0, snapshots):
-            picks = thinned(rows, run, even) if whole and room > 0 and rows.shape[1] > 1 else [None] * len(works)
+            picks = thinned(rows, run, even) if whole and workspace > 0 and rows.shape[1] > 1 else [None] * len(works)
             for k, work in enumerate(works):
-                if whole and len(last) == last.maxlen and room > 0:
-                    room -= _shelved(samples, run, last[0], picked.pop(last[0][0], None))
+                if whole and len(last) == last.maxlen and workspace > 0:
+                    workspace -= _shelved(samples, run, last[0], picked.pop(last[0][0], None))
                 last.append((first + k * steps_per_cycle, rows[k], work))
                 picked[last[-1][0]] = picks[k]
             if whole or folds:
@@ -157,7 +157,7 @@ def march(modes: ModalBasis, drive: BaseSine, model: ContactModel, cycles: float
         size = steps_per_cycle
         left = (min((mark for mark in asked if mark > run.done), default=total) - run.done) // size - last.maxlen
         if whole and run.repeats(left):
-            room = _left_out(samples, run, left)
+            workspace = _left_out(samples, run, left)
         if run.done < total:
             slot.offer(run, samples)
         if progress is not None:
@@ -189,19 +189,19 @@ def _left_out(samples: Samples, run, count: int) -> int:
     """
     first, rows, _ = samples.last[-1]
     for cycle in samples.last:
-        if samples.room > 0:
+        if samples.workspace > 0:
             _shelved(samples, run, cycle)
     samples.last.clear()
     samples.extremes += [samples.extremes[-1]] * count
     samples.phasors += [samples.phasors[-1]] * count
     pick, begin = thinned(rows[None], run)[0], 2 * run.modes.omega.size + 6
-    shown = np.arange(1, 1 + min(count, -(-max(0, samples.room) // len(pick))))[:, None]
+    shown = np.arange(1, 1 + min(count, -(-max(0, samples.workspace) // len(pick))))[:, None]
     sums = slice(begin, begin + 3)  # friction work, and what is dissipated and created, since the start
     later = np.tile(rows[pick], (len(shown), 1))
     later[:, sums] += np.repeat(shown * (rows[-1, sums] - rows[0, sums]), len(pick), axis=0)
     samples.early(later, (first + pick + run.prop.steps * shown).ravel())
     run.leave_out(count)
-    return samples.room
+    return samples.workspace
 
 
 def ends_of(cycles, run) -> list:
@@ -238,8 +238,8 @@ class Run:
         self.totals = np.zeros(3)
         self.second = np.zeros(2)  # friction work off the samples, and what went to and fro [J]
         self.ledger[0] = self.motion()  # what is released at the start counts as work in
-        self.plant = modal_arrays(modes, self.prop)
-        self.faces, self.load = faces_of(model, self.prop, self.plant, modes.mass), self._pressing()
+        self.modal_system = modal_arrays(modes, self.prop)
+        self.faces, self.load = faces_of(model, self.prop, self.modal_system, modes.mass), self._pressing()
         self.width = 2 * modes.omega.size + 7 + EACH * len(model.joints) + 5 * bool(model.loading)
         if model.joints or model.loading:
             self.ledger[0] += self.strained()
@@ -275,7 +275,7 @@ class Run:
     def repeats(self, left: int) -> bool:
         """Whether the motion has become periodic, at the end of a cycle, so that `left` more may be left out.
 
-        Asked for at the end of every cycle, or of those that `dynamics.repeats.until_look` names.
+        Asked for at the end of every cycle, or of those that `dynamics.periodicity.until_look` names.
         """
         number, size = self.done // self.prop.steps, self.looks.shape[1]
         if not size or self.periodic is None or not (looked_at(number) or looked_at(number + 1)):
@@ -390,18 +390,18 @@ class Run:
         n, around, table, far, at, number = 2 * self.modes.omega.size, self.prop.steps, None, np.zeros(
             self.width + 3), np.zeros(1, np.int64), -1
         kernels = load(PASSING)
-        room = np.zeros(n + 7), far, at, np.zeros((14, kernels.BLOCK))
+        workspace = np.zeros(n + 7), far, at, np.zeros((14, kernels.BLOCK))
         while self.done < steps and self.outcome is None:
             size = (steps - self.done) % around or around
             count = min((steps - self.done) // size, until_look(self.done // around)) if size == around else 1
             seen, sums, begin, (rows, row) = np.zeros((count, 4)), np.zeros(5), self.done, self.table(size * count)
             if rows is not table:
                 table, held = rows, kernels.passing.held(
-                    self.state, self.plant, rows, self.contact, GOAL * self.model.limit, float(self.model.limit),
-                    float(self.travel), self.ledger, self.totals, *room)
+                    self.state, self.modal_system, rows, self.contact, GOAL * self.model.limit, float(self.model.limit),
+                    float(self.travel), self.ledger, self.totals, *workspace)
             phase, at[0] = 2 * np.pi * (begin % around + np.arange(size + 1)) / around, -1
             trace = np.array([0 * phase, 0 * phase, np.cos(phase), np.sin(phase)])
-            did, status = kernels.passing.held_call(held, row, sums, trace, seen)
+            did, status = kernels.passing.call_with_bound_args(held, row, sums, trace, seen)
             self.done, number = begin + did, begin + int(at[0]) - row if at[0] >= 0 else number
             self.totals += sums[:3]
             self.second += sums[3:]
@@ -491,7 +491,7 @@ class Run:
     def _steps(self, count: int, rows) -> tuple:
         """March `count` steps into rows (count + 1, width): (steps done, status)."""
         table, row = self.table(count)
-        return self.loops.march(self.model, row, count, self.state, self.plant, table, self.contact, self.faces,
+        return self.loops.march(self.model, row, count, self.state, self.modal_system, table, self.contact, self.faces,
                                 self._load(count), float(self.travel), self.ledger, rows)
 
     def _pressing(self):
@@ -593,7 +593,7 @@ class Run:
     def strained(self) -> float:
         """Energy stored in what rubs, in springs and in the contact that presses [J]."""
         n, rows = 2 * self.modes.omega.size, np.zeros((1, self.width))
-        self.loops.march(self.model, 0, 0, self.state, self.plant, np.zeros((1, 4 * n + 3)), self.contact,
+        self.loops.march(self.model, 0, 0, self.state, self.modal_system, np.zeros((1, 4 * n + 3)), self.contact,
                          self.faces, self._load(0), np.inf, np.zeros(9), rows)
         springs = [one.potential(part[0]) for one, part in zip(self.model.joints, self._elements(rows)[0])
                    if one.potential is not None]
@@ -605,9 +605,9 @@ class Run:
         names = ("work_in", "viscous", "power", "friction", "peak_stored", "iterations", "worst_iterations")
         book = dict(zip(names, map(float, self.ledger))) | {"stored": self.motion() + self.strained()}
         book |= {"booked": float(self.ledger[8]), "sampled": float(self.second[0]), "passed": float(self.second[1])}
-        if hasattr(self.contact, "tally"):
-            tally = getattr(self.contact, "tallies", self.contact.tally[None])
-            created, dissipated, substeps = map(float, tally[:, 6:9].sum(axis=0))
+        if hasattr(self.contact, "counters"):
+            counters = getattr(self.contact, "tallies", self.contact.counters[None])
+            created, dissipated, substeps = map(float, counters[:, 6:9].sum(axis=0))
             book |= {"created": created, "dissipated": dissipated, "substeps": substeps,
-                     "strips": float(tally[:, 10].max())}
+                     "strips": float(counters[:, 10].max())}
         return book

@@ -12,10 +12,10 @@ from ...friction.laws.coulomb import Coulomb
 from ...friction.laws.elastic_plastic import parallel
 from ...friction.laws.stretch import bonds_of, growth_numbers, points_element
 from ...friction.protocol import Element
-from ..contacts import arrays
-from ..contacts.dispatch import COULOMB
+from ..interfaces import arrays
+from ..interfaces.dispatch import COULOMB
 
-HERE = "dynamics.contacts"
+HERE = "dynamics.interfaces"
 ELEMENTS = f"{HERE}.element_kernels"
 MOST_AT_FIRST = 256  # strips that the list of a point has room for before it grows, besides those of one step
 WIDE = 1e-6  # bond lengths over which the first bonds of a point lie: one may rest where their force turns
@@ -157,11 +157,11 @@ def lists_model(law, limit, sigma, shear, reach: float, merge: float, under: dic
     sigma are then a measure."""
     limit = np.asarray(limit, float)
     shape, stiffness = (np.zeros((limit.size, 0)), ()) if shear is None else (np.asarray(shear.shape), shear.stiffness)
-    room = min(numbers.room(law, reach, merge), MOST_AT_FIRST + numbers.STRIP * int(min(reach, numbers.NOTHING_LEFT)))
+    workspace = min(numbers.workspace(law, reach, merge), MOST_AT_FIRST + numbers.STRIP * int(min(reach, numbers.NOTHING_LEFT)))
     fields = arrays.sheared(limit, law.length, growth_numbers(law), shape, stiffness)
     fields["points"][4], fields["drag"][2, 1:] = sigma, shape.T @ limit / limit.sum()
-    fields |= {"bondlist": np.zeros((10, limit.size * room)), "tally": numbers.tally_of(room), "time": np.ones(1),
-               "tallies": numbers.tally_of(room, limit.size), "now": numbers.now_of(law),
+    fields |= {"bondlist": np.zeros((10, limit.size * workspace)), "counters": numbers.tally_of(workspace), "time": np.ones(1),
+               "tallies": numbers.tally_of(workspace, limit.size), "now": numbers.now_of(law),
                "nows": np.tile(numbers.now_of(law), (limit.size, 1)), "table": numbers.share_table(law),
                "law": numbers.law_numbers(law, reach, merge, WIDE), "pressed": np.zeros((2, 0)),
                "pattern": np.zeros((2, 0)), "places": np.zeros(0)}
@@ -199,9 +199,9 @@ def list_model(law, limit: float, reach: float, merge: float) -> ContactModel:
 
     reach: cut-off in bond lengths; merge: widest merged strip in bond lengths at zero age, 0 merges nothing.
     """
-    room = numbers.room(law, reach, merge)
-    fields = {"force": [limit], "bondlist": np.zeros((10, room)), "now": numbers.now_of(law),
-              "tally": numbers.tally_of(room),
+    workspace = numbers.workspace(law, reach, merge)
+    fields = {"force": [limit], "bondlist": np.zeros((10, workspace)), "now": numbers.now_of(law),
+              "counters": numbers.tally_of(workspace),
               "law": numbers.law_numbers(law, reach, merge), "table": numbers.share_table(law),
               "growth": growth_numbers(law), "last": np.zeros(2), "bound": [(1 + law.initial) * limit]}
     return ContactModel(f"{HERE}.list_kernels", limit, fields, law.length, tuple_of=arrays.BondList)

@@ -7,21 +7,21 @@ such a step are the modes of the rig. Cost of it: 25 ns of 150.
 
 import numpy as np
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import FAST, LEAN
-from ..contacts import shear_kernels as contact
-from ..contacts.shear_kernels import PULL, REACH, SLID, WAY
+from ...compiled.jit import njit
+from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
+from ..interfaces import shear_kernels as contact
+from ..interfaces.shear_kernels import PULL, REACH, SLID, WAY
 from ..modal_kernels import free_slide, move, note, push_back, sample, stored, tell
 
 WORK, LOST, CREATED, SAMPLED, PASSED = range(5)  # of `sums` [J]
 OUT, RATE, COS, SIN = range(4)  # of `trace`: output and its rate at the samples, the waves of the drive there
 LOW, HIGH, RE, IM = range(4)  # of `seen`: extremes and phasor of the output in a cycle [m]
-POWER, DAMPED, SLIDE, SPEED, PLACE, PACE, STORED = range(7)  # of `room`, at the steps of a block; as many to waste
+POWER, DAMPED, SLIDE, SPEED, PLACE, PACE, STORED = range(7)  # of `workspace`, at the steps of a block; as many to waste
 BLOCK = 32  # steps of a drag that are tried at once
 REST = 1e-12  # of the square of the largest rate of a cycle, as of `dynamics.cycles`
 
 
-@njit(error_model="numpy", forceinline=True, **LEAN)
+@njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def folded(work, rise, q, after, mean, limit, sums):
     """Add a step from the slide q to `after` [m] to the sums: its work and the rise of the interface's energy [J], the
     mean of the forces at its ends [N]."""
@@ -33,7 +33,7 @@ def folded(work, rise, q, after, mean, limit, sums):
     sums[PASSED] += abs(work)
 
 
-@njit(error_model="numpy", forceinline=True, **LEAN)
+@njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def reached(row, number, totals, sums, far, far_at):
     """Keep the sample of this number in `far`, as `Run.cycles` books it, where its slide is the largest so far."""
     n = row.size - 7
@@ -47,7 +47,7 @@ def reached(row, number, totals, sums, far, far_at):
     far_at[0] = number
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def swung(c, did, slides):
     """Move the modes of the pieces by `did` steps of a drag, forth and back; the next guess is as `went_on` leaves it.
 
@@ -65,32 +65,32 @@ def swung(c, did, slides):
     c.ready[:] = 0.0
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def flown(k, count, motion, plant, table, at, accel, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def flown(k, count, motion, modal_system, table, at, accel, workspace):
     """Move a mode by `count` steps of a force that stays, by row `at` of the table on; what it shows and takes is added
-    to `room`."""
+    to `workspace`."""
     n, z, v = motion.shape[1], motion[0, k], motion[1, k]
-    zz, zv, vz, vv = plant.free[0, k], plant.free[1, k], plant.free[2, k], plant.free[3, k]
-    by_z, by_v, slide, output, square = plant.push[0, k] * accel, plant.push[1, k] * accel, plant.slide[k], \
-        plant.output[k], plant.omega[k] * plant.omega[k]
-    a, b, d, e, f, g = plant.loss[0, k], plant.loss[1, k], plant.loss[2, k], plant.loss[3, k] * accel, \
-        plant.loss[4, k] * accel, plant.loss[5, k] * accel * accel
+    zz, zv, vz, vv = modal_system.free[0, k], modal_system.free[1, k], modal_system.free[2, k], modal_system.free[3, k]
+    by_z, by_v, slide, output, square = modal_system.push[0, k] * accel, modal_system.push[1, k] * accel, modal_system.slide[k], \
+        modal_system.output[k], modal_system.omega[k] * modal_system.omega[k]
+    a, b, d, e, f, g = modal_system.loss[0, k], modal_system.loss[1, k], modal_system.loss[2, k], modal_system.loss[3, k] * accel, \
+        modal_system.loss[4, k] * accel, modal_system.loss[5, k] * accel * accel
     for s in range(count):
         row = at + s
-        room[POWER, s] += table[row, 2 * n + k] * z + table[row, 3 * n + k] * v + table[row, 4 * n + k] * accel
-        room[DAMPED, s] += (table[row, 5 * n + k] + a * z + b * v + e) * z + (table[row, 6 * n + k] + d * v + f) * v \
+        workspace[POWER, s] += table[row, 2 * n + k] * z + table[row, 3 * n + k] * v + table[row, 4 * n + k] * accel
+        workspace[DAMPED, s] += (table[row, 5 * n + k] + a * z + b * v + e) * z + (table[row, 6 * n + k] + d * v + f) * v \
             + table[row, 7 * n + k] * accel + g
         z, v = zz * z + zv * v + by_z + table[row, k], vz * z + vv * v + by_v + table[row, n + k]
-        room[SLIDE, s] += slide * z
-        room[SPEED, s] += slide * v
-        room[PLACE, s] += output * z
-        room[PACE, s] += output * v
-        room[STORED, s] += v * v + square * z * z
+        workspace[SLIDE, s] += slide * z
+        workspace[SPEED, s] += slide * v
+        workspace[PLACE, s] += output * z
+        workspace[PACE, s] += output * v
+        workspace[STORED, s] += v * v + square * z * z
     motion[0, k], motion[1, k] = z, v
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
-def dragged_on(first, count, i, q, motion, plant, table, c, travel, limit, ledger, sums, trace, room):
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def dragged_on(first, count, i, q, motion, modal_system, table, c, travel, limit, ledger, sums, trace, workspace):
     """Move on from the sample i of a cycle, at the slide q, by up to `count` steps in which all points drag; how many
     they are.
 
@@ -98,7 +98,7 @@ def dragged_on(first, count, i, q, motion, plant, table, c, travel, limit, ledge
     after the other, and once more over those before the drag ends in it.
     """
     way, n, size, at = c.flow[WAY], motion.shape[1], 2 * motion.shape[1], first % table.shape[0]
-    force, accel, begun = way * c.drag[PULL, 0], plant.room[0], plant.room[1:]
+    force, accel, begun = way * c.drag[PULL, 0], modal_system.workspace[0], modal_system.workspace[1:]
     least, taken, energy, swing = 0.0, 0.0, c.eps[0] * c.drag[PULL, 0], 0.0
     for k in range(c.b.size):
         y = 2 * (way * c.drag[PULL, k + 1] / c.kappa[k] - c.b[k])
@@ -106,88 +106,88 @@ def dragged_on(first, count, i, q, motion, plant, table, c, travel, limit, ledge
         taken += way * c.drag[PULL, k + 1] * y
         energy += 0.5 * c.kappa[k] * c.b[k] * c.b[k]
         swing += c.kappa[k] * y * (c.b[k] + 0.5 * y)
-    push_back(force, plant.slide, plant.mass, accel)
-    block = min(count, room.shape[1], table.shape[0] - at)
+    push_back(force, modal_system.slide, modal_system.mass, accel)
+    block = min(count, workspace.shape[1], table.shape[0] - at)
     for part in range(7):
         for s in range(block):
-            room[part, s] = 0.0
+            workspace[part, s] = 0.0
     for k in range(n):
         begun[0, k], begun[1, k] = motion[0, k], motion[1, k]
-        flown(k, block, motion, plant, table, at, accel[k], room)
+        flown(k, block, motion, modal_system, table, at, accel[k], workspace)
     did = 0
     for s in range(block):
-        after = room[SLIDE, s]
+        after = workspace[SLIDE, s]
         dq = after - q
         if way * dq <= least:
             break
         did, swings = s + 1, 1.0 if s % 2 == 0 else -1.0  # forth, then back
-        odd, power = 0.5 * (1.0 + swings), room[POWER, s] + table[at + s, 4 * size]
+        odd, power = 0.5 * (1.0 + swings), workspace[POWER, s] + table[at + s, 4 * size]
         folded(force * dq, swings * swing, q, after, force, limit, sums)
         ledger[0] += power
-        ledger[1] += room[DAMPED, s] + table[at + s, 4 * size + 1]
+        ledger[1] += workspace[DAMPED, s] + table[at + s, 4 * size + 1]
         ledger[2] += abs(power)
         ledger[3] += force * dq - swings * taken
-        ledger[4] = max(ledger[4], energy + odd * swing + 0.5 * plant.mass * room[STORED, s])
+        ledger[4] = max(ledger[4], energy + odd * swing + 0.5 * modal_system.mass * workspace[STORED, s])
         ledger[8] += force * dq
-        trace[OUT, i + did], trace[RATE, i + did] = room[PLACE, s], room[PACE, s]
-        q, room[SLIDE, s] = after, dq
+        trace[OUT, i + did], trace[RATE, i + did] = workspace[PLACE, s], workspace[PACE, s]
+        q, workspace[SLIDE, s] = after, dq
         c.flow[SLID] += dq
-        if not (abs(room[PLACE, s]) <= travel and np.isfinite(q + room[SPEED, s])):
+        if not (abs(workspace[PLACE, s]) <= travel and np.isfinite(q + workspace[SPEED, s])):
             break
     if did < block:
         for k in range(n):
             motion[0, k], motion[1, k] = begun[0, k], begun[1, k]
-            flown(k, did, motion, plant, table, at, accel[k], room[7:])
+            flown(k, did, motion, modal_system, table, at, accel[k], workspace[7:])
     if did:
-        swung(c, did, room[SLIDE])
+        swung(c, did, workspace[SLIDE])
     return did
 
 
-@njit(error_model="numpy", **LEAN)
-def through(first, motion, plant, table, c, goal, limit, travel, ledger, sums, totals, trace, row, far, far_at,
-            room):
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def through(first, motion, modal_system, table, c, goal, limit, travel, ledger, sums, totals, trace, row, far, far_at,
+            workspace):
     """March a cycle of samples as of `trace`, the first step by row `first` of the table (in turns); (steps done,
     status) as of `loop_kernels.march`."""
-    count, n, size, dt, around = trace.shape[1] - 1, motion.shape[1], 2 * motion.shape[1], plant.dt, table.shape[0]
-    accel, spare, i, open_step = plant.room[0], plant.room[1:], 0, False
+    count, n, size, dt, around = trace.shape[1] - 1, motion.shape[1], 2 * motion.shape[1], modal_system.dt, table.shape[0]
+    accel, scratch, i, open_step = modal_system.workspace[0], modal_system.workspace[1:], 0, False
     work, q0, force0, energy0 = 0.0, 0.0, 0.0, 0.0
     while True:
-        q, v, out = sample(row, motion, plant.slide, plant.output)
+        q, v, out = sample(row, motion, modal_system.slide, modal_system.output)
         force, energy, slip = contact.state(c, q, v)
         status = note(row[:size + 6], force, energy, slip, out, travel,
-                      energy + stored(motion, plant.omega, plant.mass), ledger)
+                      energy + stored(motion, modal_system.omega, modal_system.mass), ledger)
         if open_step:
             folded(work, energy - energy0, q0, q, 0.5 * (force0 + force), limit, sums)
         rate = 0.0
         for k in range(n):
-            rate += plant.output[k] * motion[1, k]
+            rate += modal_system.output[k] * motion[1, k]
         trace[OUT, i], trace[RATE, i] = out, rate
         reached(row, first + i, totals, sums, far, far_at)
         if status or i == count:
             return i, status
-        if c.flow[WAY] != 0.0 and plant.dense.size == 0:
-            did = dragged_on(first + i, count - i, i, q, motion, plant, table, c, travel, limit, ledger, sums, trace,
-                             room)
+        if c.flow[WAY] != 0.0 and modal_system.dense.size == 0:
+            did = dragged_on(first + i, count - i, i, q, motion, modal_system, table, c, travel, limit, ledger, sums, trace,
+                             workspace)
             if did:
                 i, open_step = i + did, False
                 continue
         at = (first + i) % around
-        free = free_slide(motion, plant.reach, 0, table, at)
-        dq, _, turns = contact.solve(free, plant.beta, q, v, dt, c, goal)
-        used = (free - dq) / plant.beta
-        push_back(used, plant.slide, plant.mass, accel)
+        free = free_slide(motion, modal_system.reach, 0, table, at)
+        dq, _, turns = contact.solve(free, modal_system.beta, q, v, dt, c, goal)
+        used = (free - dq) / modal_system.beta
+        push_back(used, modal_system.slide, modal_system.mass, accel)
         work = used * dq
-        move(motion, plant.free, plant.push, plant.loss, plant.dense, plant.dense_loss, table, at, accel, spare, ledger)
+        move(motion, modal_system.free, modal_system.push, modal_system.loss, modal_system.dense, modal_system.dense_loss, table, at, accel, scratch, ledger)
         tell(turns, work, ledger)
         after = 0.0
         for k in range(n):
-            after += plant.slide[k] * motion[1, k]
+            after += modal_system.slide[k] * motion[1, k]
         lost, _ = contact.commit(dq, used, q, v, after, dt, c)
         ledger[3] += lost
         q0, force0, energy0, open_step, i = q, force, energy, True, i + 1
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def shown(trace, dt, seen):
     """Extremes of the output between the samples of a cycle, by the cubic through values and rates as
     `cycles.hermite_extremes` has it, and its phasor, into seen (4,)."""
@@ -212,9 +212,9 @@ def shown(trace, dt, seen):
     seen[LOW], seen[HIGH], seen[RE], seen[IM] = low, high, 2 * re / count, 2 * im / count
 
 
-@njit(error_model="numpy", cache=True, **LEAN)
-def passing(first, sums, trace, seen, motion, plant, table, c, goal, limit, travel, ledger, totals, row, far, far_at,
-            room):
+@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
+def passing(first, sums, trace, seen, motion, modal_system, table, c, goal, limit, travel, ledger, totals, row, far, far_at,
+            workspace):
     """March cycles (k,) of as many samples as `trace` has, of which rows of `seen` (k, 4) are left, the first step by
     row `first` of the table (in turns).
 
@@ -226,9 +226,9 @@ def passing(first, sums, trace, seen, motion, plant, table, c, goal, limit, trav
     """
     count = trace.shape[1] - 1
     for cycle in range(seen.shape[0]):
-        did, status = through(first + cycle * count, motion, plant, table, c, goal, limit, travel, ledger, sums, totals,
-                              trace, row, far, far_at, room)
+        did, status = through(first + cycle * count, motion, modal_system, table, c, goal, limit, travel, ledger, sums, totals,
+                              trace, row, far, far_at, workspace)
         if status:
             return cycle * count + did, status
-        shown(trace, plant.dt, seen[cycle])
+        shown(trace, modal_system.dt, seen[cycle])
     return seen.shape[0] * count, 0

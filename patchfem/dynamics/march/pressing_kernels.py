@@ -10,11 +10,11 @@ energies never rises by itself. n: `contacts.arrays.Pressing`, c: the contact th
 
 import numpy as np
 
-from ...compiled.inner import njit
+from ...compiled.jit import njit
 from ...contact.press_kernels import locate, press_state, pull
 from ...contact.press_path_kernels import path_mean
-from ...friction.flags_kernels import INNER
-from ..contacts import element_kernels as contact
+from ...friction.flags_kernels import NJIT_INTERNAL
+from ..interfaces import element_kernels as contact
 from ..modal_kernels import free_rate, free_slide
 from . import faces_kernels as faces
 from . import parts_kernels as parts
@@ -25,7 +25,7 @@ TIGHT = 0.01  # of the goal, to which friction and normal contact agree
 MOST = 80  # guesses of the force that friction and normal contact agree on; the bracket of the secant shuts within 60
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def place_of(motion, rows, r):
     """Slide, heave or pitch of the modes."""
     out = 0.0
@@ -34,7 +34,7 @@ def place_of(motion, rows, r):
     return out
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def press_step(n, k0, begin, f1, f2, turn, out):
     """Heave and pitch of a step: (dh, dt) = (f1, f2) - beta mean slope, by Newton's method with step halving from the
     guess in `turn` (2,). Returns (set at the end, iterations, residual as a force [N]); `out` as in `path_mean`.
@@ -73,7 +73,7 @@ def press_step(n, k0, begin, f1, f2, turn, out):
     return k, 100, best / (b11 + b22 / (arm * arm) + 2 / sets.base[4])
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def pressed(i, last, motion, mass, c, j, n, row):
     """Load [N], moment [N m], energy [J] of the preloaded contact, heave and pitch at sample i into the last columns of
     its row; what rubs knows its load. The energy [J]; n.slot < 0 where no contact set fits."""
@@ -100,7 +100,7 @@ def pressed(i, last, motion, mass, c, j, n, row):
     return begin[2]
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def weigh(before, after, c, j, n):
     """Tell what rubs its load at both ends of a step [N]; the nodal forces of points at the later one stand in n.now.
     """
@@ -114,44 +114,44 @@ def weigh(before, after, c, j, n):
         c.bound[0] = c.num[0, 1]
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def pushes(heave, pitch, mass, n, accel):
     """Modal accelerations (n,) under forces that resist heave [N] and pitch [N m]."""
     for i in range(accel.size):
         accel[i] = -(n.rows[1, i] * heave + n.rows[2, i] * pitch) / mass
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def pushed(n, mass, accel):
     """Add the modal accelerations of the mean forces of a step on heave and pitch, n.few[3:5], to accel (n,)."""
     for i in range(accel.size):
         accel[i] -= (n.rows[1, i] * n.few[3] + n.rows[2, i] * n.few[4]) / mass
 
 
-@njit(error_model="numpy", **INNER)
-def rubbed(q, v, force, whole, motion, plant, table, at, c, j, n):
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def friction_force(q, v, force, whole, motion, modal_system, table, at, c, j, n):
     """(slide dq [m], mean friction force [N], iterations) of a step under the mean forces force (2,) on heave and
     pitch; iterations < 0 where it failed. whole: no stop or release inside the step."""
-    free = free_slide(motion, plant.reach, 0, table, at) - n.beta[0, 1] * force[0] - n.beta[0, 2] * force[1]
+    free = free_slide(motion, modal_system.reach, 0, table, at) - n.beta[0, 1] * force[0] - n.beta[0, 2] * force[1]
     if STOPS:
-        pushes(force[0], force[1], plant.mass, n, j.modal[BESIDE])
+        pushes(force[0], force[1], modal_system.mass, n, j.modal[BESIDE])
         j.port[FREE, 0] = free
         if n.beta[0, 0] == 0.0:  # nothing slides
-            return faces.slid(0.0, j), 0.0, 1
-        j.port[RATE, 0] = free_rate(motion, plant.slide, plant.free, plant.dense, table, at) \
+            return faces.slip_path(0.0, j), 0.0, 1
+        j.port[RATE, 0] = free_rate(motion, modal_system.slide, modal_system.free, modal_system.dense, table, at) \
             - j.gives[GAMMA, 0, 1] * force[0] - j.gives[GAMMA, 0, 2] * force[1]
         if whole:
-            _, count = faces.agreed(q, v, plant, c, j)
+            _, count = faces.solve_coupled_forces(q, v, modal_system, c, j)
             j.own[KNOWN] = 0.0
         else:
-            _, count = faces.solved(q, v, motion, plant, table, at, c, j)
+            _, count = faces.solved(q, v, motion, modal_system, table, at, c, j)
         return j.each[STEP, 0], j.each[PULL, 0], count
     else:
-        return contact.solve(free, n.beta[0, 0], q, v, plant.dt, c, TIGHT * n.goal[0])
+        return contact.solve(free, n.beta[0, 0], q, v, modal_system.dt, c, TIGHT * n.goal[0])
 
 
-@njit(error_model="numpy", **INNER)
-def agreed(i, q, v, motion, plant, table, at, c, j, n):
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def solve_coupled_forces(i, q, v, motion, modal_system, table, at, c, j, n):
     """Friction and normal contact over a step from sample i, each under the mean force of the other: (dq [m], mean
     friction force [N], iterations, < 0 where they disagree); n.slot < 0 where no contact set fits. The mean forces on
     heave and pitch stand in n.few[3:5].
@@ -164,7 +164,7 @@ def agreed(i, q, v, motion, plant, table, at, c, j, n):
     force, turn, out, begin = few[3:5], few[6:8], few[8:17], few[17:22]
     given, coupled = n.loads.size > 0, beta[0, 1] != 0 or beta[0, 2] != 0
     moves = not given and (beta[1, 1] != 0 or beta[2, 2] != 0)
-    heave, pitch = free_slide(motion, plant.reach, 1, table, at), free_slide(motion, plant.reach, 2, table, at)
+    heave, pitch = free_slide(motion, modal_system.reach, 1, table, at), free_slide(motion, modal_system.reach, 2, table, at)
     guess, count, wrong, end, bad = n.mean[0], 0, 0.0, n.slot[0], False
     low, high, last_f, last_r = -np.inf, np.inf, 0.0, np.inf
     dq, used, after, whole, last = 0.0, 0.0, load, False, MOST
@@ -187,7 +187,7 @@ def agreed(i, q, v, motion, plant, table, at, c, j, n):
             if POINTED:
                 press_state(n.sets, end, -(begin[0] + turn[0]), begin[1] + turn[1], n.now)
         weigh(load, after, c, j, n)
-        dq, used, its = rubbed(q, v, force, whole, motion, plant, table, at, c, j, n)
+        dq, used, its = friction_force(q, v, force, whole, motion, modal_system, table, at, c, j, n)
         count += abs(its)
         bad = its < 0 or wrong > goal
         miss = used - guess
@@ -198,7 +198,7 @@ def agreed(i, q, v, motion, plant, table, at, c, j, n):
                 mean = 0.5 * (load + max(after, 0.0))
                 if n.force[1] * mean <= abs(guess) <= n.force[0] * mean:
                     used = guess  # between kinetic and static friction the step starts to slip
-                    dq = faces.slid(used, j)
+                    dq = faces.slip_path(used, j)
                     break
                 if not whole:
                     whole, last, low, high, last_r = True, outer + MOST, -np.inf, np.inf, np.inf

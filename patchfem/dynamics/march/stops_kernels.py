@@ -20,8 +20,8 @@ are within the tolerance, where all set-valued ones are.
 
 import numpy as np
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import INNER, LEAN
+from ...compiled.jit import njit
+from ...friction.flags_kernels import NJIT_INTERNAL, NJIT_NO_REFCOUNT
 from ..dense_kernels import factor, solve
 from ..modal_kernels import accelerations
 
@@ -42,13 +42,13 @@ STATIC, KINETIC, END = range(3)  # of `limit`: at the start of the step, and END
  BLOW) = range(18)
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def bound(which, e, x, s):
     """Static or kinetic friction [N] of face e at the place x of the step."""
     return s.limit[which, e] + x * (s.limit[which + END, e] - s.limit[which, e])
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def shared(which, count, s):
     """Put the solution x of A x = b into row FOUND of s.field, b in row RIGHT, A = s.gives[which] of the faces
     s.names[:count].
@@ -79,7 +79,7 @@ def shared(which, count, s):
     return True
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def resting(s):
     """Numbers of the faces that rest into s.names; how many."""
     count = 0
@@ -90,7 +90,7 @@ def resting(s):
     return count
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def forces_at(x, s):
     """Forces of all faces at the place x of the step and their slopes, into s.field; False where there are none."""
     f, count = s.field, resting(s)
@@ -118,7 +118,7 @@ def forces_at(x, s):
     return True
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def let_go(e, way, s):
     """Let face e slide along way, or carry its static friction where the others that rest hold it."""
     f = s.field
@@ -135,7 +135,7 @@ def let_go(e, way, s):
         f[WAY, e] = 2 * way
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def settled(x, s):
     """Which faces rest, slide or carry at the place x, and their forces; False where no choice is found."""
     f = s.field
@@ -156,7 +156,7 @@ def settled(x, s):
     return False
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def passes_zero(speed, start, bend):
     """Where speed + start y + bend y^2 falls to 0, infinite where it does not; speed >= 0, start >= 0 where it is 0."""
     if speed == 0.0:
@@ -168,7 +168,7 @@ def passes_zero(speed, start, bend):
     return 2 * speed / below if below > 0 else np.inf
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def pulls(e, x, dt, s):
     """(change of speed [m/s] of face e per length of the step at the place x, half of the slope of that)."""
     start, bend, f = 0.0, 0.0, s.field
@@ -181,7 +181,7 @@ def pulls(e, x, dt, s):
     return start, bend
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def next_event(x, dt, s):
     """(how far from the place x the next face stops or goes, which, the way it goes or 0)."""
     f, y, who, way = s.field, 1.0 - x, -1, 0.0
@@ -201,7 +201,7 @@ def next_event(x, dt, s):
     return y, who, way
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def moved(x, y, who, dt, s):
     """Move all faces on by y from the place x, where face `who` stops if it slides."""
     f = s.field
@@ -219,7 +219,7 @@ def moved(x, y, who, dt, s):
                 f[SPEED, e], f[WAY, e], f[SLIDES, e] = 0.0, 0.0, 0.0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def followed(dt, s):
     """Follow all faces through the step: slides, speeds, ways and mean forces in s.field; False where it fails."""
     x = 0.0
@@ -236,7 +236,7 @@ def followed(dt, s):
     return False
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def slides_on(s):
     """Whether all faces slide the way they do to the end of the step; ways and speeds stand in s.field then."""
     f, count = s.field, s.names.size
@@ -256,7 +256,7 @@ def slides_on(s):
     return True
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def asked(dt, s):
     """Forces that would hold the faces at the ends of the step, rows FIRST and LAST of s.field; False: none found.
 
@@ -297,7 +297,7 @@ def asked(dt, s):
     return True
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def watched(dt, s):
     """Follow the faces from event to event; False where it fails. The ways, slides and speeds stand in s.field.
 
@@ -318,7 +318,7 @@ def watched(dt, s):
     return followed(dt, s)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def met(s):
     """Mean forces of all faces, row MEAN, that give the slides that were found, and their slides, row DQ; False where
     none are found."""
@@ -351,7 +351,7 @@ def met(s):
     return True
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def blows(s):
     """Blows, row BLOW [N s], that bring every face that stopped, went, turned or rests to its speed; work that all
     friction takes in the step [J]."""
@@ -376,7 +376,7 @@ def blows(s):
     return work
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def brought(motion, s):
     """After a step by mean forces alone: blows that bring the faces without a slide to rest, as the modes move."""
     f, count = s.field, 0
@@ -391,7 +391,7 @@ def brought(motion, s):
             f[BLOW, s.names[i]] = f[FOUND, i]
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def speed_of(motion, e, s):
     """Speed [m/s] of face e as the modes move."""
     out = 0.0
@@ -400,7 +400,7 @@ def speed_of(motion, e, s):
     return out
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def struck(motion, mass, s):
     """Strike the modes by the blows, in place; energy that they take [J]. Faces at rest are noted in row REST."""
     f, lost = s.field, 0.0
@@ -415,23 +415,23 @@ def struck(motion, mass, s):
     return lost
 
 
-@njit(error_model="numpy", **INNER)
-def reactions(motion, plant, drive, accel, spare, s):
+@njit(error_model="numpy", **NJIT_INTERNAL)
+def reactions(motion, modal_system, drive, accel, scratch, s):
     """Forces that leave the faces at rest, row WAY of s.field, no acceleration at an instant, into row FOUND in the
     order of s.names; how many they are, 0 where none are found.
 
     accel (n,): modal accelerations [m/s2] of all other forces; drive [m/s2]; spare (2, n): room.
     """
-    accelerations(motion, plant.omega, plant.damp, plant.damping, plant.base, drive, accel, spare)
+    accelerations(motion, modal_system.omega, modal_system.damp, modal_system.damping, modal_system.base, drive, accel, scratch)
     count = resting(s)
     for i in range(count):
         s.field[RIGHT, i] = 0.0
         for k in range(accel.size):
-            s.field[RIGHT, i] += s.rows[s.names[i], k] * spare[0, k]
+            s.field[RIGHT, i] += s.rows[s.names[i], k] * scratch[0, k]
     return count if count and shared(TUG, count, s) else 0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def stays(s):
     """Whether all faces rest at the start of the step, and mean forces below their static friction hold them, row MEAN;
     ways, slides and speeds stand in s.field then."""
@@ -450,8 +450,8 @@ def stays(s):
     return True
 
 
-@njit(error_model="numpy", **LEAN)
-def stays_to_the_end(motion, plant, drive, accel, spare, s):
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def stays_to_the_end(motion, modal_system, drive, accel, scratch, s):
     """Whether static friction holds all faces at the end of a step through which they rest: a line of the holding
     forces would pass above a crest of them.
 
@@ -464,8 +464,8 @@ def stays_to_the_end(motion, plant, drive, accel, spare, s):
         return False
     for k in range(accel.size):
         for e in range(faces):
-            motion[1, k] -= s.rows[e, k] * s.field[FOUND, e] / plant.mass
-    if reactions(motion, plant, drive, accel, spare, s) < faces:
+            motion[1, k] -= s.rows[e, k] * s.field[FOUND, e] / modal_system.mass
+    if reactions(motion, modal_system, drive, accel, scratch, s) < faces:
         return False
     for i in range(faces):
         if abs(s.field[FOUND, i]) > s.limit[STATIC + END, s.names[i]]:

@@ -8,8 +8,8 @@ elements that depend on each other, however many there are.
 
 import numpy as np
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import INNER
+from ...compiled.jit import njit
+from ...friction.flags_kernels import NJIT_INTERNAL
 from ...friction.laws import elastic_plastic_kernels as law
 from ...friction.laws import plane_kernels as plane
 from ..dense_kernels import eliminate, factor, solve
@@ -19,7 +19,7 @@ from .stops_kernels import BETA, CLOSE, EPS, FREE, GIVE, HOLDS, LACK, MATE, PLAC
 PLANE = parts.PLANE
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def slide_of(e, y, j):
     """Slide of element e [m] at y (n,)."""
     p = j.of[PORT, e]
@@ -29,7 +29,7 @@ def slide_of(e, y, j):
     return out
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def along(t, y, step, trial, j, dt):
     """Slope of the minimum's function along `step` at y + t step."""
     out = 0.0
@@ -43,7 +43,7 @@ def along(t, y, step, trial, j, dt):
     return out
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def slope_at(y, step, j, dt, hess):
     """Newton's equations at y (n,): minus the slope in `step`, the Hessian, the forces of the laws; the largest change
     of a force over its goal."""
@@ -66,7 +66,7 @@ def slope_at(y, step, j, dt, hess):
     return worst
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def solve_smooth(j, dt):
     """Forces of a step in place, from those there are, where every law has a slope.
 
@@ -101,7 +101,7 @@ def solve_smooth(j, dt):
     return -80
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def equations(j, dt, known):
     """Newton's equations j.system (e, e), row LACK of j.each on the forces of all elements, residual forces -
     law(free - beta forces).
@@ -138,7 +138,7 @@ def equations(j, dt, known):
         j.system[e, e] += 1.0
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def in_plane(e, f, dx, j):
     """The two of Newton's equations of an element whose directions are e and f; dx [m]: slide of e."""
     beta, p, r = j.gives[BETA], j.of[PORT, e], j.of[PORT, f]
@@ -154,7 +154,7 @@ def in_plane(e, f, dx, j):
     j.system[f, f] += 1.0
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def newton_turn(j, dt, known):
     """One Newton step on the forces of all elements at once, without a patch; False where it fails. known: as of
     `equations`."""

@@ -13,13 +13,13 @@ import numpy as np
 from ...compiled import load as compiled
 from ...contact.contact_sets import ContactSets, sides
 from ...core import ModalBasis, PatchfemError, Response
-from ...effects import unbuilt
+from ...effects import not_supported_message
 from ...friction.laws.coulomb import Coulomb
 from ...friction.laws.stretch import growth_numbers
 from ...friction.laws.tanh import Rate
 from ...slip.shear_modes import SHEAR_MODES, enough_modes, shear_modes
-from ..contacts import arrays
-from ..contacts.dispatch import COULOMB as COULOMB_LAW
+from ..interfaces import arrays
+from ..interfaces.dispatch import COULOMB as COULOMB_LAW
 from .faces import GOAL
 from .instances import SHEARED_LISTS
 from .march import Run
@@ -64,7 +64,7 @@ def plastic(static: float, length: float) -> Rubbing:
 def bonds(law) -> Rubbing:
     """The stretch reading with p = 1 of friction.bonds.parameters.Bonds at every point. PatchfemError for others."""
     if law.reading != "stretch" or law.order != 1 or law.breakaway:
-        raise PatchfemError(unbuilt("friction: a changing normal load together with reading = 'report', an order other "
+        raise PatchfemError(not_supported_message("friction: a changing normal load together with reading = 'report', an order other "
                                     "than 1 or a breakaway above 0", "recursion"))
 
     return Rubbing(POINTS, law.static, (law.static, law.static, law.length, law.initial), tuple(growth_numbers(law)),
@@ -75,7 +75,7 @@ def lists(law, reach: float, merge: float) -> Rubbing:
     """The printed reading of friction.bonds.parameters.Bonds, a list of bonds at every point: bonds keep the pressure
     that they formed under. PatchfemError for the other, of which bonds are let go as the load falls."""
     if law.reading != "report":
-        raise PatchfemError(unbuilt("friction: a changing normal load together with reading = 'stretch' and an order "
+        raise PatchfemError(not_supported_message("friction: a changing normal load together with reading = 'stretch' and an order "
                                     "other than 1", "recursion"))
     return Rubbing(LISTS, law.static, (law.static, law.static, law.length, law.initial), tuple(growth_numbers(law)),
                    law.length, (law, reach, merge))
@@ -87,10 +87,10 @@ def sets_of(patch, spring: float = 0.0) -> ContactSets:
     PatchfemError for a smooth skin, strips, or a patch that carries no load.
     """
     if patch.skin is not None:
-        raise PatchfemError(unbuilt("contact.asperities.law: a nonlinear law under a normal load that changes",
+        raise PatchfemError(not_supported_message("contact.asperities.law: a nonlinear law under a normal load that changes",
                                     "linear"))
     if patch.strips is not None:
-        raise PatchfemError(unbuilt("[contact.strips] with a normal load that changes", "either"))
+        raise PatchfemError(not_supported_message("[contact.strips] with a normal load that changes", "either"))
     force = patch.pressure.sigma_n * patch.pieces.interface.weight
     c, x = patch.pieces.normal, patch.x
     if spring > 0:
@@ -190,7 +190,7 @@ class VaryingLoadModel:
         if self.law.kind == LISTS:
             return SHEARED_LISTS, ""
         if self.pointed:
-            return "dynamics.contacts.pressed_points_kernels", ""
+            return "dynamics.interfaces.pressed_points_kernels", ""
         return IDLE if self.set_valued else (IDLE[0], "friction.laws.tanh_kernels")
 
     def build(self):
@@ -234,7 +234,7 @@ def model_of(modes: ModalBasis, law: Rubbing, sets: ContactSets | None, load=Non
     """The model of a basis on contact sets, or under a prescribed load on one point, which no heave or pitch can move.
     shear: ShearModes of an elastic-plastic law or of bonds; PatchfemError beside any other."""
     if shear is not None and law.kind not in (PLASTIC, POINTS, LISTS):
-        raise PatchfemError(unbuilt("friction.law: this law together with [contact.shear] and a normal load that "
+        raise PatchfemError(not_supported_message("friction.law: this law together with [contact.shear] and a normal load that "
                                     "changes", "stiff"))
     if shear is not None and shear.points.size != sets.x.size:
         raise PatchfemError("contact.shear: if the normal load changes, the shear modes must include every node")
@@ -283,9 +283,9 @@ class VaryingLoadRun(Run):
         lost = work - np.diff(rows[:, n + 5])
         size = np.maximum(self.model.limit, np.abs(rows[:-1, n + 4]))
         digit = np.abs(rows[:, :n // 2]) @ np.abs(self.modes.slide)
-        slid, beta = np.abs(np.diff(rows[:, n])), self.prop.beta[0, 0]
+        slip_path, beta = np.abs(np.diff(rows[:, n])), self.prop.beta[0, 0]
         digit = np.maximum(digit[1:], digit[:-1]) + beta * size
-        noise = size * (1e-12 * slid + 2e-15 * digit) + 2e-16 * slid**2 / (beta or np.inf) \
+        noise = size * (1e-12 * slip_path + 2e-15 * digit) + 2e-16 * slip_path**2 / (beta or np.inf) \
             + 1e-14 * np.maximum(rows[:-1, n + 5], rows[1:, n + 5])
         return np.stack([work, np.where(lost > -noise, lost, 0.0), np.where(lost < -noise, -lost, 0.0)])
 

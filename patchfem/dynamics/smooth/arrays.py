@@ -53,5 +53,5 @@ class Kept(NamedTuple):
     samples: np.ndarray
     turns: np.ndarray
     parts: np.ndarray
-    tally: np.ndarray
-    room: np.ndarray
+    counters: np.ndarray
+    workspace: np.ndarray

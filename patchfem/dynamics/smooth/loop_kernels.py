@@ -9,8 +9,8 @@ from math import sqrt
 
 import numpy as np
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import INNER, LEAN
+from ...compiled.jit import njit
+from ...friction.flags_kernels import NJIT_INTERNAL, NJIT_NO_REFCOUNT
 from ...friction.laws import stretch_kernels as law
 from . import step_kernels as steps
 from . import watch_kernels as watching
@@ -48,7 +48,7 @@ STUCK = 0.02  # of a period: longest step of what holds, as nothing else tells w
 STANDS, FLIPPED = 1, 2  # of a motion that has not moved on from a stop: it is there, it was found to go the other way
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def left(m, what, y, slopes, travel):
     """(what is left until an end, > 0 before it; its rate [1/s]; its round-off) in a state with its slopes."""
     n, way = m.rows.shape[1], m.turn[0]
@@ -71,7 +71,7 @@ def left(m, what, y, slopes, travel):
     return travel - abs(x), -w if x > 0 else w, 1e-13 * travel
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def possible(m, what, travel):
     """Whether a motion can meet such an end at all."""
     if what == KINK:
@@ -83,7 +83,7 @@ def possible(m, what, travel):
     return m.turn[0] != 0 if what == STOP else travel < np.inf
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def first_end(m, h, travel, skip):
     """(what ends the step of h [s] first, guess of the share of it) by cubics through both ends; NOTHING, 1."""
     found, where = NOTHING, 1.0
@@ -111,7 +111,7 @@ def first_end(m, h, travel, skip):
     return found, where
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def back_of(p, b, r):
     """Share of a step at which a cubic from 0 to b < 0 comes back to zero from above; 0 where it is nowhere above.
 
@@ -127,7 +127,7 @@ def back_of(p, b, r):
     return s if 0 < s < 1 else 0.0
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def located(m, h, what, share, travel):
     """Length [s] of the step that ends there, within a step of h [s]; m.work[steps.TRIAL] is the state at its end."""
     low, high, at = 0.0, h, max(share, 1e-12) * h
@@ -147,7 +147,7 @@ def located(m, h, what, share, travel):
     return at
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def let_go(m, h, what, travel):
     """Length [s] of the step that ends just beyond where a hold or a load is used up, within a step of h [s] whose end
     is beyond it; m.work[steps.TRIAL] is the state at its end. Regula falsi with halved ends (Illinois), then halving.
@@ -171,7 +171,7 @@ def let_go(m, h, what, travel):
     return high
 
 
-@njit(error_model="numpy", forceinline=True, **INNER)
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def dips(m, h):
     """Share [1] of the step of h [s] at which the speed, > 0 at both ends, may have a least value below zero; 0 for
     none."""
@@ -182,7 +182,7 @@ def dips(m, h):
     return dip_of(a, p * h, b, r * h)
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def dip_of(a, p, b, r):
     """Share of a step at which a cubic from a to b, both > 0, has a least value below zero or so near to it that the
     speed it stands for may have one; 0 for none.
@@ -202,13 +202,13 @@ def dip_of(a, p, b, r):
     return s if a + s * (p + s * (mid + s * big)) < near else 0.0
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def still(m):
     """Round-off [m/s] of the speed of the slide, below which it rests."""
     return 4e-16 * (m.now[CREST_SPEED] + m.now[PACE] * m.now[CREST])
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def enter(m, way):
     """Begin a motion in the direction `way` from the state as it stands: the law's states, and the slopes there."""
     n = m.rows.shape[1]
@@ -219,7 +219,7 @@ def enter(m, way):
     steps.slope(m, m.now[TIME], m.y, m.work[0])
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def leave(m, k):
     """End the motion in one direction: move the memory of the law and book what it dissipated."""
     n, size = m.rows.shape[1], m.y.size
@@ -228,10 +228,10 @@ def leave(m, k):
     if np.isnan(lost):
         lost = m.y[size - 1] - m.now[LEFT] - before
         m.now[LEFT] = m.y[size - 1] - before
-    k.tally[LOST] += lost
+    k.counters[LOST] += lost
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def heading(m):
     """Direction of a motion that starts: that of its speed, of its acceleration at rest, or of what comes next."""
     n, t = m.rows.shape[1], m.now[TIME]
@@ -252,7 +252,7 @@ def heading(m):
     return 1.0
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def lets_go(m):
     """Direction in which a law that holds lets go of the slide at rest, as the motion stands; 0 where it holds."""
     m.turn[0] = 0.0
@@ -260,7 +260,7 @@ def lets_go(m):
     return law.gives(m.num, m.turn)
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def rest(m):
     """Take the last digits of the speed of a slide that has stopped from the rates."""
     n, v, size = m.rows.shape[1], steps.slide_of(m, m.y)[1], 0.0
@@ -270,7 +270,7 @@ def rest(m):
         m.y[n + i] = 0.0 if n == 1 else m.y[n + i] - m.rows[steps.SLIDE, i] * v / size
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def turns_around(m, period):
     """Begin the motion after a stop: whether it turns, else it goes on as before.
 
@@ -293,11 +293,11 @@ def turns_around(m, period):
     return False
 
 
-@njit(error_model="numpy", forceinline=True, **INNER)
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def accept(m, h, k):
     """Move on by the step of h [s] that stands in m.work[steps.TRIAL]."""
     n = m.rows.shape[1]
-    fade = 1 - min(h / (FORGET * k.tally[PERIOD]), 1.0)
+    fade = 1 - min(h / (FORGET * k.counters[PERIOD]), 1.0)
     m.now[CREST] *= fade
     m.now[CREST_SPEED] *= fade
     for c in range(m.y.size):
@@ -311,11 +311,11 @@ def accept(m, h, k):
     m.now[TIME] += h
 
 
-@njit(error_model="numpy", forceinline=True, **INNER)
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def try_step(m, h, tolerance, k):
     """Take a step of at most h [s] whose error meets the tolerance: (its length, the next length)."""
     if law.SET_VALUED:
-        h = min(h, STUCK * k.tally[PERIOD] if m.turn[0] == 0 else np.inf)
+        h = min(h, STUCK * k.counters[PERIOD] if m.turn[0] == 0 else np.inf)
     for _ in range(60):
         steps.step(m, h)
         error = steps.missed(m, h, tolerance)
@@ -327,11 +327,11 @@ def try_step(m, h, tolerance, k):
             h *= dip
         else:
             h *= max(0.9 * error**-0.125, SLOWER) if np.isfinite(error) else SLOWER
-        k.tally[REFUSED] += 1
+        k.counters[REFUSED] += 1
     return 0.0, 0.0
 
 
-@njit(error_model="numpy", forceinline=True, **INNER)
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def pass_end(m, k, what):
     """Go on beyond the end of a step: turn around, or into the next part of the law."""
     n = m.rows.shape[1]
@@ -341,15 +341,15 @@ def pass_end(m, k, what):
         way = lets_go(m)
         enter(m, way)
         if way != 0 or what == STOP:
-            watching.write(m, m.now[TIME], m.y, k.turns[int(k.tally[TURNS])])
-            k.tally[TURNS] += 1
+            watching.write(m, m.now[TIME], m.y, k.turns[int(k.counters[TURNS])])
+            k.counters[TURNS] += 1
     elif what == STOP:
         if n == 1:
             m.y[1] = 0.0  # to the last digit
         leave(m, k)
-        if turns_around(m, k.tally[PERIOD]):
-            watching.write(m, m.now[TIME], m.y, k.turns[int(k.tally[TURNS])])
-            k.tally[TURNS] += 1
+        if turns_around(m, k.counters[PERIOD]):
+            watching.write(m, m.now[TIME], m.y, k.turns[int(k.counters[TURNS])])
+            k.counters[TURNS] += 1
     elif what == KINK:
         leave(m, k)
         enter(m, m.turn[0])
@@ -358,7 +358,7 @@ def pass_end(m, k, what):
         steps.slope(m, m.now[TIME], m.y, m.work[0])
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def begin(m, k):
     """Begin a motion from the state as it stands."""
     n = m.rows.shape[1]
@@ -366,22 +366,22 @@ def begin(m, k):
         m.now[CREST] = max(m.now[CREST], abs(m.y[i]))
         m.now[CREST_SPEED] = max(m.now[CREST_SPEED], abs(m.y[n + i]))
     enter(m, heading(m))
-    k.tally[STORED] = watching.stored(m, m.y)
+    k.counters[STORED] = watching.stored(m, m.y)
     m.now[LEFT] = m.y[m.y.size - 1] - watching.state_of(m, m.y)[3]
     m.now[BEGUN] = 1.0
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def sampled(m, k):
     """Take the samples that are asked for at the time as it stands."""
-    at = int(k.tally[SAMPLE])
+    at = int(k.counters[SAMPLE])
     while at < k.samples.shape[0] and k.samples[at, 0] <= m.now[TIME]:
         watching.write(m, m.now[TIME], m.y, k.samples[at])
         at += 1
-    k.tally[SAMPLE] = at
+    k.counters[SAMPLE] = at
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def went_on(m):
     """STANDS where a motion was left at a reversal, for lack of room, else 0: it goes on as if it had not been left."""
     fresh = STANDS if m.now[BEGUN] == TURNING else 0
@@ -389,7 +389,7 @@ def went_on(m):
     return fresh
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def first_of_ends(m, taken, what, share, travel):
     """(length [s] of the step that was tried up to the first end in it, what ends it); NOTHING as it is."""
     while what != NOTHING:
@@ -401,7 +401,7 @@ def first_of_ends(m, taken, what, share, travel):
     return taken, what
 
 
-@njit(error_model="numpy", cache=True, nogil=True, **LEAN)
+@njit(error_model="numpy", cache=True, nogil=True, **NJIT_NO_REFCOUNT)
 def advance(m, k, until, edge, tolerance, travel):
     """Move on to the time `until` [s], or to the edge [s] of the piece of the drive: how it ended.
 
@@ -415,23 +415,23 @@ def advance(m, k, until, edge, tolerance, travel):
         steps.slope(m, m.now[TIME], m.y, m.work[0])
         m.now[STOOD] = m.now[PIECE]
     sampled(m, k)
-    begun, tried = m.now[TIME], k.tally[DONE] + k.tally[REFUSED]
+    begun, tried = m.now[TIME], k.counters[DONE] + k.counters[REFUSED]
     while m.now[TIME] < end:
-        full = k.tally[TURNS] >= k.turns.shape[0] or 0 < k.parts.shape[0] < k.tally[PARTS] + watching.MOST_PARTS
-        spent = k.tally[DONE] + k.tally[REFUSED] - tried > CALL and fresh != FLIPPED
+        full = k.counters[TURNS] >= k.turns.shape[0] or 0 < k.parts.shape[0] < k.counters[PARTS] + watching.MOST_PARTS
+        spent = k.counters[DONE] + k.counters[REFUSED] - tried > CALL and fresh != FLIPPED
         if spent and m.now[TIME] - begun < GETS_ON / m.now[PACE]:
             return ENDLESS
         if full or spent:
             m.now[BEGUN] = TURNING if fresh > 0 else 1.0
             return FULL if full else PAUSED
-        room = end - m.now[TIME]
-        whole = m.now[STEP] >= room * (1 - 1e-9)
-        h, wanted = try_step(m, room if whole else m.now[STEP], tolerance, k)
+        workspace = end - m.now[TIME]
+        whole = m.now[STEP] >= workspace * (1 - 1e-9)
+        h, wanted = try_step(m, workspace if whole else m.now[STEP], tolerance, k)
         if h <= 1e-16 * end:
             return ENDLESS
         taken = h
         what, share = first_end(m, h, travel, NOTHING)
-        if what == STOP and fresh > 0 and share * h < INSTANT * k.tally[PERIOD]:
+        if what == STOP and fresh > 0 and share * h < INSTANT * k.counters[PERIOD]:
             if fresh == FLIPPED:  # neither way: no motion of a law that is smooth does so
                 return ENDLESS
             enter(m, -m.turn[0])
@@ -442,13 +442,13 @@ def advance(m, k, until, edge, tolerance, travel):
             error = steps.missed(m, taken, tolerance)
             if error > 1:
                 m.now[STEP] = taken * max(0.9 * error**-0.125, SLOWER)
-                k.tally[REFUSED] += 1
+                k.counters[REFUSED] += 1
                 continue
         watching.watch(m, taken, k)
         accept(m, taken, k)
-        if whole and taken == room:
+        if whole and taken == workspace:
             m.now[TIME] = end
-        m.now[STEP] = max(wanted, m.now[STEP]) if whole and h == room else wanted
+        m.now[STEP] = max(wanted, m.now[STEP]) if whole and h == workspace else wanted
         if fresh == STANDS:
             m.now[TURNED] = wanted
         fresh = 0
@@ -465,7 +465,7 @@ def advance(m, k, until, edge, tolerance, travel):
     return FINISHED
 
 
-@njit(error_model="numpy", cache=True, **LEAN)
+@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def settled(m, k, row):
     """Energy of modes and interface [J] as the motion stands; writes its sample into row, and moves the memory of the
     law to there: for a copy of the motion."""

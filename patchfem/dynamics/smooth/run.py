@@ -12,10 +12,10 @@ from ...core import Integrated, ModalBasis, Outcome, Response
 from ...friction.laws.stretch import bonds_of
 from ...friction.path_work import sampled_work
 from ...structure.drive_sizes import even_samples
-from ..events.plant import segments_of
+from ..events.modal_system import segments_of
 from ..integrated import histories
 from ..march.march import MarchResult
-from ..repeats import APART, ahead
+from ..periodicity import APART, ahead
 from .arrays import (
     CREST,
     CREST_SPEED,
@@ -93,10 +93,10 @@ def started(modes: ModalBasis, drive, element, cycles: float, start=None) -> tup
     if start is not None:
         state[:n], state[n:2 * n] = start.z, start.v
     pace = max(float(np.max(modes.omega * np.maximum(1.0, 2 * modes.zeta), initial=0.0)), 2 * np.pi / drive.period)
-    now, tally, work = np.zeros(15), np.zeros(10), np.zeros((26, size))
+    now, counters, work = np.zeros(15), np.zeros(10), np.zeros((26, size))
     now[[STEP, TURNED, PACE, MASS]] = FIRST / pace, FIRST / pace, pace, modes.mass
     now[STIFF] = element.limit / element.length if element.length else 0.0
-    now[[DRIVEN, MOVES]], tally[PERIOD] = (drive.period, drive.moving), drive.period
+    now[[DRIVEN, MOVES]], counters[PERIOD] = (drive.period, drive.moving), drive.period
     work[24, 2 * n:-3] = element.sizes
     rows = np.stack([modes.omega, 2 * modes.zeta * modes.omega, modes.slide, modes.base, modes.output])
     law = element.numbers[None], element.memory[None], [1.0, np.inf, 1.0, *np.zeros(5)]
@@ -104,7 +104,7 @@ def started(modes: ModalBasis, drive, element, cycles: float, start=None) -> tup
     moving = Moving(*(np.array(part, float, order="C") for part in own))
     cycles = np.zeros((4, max(1, ceil(cycles - 1e-9))))
     cycles[0], cycles[1], width = np.inf, -np.inf, 2 * n + 7
-    return moving, Kept(cycles, np.zeros((0, width)), np.zeros((ROOM, width)), np.zeros((0, NODES, width)), tally,
+    return moving, Kept(cycles, np.zeros((0, width)), np.zeros((ROOM, width)), np.zeros((0, NODES, width)), counters,
                         np.zeros(size))
 
 
@@ -140,7 +140,7 @@ class Motion:
         self.turns, self.parts, self.begun, self.unlike = [], [], 0.0, 0.0
         self.outcome, self.message, self.progress = None, "", None
         self.until(0.0)
-        self.first, self.begun = self.settled()[0], float(self.kept.tally[STORED])
+        self.first, self.begun = self.settled()[0], float(self.kept.counters[STORED])
 
     def fork(self, drive):
         """A copy of the motion as it stands that goes on by itself, under another drive."""
@@ -183,7 +183,7 @@ class Motion:
         times, width = np.asarray(times, float), self.kept.turns.shape[1]
         samples, parts = np.zeros((times.size, width)), np.zeros((STEPS if whole else 0, NODES, width))
         samples[:, 0], self.kept = times, self.kept._replace(samples=samples, parts=parts)
-        self.kept.tally[SAMPLE] = 0
+        self.kept.counters[SAMPLE] = 0
         ends = np.append(self._starts()[1:], np.inf)
         while self.outcome is None:
             end = float(ends[int(self.moving.now[PIECE])])
@@ -196,7 +196,7 @@ class Motion:
                 self.progress(min(self.time / (self.cycles * self.drive.period), 1.0))
             if status == FINISHED and self.time >= time:
                 break
-        return self.kept.samples[:int(self.kept.tally[SAMPLE])]
+        return self.kept.samples[:int(self.kept.counters[SAMPLE])]
 
     def onward(self, time: float) -> None:
         """Move on to a time [s], where the motion repeats under a sine without an end by many cycles at once.
@@ -247,7 +247,7 @@ class Motion:
     def _sums(self) -> np.ndarray:
         """Work of the drive less what is stored, viscous loss, friction work, |work| of the drive and energy lost to
         friction [J]."""
-        return np.append(self.moving.y[-3:] - [self.settled()[3], 0.0, 0.0], self.kept.tally[[POWER, LOST]])
+        return np.append(self.moving.y[-3:] - [self.settled()[3], 0.0, 0.0], self.kept.counters[[POWER, LOST]])
 
     def _leave_out(self, count: int, sums) -> None:
         """Go on by `count` cycles that are as the last one; sums (5,): what `_sums` grows by in one."""
@@ -255,7 +255,7 @@ class Motion:
         at, turns = round(self.time / period), np.concatenate([self.kept.turns[:0], *self.turns[-2:]])
         self.moving.y[-3:] += count * sums[:3]
         self.moving.now[LEFT] += count * sums[2]
-        self.kept.tally[[POWER, LOST]] += count * sums[3:]
+        self.kept.counters[[POWER, LOST]] += count * sums[3:]
         self.kept.cycles[:, at:at + count] = self.kept.cycles[:, at - 1:at]
         turns = turns[turns[:, 0] > self.time - period * (1 - 1e-9)]
         shown = min(count, max(0, MOST_KEPT - sum(map(len, self.turns))) // max(1, len(turns)))
@@ -265,12 +265,12 @@ class Motion:
         self.moving.now[TIME] = (at + count) * period
 
     def _judge(self, status: int) -> None:
-        count = int(self.kept.tally[TURNS])
+        count = int(self.kept.counters[TURNS])
         if count and sum(map(len, self.turns)) < MOST_KEPT:
             self.turns.append(self.kept.turns[:count].copy())
-        if self.kept.tally[PARTS]:
-            self.parts.append(self.kept.parts[:int(self.kept.tally[PARTS])].copy())
-        self.kept.tally[[TURNS, PARTS]] = 0
+        if self.kept.counters[PARTS]:
+            self.parts.append(self.kept.parts[:int(self.kept.counters[PARTS])].copy())
+        self.kept.counters[[TURNS, PARTS]] = 0
         if status == TRAVELLED:
             self.outcome = Outcome.EXCEEDS_TRAVEL
         elif status == LIFTED:
@@ -291,11 +291,11 @@ class Motion:
 
     def settled(self) -> tuple:
         """As the motion stands: sample (2 n + 7,), Kept.tally, memory of the law, energy of modes and interface [J]."""
-        kept = self.kept._replace(tally=self.kept.tally.copy())
+        kept = self.kept._replace(counters=self.kept.counters.copy())
         twin = self.moving._replace(mem=self.moving.mem.copy(), now=self.moving.now.copy())
         row = np.zeros(kept.turns.shape[1])
         stored = float(self.loops.settled(twin, kept, row))
-        return row, kept.tally, twin.mem[0], stored
+        return row, kept.counters, twin.mem[0], stored
 
     def response(self, rows) -> Response:
         """Histories of sample rows (k, 2 n + 7). No force passes the limit of its law; the extension of a step may.
@@ -303,7 +303,7 @@ class Motion:
         if self.element.bounded:
             rows, force = rows.copy(), 2 * self.modes.omega.size + 3
             np.clip(rows[:, force], -self.element.limit, self.element.limit, out=rows[:, force])
-        return response_of(self.modes, self.drive, rows, float(self.kept.tally[STORED]))
+        return response_of(self.modes, self.drive, rows, float(self.kept.counters[STORED]))
 
     def ends(self) -> np.ndarray:
         """Where the motion stands: time [s], output [m], its rate [m/s], friction work [J]."""

@@ -9,8 +9,8 @@ from math import sqrt
 
 import numpy as np
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import FAST, INNER
+from ...compiled.jit import njit
+from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_INTERNAL
 from ...friction.laws import stretch_kernels as law
 from ..events.drive_kernels import value_now
 from ..tableau_kernels import BEFORE, FIFTH, INSIDE, PLACES, SHARES, STAGES, THIRD
@@ -22,13 +22,13 @@ LEAST = 1e-30  # of a size: at rest everything is as large as this
 NOISE = 2e-15  # of the forces of a mode's stiffness and of the law's: round-off of the acceleration where they balance
 
 
-@njit(error_model="numpy", forceinline=True, **INNER)
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def push(m, t):
     """Drive [m s-2] at the time t [s], by the numbers of its piece as it stands, continued beyond its ends."""
     return value_now(m.pieces[int(m.now[PIECE])], 0.0, t, m.now[DRIVEN])
 
 
-@njit(error_model="numpy", forceinline=True, **INNER)
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def slide_of(m, y):
     """(slide [m], its speed [m/s]) of a state."""
     n = m.rows.shape[1]
@@ -39,7 +39,7 @@ def slide_of(m, y):
     return q, v
 
 
-@njit(error_model="numpy", forceinline=True, **INNER)
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def of_mode(m, i, y, out, drive, pull):
     """Write the slopes of a mode into out; (power of the drive, viscous power) [m2 s-3]; pull: force/mass [m s-2]."""
     n, rate = m.rows.shape[1], y[m.rows.shape[1] + i]
@@ -54,7 +54,7 @@ def of_mode(m, i, y, out, drive, pull):
     return -m.rows[BASE, i] * rate, damped * rate
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def offered(m, q, y, drive):
     """Write what a law that holds has to know into m.turn: acceleration [m s-2] that the slide has without the force
     and what a newton takes of it [1/kg], slide [m]."""
@@ -70,7 +70,7 @@ def offered(m, q, y, drive):
     m.turn[FREE], m.turn[EASE], m.turn[PLACE] = free, ease, q
 
 
-@njit(error_model="numpy", forceinline=True, **INNER)
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def slope(m, t, y, out):
     """Write the slopes of the state y at the time t [s] into out: eq. 3.4 and the rates of the law.
 
@@ -90,7 +90,7 @@ def slope(m, t, y, out):
     out[energies], out[energies + 1], out[energies + 2] = mass * drive * work, mass * lost, force * v
 
 
-@njit(error_model="numpy", fastmath=FAST, forceinline=True, **INNER)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_INTERNAL)
 def gathered(m, stage, h, size):
     """Write the state at a stage of a step of h [s] into m.work[TRIAL], its first `size` entries."""
     first, share = SHARES[stage, 0], SHARES[stage]
@@ -101,7 +101,7 @@ def gathered(m, stage, h, size):
         m.work[TRIAL, c] = m.y[c] + h * part
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def step(m, h):
     """Write the state after a step of h [s] into m.work[TRIAL], with the slopes on the way; m.work[0] is that at the
     start."""
@@ -111,7 +111,7 @@ def step(m, h):
         slope(m, t + PLACES[stage] * h, m.work[TRIAL], m.work[stage])
 
 
-@njit(error_model="numpy", forceinline=True, **INNER)
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def missed(m, h, tolerance):
     """Estimate of the error of a step of h [s] over what the tolerance allows, by its estimates of order 5 and 3.
 
@@ -128,8 +128,8 @@ def missed(m, h, tolerance):
             low += THIRD[j] * m.work[j, c]
         top = max(abs(m.y[c]), abs(m.work[TRIAL, c]), m.work[SIZES, c]) if c < 2 * n else 0.0
         if n <= c < 2 * n:
-            felt = abs(m.y[c - n]) * m.rows[OMEGA, c - n]**2 + abs(m.rows[SLIDE, c - n]) * pull
-            top = max(top, NOISE * abs(h) * felt / tolerance)
+            friction_force = abs(m.y[c - n]) * m.rows[OMEGA, c - n]**2 + abs(m.rows[SLIDE, c - n]) * pull
+            top = max(top, NOISE * abs(h) * friction_force / tolerance)
         scale = max(scale, top, LEAST)
         fifth += (high / scale)**2
         third += (low / scale)**2
@@ -140,7 +140,7 @@ def missed(m, h, tolerance):
     return abs(h) * fifth / sqrt((fifth + 0.01 * third) * size) / tolerance
 
 
-@njit(error_model="numpy", fastmath=FAST, **INNER)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_INTERNAL)
 def extended(m, h):
     """Write the extension of a step of h [s], taken by `step`, beside the slopes; the state at its end stays."""
     t, size = m.now[TIME], m.y.size
@@ -162,7 +162,7 @@ def extended(m, h):
             m.work[EXTENSION + 3 + k, c] = h * part
 
 
-@njit(error_model="numpy", fastmath=FAST, **INNER)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_INTERNAL)
 def between(m, share, out, size):
     """Write the first `size` entries of the state at a share [1] of the step into out, by its extension."""
     for c in range(size):

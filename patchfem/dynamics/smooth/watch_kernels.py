@@ -7,8 +7,8 @@ from math import cos, pi, sin
 
 import numpy as np
 
-from ...compiled.inner import njit
-from ...friction.flags_kernels import INNER
+from ...compiled.jit import njit
+from ...friction.flags_kernels import NJIT_INTERNAL
 from ...friction.laws import stretch_kernels as law
 from . import step_kernels as steps
 from .arrays import DONE, ENDS, FORCE, MASS, ORIGIN, PARTS, PERIOD, POWER, SAMPLE, STORED, TIME
@@ -19,7 +19,7 @@ SMOOTH, LEAST = 1e-9, 2.0**-14  # last terms of the force in a part over its lar
 MOST_PARTS = 64  # of a step, for which there is to be room
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def state_of(m, y):
     """(slide [m], speed [m/s], force [N], stored energy [J], irreversible slip [m]) of a state."""
     n = m.rows.shape[1]
@@ -28,7 +28,7 @@ def state_of(m, y):
     return q, v, force, energy, slip
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def write(m, t, y, row):
     """Write the sample of a state at the time t [s] into a row of `Kept.samples`."""
     n = m.rows.shape[1]
@@ -41,7 +41,7 @@ def write(m, t, y, row):
     row[2 * n + 6] = y[y.size - 1]
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def output_of(m, y):
     """(output [m], its rate [m/s]) of a state."""
     x, w, n = 0.0, 0.0, m.rows.shape[1]
@@ -51,21 +51,21 @@ def output_of(m, y):
     return x, w
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def may_turn(m):
     """Whether the output may turn inside a step: always with several modes; with one it turns where the slide does,
     which ends a step (`loop_kernels.dips`), and else by round-off alone."""
     return m.rows.shape[1] > 1 or output_of(m, m.y)[1] * output_of(m, m.work[steps.TRIAL])[1] < 0
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def turning(m, k, a, b, rate):
     """Output [m] where its rate, `rate` at the share a of the step, passes zero before the share b."""
     out = 0.0
     for _ in range(60):
         middle = 0.5 * (a + b)
-        steps.between(m, middle, k.room, m.y.size - 3)
-        out, here = output_of(m, k.room)
+        steps.between(m, middle, k.workspace, m.y.size - 3)
+        out, here = output_of(m, k.workspace)
         if here * rate > 0:
             a = middle
         else:
@@ -75,15 +75,15 @@ def turning(m, k, a, b, rate):
     return out
 
 
-@njit(error_model="numpy", forceinline=True, **INNER)
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def bounds(m, h, k, parts):
     """Take the step of h [s] into the extremes of its cycles; parts: of it, at whose ends turns are looked for."""
     x, w = output_of(m, m.y)
     low, high = x, x
     for part in range(1, parts + 1):
         if part < parts:
-            steps.between(m, part / parts, k.room, m.y.size - 3)
-            x1, w1 = output_of(m, k.room)
+            steps.between(m, part / parts, k.workspace, m.y.size - 3)
+            x1, w1 = output_of(m, k.workspace)
         else:
             x1, w1 = output_of(m, m.work[steps.TRIAL])
         low, high = min(low, x1), max(high, x1)
@@ -91,10 +91,10 @@ def bounds(m, h, k, parts):
             top = turning(m, k, (part - 1) / parts, part / parts, w)
             low, high = min(low, top), max(high, top)
         w = w1
-    extremes(k.cycles, k.tally[PERIOD], m.now[TIME] + 0.5 * h, low, high)
+    extremes(k.cycles, k.counters[PERIOD], m.now[TIME] + 0.5 * h, low, high)
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def extremes(cycles, period, time, x, y):
     """Take two outputs [m] into the extremes of the cycle of a time [s]."""
     cycle = min(max(int(time / period), 0), cycles.shape[1] - 1)
@@ -102,7 +102,7 @@ def extremes(cycles, period, time, x, y):
     cycles[1, cycle] = max(cycles[1, cycle], x, y)
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def phasor(cycles, period, t, h, begin, end):
     """Take the step of h [s] from the time t [s] into the parts at the drive's frequency of the cycles that are asked
     for (not NaN); begin, end: output [m], its rate and acceleration there.
@@ -125,7 +125,7 @@ def phasor(cycles, period, t, h, begin, end):
             cycles[3, cycle] -= weight * x * sin(turn)
 
 
-@njit(error_model="numpy", forceinline=True, **INNER)
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def phasors(m, h, k):
     """Take the step of h [s] into the phasors."""
     n, gain, after = m.rows.shape[1], 0.0, 0.0
@@ -133,22 +133,22 @@ def phasors(m, h, k):
         gain += m.rows[steps.OUTPUT, i] * m.work[0, n + i]
         after += m.rows[steps.OUTPUT, i] * m.work[12, n + i]
     (x, w), (y, v) = output_of(m, m.y), output_of(m, m.work[steps.TRIAL])
-    phasor(k.cycles, k.tally[PERIOD], m.now[TIME], h, (x, w, gain), (y, v, after))
+    phasor(k.cycles, k.counters[PERIOD], m.now[TIME], h, (x, w, gain), (y, v, after))
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def marks(m, h, k):
     """Samples inside the step of h [s], its end included."""
     t = m.now[TIME]
     end = t + h
-    while k.tally[SAMPLE] < k.samples.shape[0] and k.samples[int(k.tally[SAMPLE]), 0] <= end:
-        j = int(k.tally[SAMPLE])
-        steps.between(m, (k.samples[j, 0] - t) / h, k.room, m.y.size)
-        write(m, k.samples[j, 0], k.room, k.samples[j])
-        k.tally[SAMPLE] += 1
+    while k.counters[SAMPLE] < k.samples.shape[0] and k.samples[int(k.counters[SAMPLE]), 0] <= end:
+        j = int(k.counters[SAMPLE])
+        steps.between(m, (k.samples[j, 0] - t) / h, k.workspace, m.y.size)
+        write(m, k.samples[j, 0], k.workspace, k.samples[j])
+        k.counters[SAMPLE] += 1
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def rough(row, force):
     """Last two Chebyshev terms of the force [N] in a part, its values at ENDS in the column `force` of row."""
     one, two, last = 0.0, 0.0, ENDS.size - 1
@@ -159,26 +159,26 @@ def rough(row, force):
     return (abs(one) + 2 * abs(two)) / last
 
 
-@njit(error_model="numpy", **INNER)
+@njit(error_model="numpy", **NJIT_INTERNAL)
 def parted(m, h, k):
     """Write the step of h [s] into `Kept.parts`, in parts in which the force is a polynomial."""
     begin, size, force = 0.0, 1.0, 2 * m.rows.shape[1] + 3
-    while begin < 1 and k.tally[PARTS] < k.parts.shape[0]:
-        row = k.parts[int(k.tally[PARTS])]
+    while begin < 1 and k.counters[PARTS] < k.parts.shape[0]:
+        row = k.parts[int(k.counters[PARTS])]
         for j in range(ENDS.size):
             at = min(begin + ENDS[j] * size, 1.0)
-            steps.between(m, at, k.room, m.y.size)
-            write(m, m.now[TIME] + at * h, k.room, row[j])
-            k.tally[FORCE] = max(k.tally[FORCE], abs(row[j, force]))
-        if size > LEAST and rough(row, force) > SMOOTH * k.tally[FORCE]:
+            steps.between(m, at, k.workspace, m.y.size)
+            write(m, m.now[TIME] + at * h, k.workspace, row[j])
+            k.counters[FORCE] = max(k.counters[FORCE], abs(row[j, force]))
+        if size > LEAST and rough(row, force) > SMOOTH * k.counters[FORCE]:
             size *= 0.5
             continue
-        k.tally[PARTS] += 1
+        k.counters[PARTS] += 1
         begin += size
         size = min(2 * size, 1 - begin)
 
 
-@njit(error_model="numpy", forceinline=True, **INNER)
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def stored(m, y):
     """Energy of the modes and of the interface [J]."""
     n, out = m.rows.shape[1], 0.0
@@ -187,13 +187,13 @@ def stored(m, y):
     return 0.5 * m.now[MASS] * out + state_of(m, y)[3]
 
 
-@njit(error_model="numpy", forceinline=True, **INNER)
+@njit(error_model="numpy", forceinline=True, **NJIT_INTERNAL)
 def watch(m, h, k):
     """Take in a step of h [s] before the state moves on."""
-    work, at = m.y.size - 3, int(k.tally[SAMPLE])
-    k.tally[POWER] += abs(m.work[steps.TRIAL, work] - m.y[work])
-    k.tally[STORED] = max(k.tally[STORED], stored(m, m.work[steps.TRIAL]))
-    k.tally[DONE] += 1
+    work, at = m.y.size - 3, int(k.counters[SAMPLE])
+    k.counters[POWER] += abs(m.work[steps.TRIAL, work] - m.y[work])
+    k.counters[STORED] = max(k.counters[STORED], stored(m, m.work[steps.TRIAL]))
+    k.counters[DONE] += 1
     phasors(m, h, k)
     sampled = at < k.samples.shape[0] and k.samples[at, 0] <= m.now[TIME] + h
     whole = k.parts.shape[0] > 0

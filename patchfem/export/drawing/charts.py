@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...core import G_N
-from ...scales import axis_unit, plain, wide_scale
+from ...formatting import axis_unit, plain, wide_scale
 
 LINE, FRAMES = 6000, 24  # points of a line, frames of the shear stress behind the largest one
 FAINT, FEWEST = 400, 200  # points of such a frame, and those that every line keeps

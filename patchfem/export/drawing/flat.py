@@ -8,7 +8,7 @@ from pathlib import Path
 import matplotlib
 import numpy as np
 
-from ...scales import axis_unit
+from ...formatting import axis_unit
 from ..fields.series import Frame
 from .panels import Panel, borders, curves, panels
 from .pictures import BLUE, ORANGE, STYLE

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...scales import axis_unit
+from ...formatting import axis_unit
 from ..fields.series import Frame
 
 SHOWN = 0.995  # share of the area of a panel whose stress the colours tell apart

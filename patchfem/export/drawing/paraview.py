@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from ...core import PatchfemError
-from ...disk.whole import write_text
+from ...disk.atomic_write import write_text
 from ..fields.series import Frame, Series
 from ..fields.vtu import frames_beside, write_pvd
 from .film import Film, film_of

@@ -4,7 +4,7 @@ import io
 import re
 from functools import partial, wraps
 
-from ...scales import plain
+from ...formatting import plain
 
 BLUE, ORANGE, GREY = "#1f5f99", "#c8551b", "#8a8a8a"
 WIDTH = 9.6  # inches; the page stretches a picture to its text column

@@ -3,9 +3,9 @@
 import numpy as np
 
 from ...core import PatchfemError
+from ...formatting import LADDERS, axis_unit, plain, short
 from ...runs.results.patch_rows import minimum_of
-from ...scales import LADDERS, axis_unit, plain, short
-from ..missed import over
+from ..tolerance_misses import over
 from ..written import label
 from . import charts
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from ...core import Missing, PatchfemError
-from ...disk.whole import whole
-from ...scales import axis_unit
+from ...disk.atomic_write import whole
+from ...formatting import axis_unit
 from ..fields.series import Frame, Series
 from . import film, flat
 from .panels import Panel, borders, curves, panels

@@ -7,7 +7,7 @@ import h5py
 import numpy as np
 
 from ...core import Missing, PatchfemError
-from ..readback import HUGE, numeric, readable, wanted
+from ..read_results import HUGE, numeric, readable, wanted
 from .blocks import NAMES, PARTS, Block, joined
 from .vtkhdf import NAME
 

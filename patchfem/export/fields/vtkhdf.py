@@ -20,7 +20,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from ...disk.whole import sturdy, whole
+from ...disk.atomic_write import sturdy, whole
 from .blocks import CODES, MEANINGS, Block
 
 NAME = "fields.vtkhdf"

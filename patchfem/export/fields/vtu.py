@@ -19,7 +19,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from ...core import PatchfemError
-from ...disk.whole import fault, unfinished, whole, write_text
+from ...disk.atomic_write import fault, unfinished, whole, write_text
 from .blocks import CODES, PARTS, Block
 from .series import Frame, Series
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from ...campaigns.fits.curve import FittedCurve
-from ...scales import axis_unit
+from ...formatting import axis_unit
 from ..drawing import charts
 from .files import (
     FITTED_SCENE,

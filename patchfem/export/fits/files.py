@@ -7,7 +7,7 @@ import numpy as np
 
 from ... import __version__
 from ...campaigns.fits.problem import FittedKeys
-from ...disk.whole import write_rows, write_text
+from ...disk.atomic_write import write_rows, write_text
 from ...identify.least_squares import Fit
 from ...model.model import build, resolved
 from ...scene.ranges import Range

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from ...campaigns.fits.loop import FittedLoop
-from ...scales import axis_unit, plain, short
+from ...formatting import axis_unit, plain, short
 from ..drawing import charts
 from .files import (
     FITTED_SCENE,

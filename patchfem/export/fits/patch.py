@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 
 from ...campaigns.fits.patch import FITTED_LAWS, FittedLaw, FittedPatch
+from ...formatting import SPOKEN, axis_unit, plain, short
+from ...formatting import told as format_with_error
 from ...model.model import build, resolved
-from ...scales import SPOKEN, axis_unit, plain, short
-from ...scales import told as format_with_error
 from ...scene.scene import loads, moved
 from ...scene.sets import text_of
 from ..drawing import charts

@@ -11,9 +11,9 @@ from ... import __version__
 from ...campaigns.rows.asked import READINGS
 from ...campaigns.rows.cells import scores
 from ...campaigns.rows.fit import SAME_SCORE, FittedRows
-from ...campaigns.rows.nulls import NULLS
+from ...campaigns.rows.null_models import NULLS
 from ...core import G_N
-from ...disk.whole import write_text
+from ...disk.atomic_write import write_text
 from ..drawing import charts
 from .files import (
     FITTED_SCENE,

@@ -2,7 +2,7 @@
 
 from typing import NamedTuple
 
-from ...scales import SPOKEN, fitting, rounded
+from ...formatting import SPOKEN, fitting, rounded
 
 
 class FormattedValue(NamedTuple):

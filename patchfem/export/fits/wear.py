@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from ...campaigns.fits.wear import KEY, FittedCoefficient
-from ...scales import plain
+from ...formatting import plain
 from ...scene.scene import Scene, loads
 from .files import FITTED_SCENE, FitFiles, describe_measurement
 

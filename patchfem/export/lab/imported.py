@@ -4,9 +4,9 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
-from ... import scales
+from ... import formatting
 from ...core import PatchfemError
-from ...disk import whole
+from ...disk import atomic_write
 from ...identify import measured_modes as measured
 from ...inputs import laboratory, records
 from ...inputs import universal as universal_files
@@ -68,8 +68,8 @@ def _decay(file: Path, out: Path, asked, begin: str) -> dict:
     found, more = measured.decay_curve(values, _quantity(begin, "time", f"--begin {begin}"))
     write.write_table(out, {f"decay_{name}": one for name, one in found._asdict().items()},
                       {f"decay_{name}": unit for name, unit in write.DECAY.items()})
-    ends = [f"{scales.told(found.frequency[k], found.frequency_error[k], unit='Hz')} with a damping ratio of "
-            f"{scales.told(found.damping[k], found.damping_error[k])} at {scales.short(found.amplitude[k], 'm', 3)}"
+    ends = [f"{formatting.told(found.frequency[k], found.frequency_error[k], unit='Hz')} with a damping ratio of "
+            f"{formatting.told(found.damping[k], found.damping_error[k])} at {formatting.short(found.amplitude[k], 'm', 3)}"
             for k in (0, -1)]
     return {"points": found.time.size, **{f"decay_{name}": one.tolist() for name, one in found._asdict().items()},
             "notes": [*notes, *more], "told": f"{found.time.size} amplitudes, from {ends[0]} to {ends[1]}"}
@@ -83,7 +83,7 @@ def _modes(file: Path, out: Path, asked, how: Estimate) -> dict:
         values, notes = _records(file, asked)
         found = measured.of_decay(values, _quantity(how.begin, "time", f"--begin {how.begin}")) if how.decay else \
             measured.of_drive(values, _segment(how.segment), _window(how.window), _band(how.band))
-    whole.write_text(out, mode_lines.fragment(found, file.name))
+    atomic_write.write_text(out, mode_lines.fragment(found, file.name))
     listed = [{"frequency": f, "damping": zeta, "about": about} for f, zeta, about in
               zip(found.frequency.tolist(), found.damping.tolist(), found.about)]
     told = "; ".join(f"{one['frequency']:.5g} Hz with a damping of {one['damping']:.4g}" for one in listed)

@@ -10,7 +10,7 @@ from ... import __version__
 from ...core import Missing, PatchfemError
 from ...inputs.columns import read_columns
 from ...inputs.paths import BESIDE, UNITS
-from ..readback import numeric, variables
+from ..read_results import numeric, variables
 
 LOOPS = (("slide", "friction_force"), ("relative_displacement", "friction_force"), ("displacement", "force"),
          ("displacement", "friction_ratio"), ("displacement", "fitted"))  # slide, resistance: the first of one counts

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import BaseSine, Outcome, PatchfemError
-from ...disk.whole import whole
+from ...disk.atomic_write import whole
 from ...model.model import Model
 from ...model.rig import BEYOND
 from ...model.source import placed

@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 
 from ...core import PatchfemError
-from ...disk.whole import whole
-from ...scales import short
+from ...disk.atomic_write import whole
+from ...formatting import short
 from ...structure.drive_sizes import LEAST_EVEN, MOST_EVEN
 from . import ENDINGS, matlab, modes, table, universal
 from .series import histories_of

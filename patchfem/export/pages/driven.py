@@ -6,7 +6,7 @@ from textwrap import shorten
 
 from ...core import G_N
 from ...effects import SINE, WAVEFORMS
-from ...scales import LADDERS, axis_unit
+from ...formatting import LADDERS, axis_unit
 
 PLAIN = {"m/s^2": ("g", 1 / G_N), "m/s": ("mm/s", 1e3), "Hz": ("Hz", 1.0), "m^2/s^3": ("g^2/Hz", G_N**-2)}
 

@@ -14,11 +14,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...scales import LADDERS, plain, step_of
+from ...formatting import LADDERS, plain, step_of
 from ..written import NUMBER, bare, label
 from . import document
 from .key_lines import lines_of, shown_of
-from .words import linked, short, zero_below
+from .sentences import linked, short, zero_below
 
 LARGEST_CHANGE = (
     0.05  # relative change at which a measure reaches its limit; engineers call 5 % unchanged

@@ -5,11 +5,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...scales import plain, told
+from ...formatting import plain, told
 from ..written import label
 from . import document
 from .key_lines import lines_of, shown_of, varies
-from .words import linked, zero_below
+from .sentences import linked, zero_below
 
 KEYS = ("drive.frequency",)
 HEIGHTS = ("relative_displacement_amplitude", "absolute_acceleration_peak")

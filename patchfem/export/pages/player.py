@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from ...disk.whole import write_text
-from ...scales import axis_unit
+from ...disk.atomic_write import write_text
+from ...formatting import axis_unit
 from ..drawing.panels import corners, shape, slides
 from ..fields.series import Series, moving
 from ..fields.vtkhdf import NAME

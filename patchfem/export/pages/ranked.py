@@ -7,11 +7,11 @@ import numpy as np
 
 from ...campaigns.sweeps.ranking import ranking
 from ...core import Outcome
-from ...scales import fitting, plain
+from ...formatting import fitting, plain
 from ..written import NUMBER, label
 from . import document
 from .key_lines import shown_of, varies
-from .words import both, is_share, joined, linked, short
+from .sentences import both, is_share, joined, linked, short
 
 RANKED = ("relative_displacement_amplitude", "loop_area", "equivalent_damping", "absolute_acceleration_peak",
           "friction_ratio_peak", "onset_level", "pressure_peak", "contact_fraction", "normal_stiffness",

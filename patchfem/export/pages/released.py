@@ -3,8 +3,8 @@
 import numpy as np
 
 from ...core import say
+from ...formatting import short, told
 from ...runs.results.result import Result
-from ...scales import short, told
 
 RESTS = 5e-3  # of the place where it ends, which is told to three digits: what moves by less has come to rest
 FEWEST = 5  # amplitudes of a decay whose frequency and damping are told in the sentence

@@ -7,22 +7,22 @@ from pathlib import Path
 import numpy as np
 
 from ...core import Outcome
+from ...formatting import LADDERS, axis_unit, rounded
 from ...runs.results.patch_rows import minimum_of
-from ...scales import LADDERS, axis_unit, rounded
-from ..missed import over
+from ..tolerance_misses import over
 from ..written import NUMBER, brief, label
 from . import document, limits, peaks, ranked
 from .document import Section, breakable, prose
 from .drawn import BAR, SHORT, digits, drawn
-from .lead import FIRST, SETTLED, Lead, columns, lead_of
-from .words import is_share, linked, zero_below
+from .headline import FIRST, SETTLED, SweepHeadline, columns, lead_of
+from .sentences import is_share, linked, zero_below
 
 MOST, COLUMNS = 6, 8  # measures in the table of cases, and keys with measures: more do not fit a wide screen
 PAGE, SUMMARY = "report.html", "summary.json"  # of a case
 LISTED, TALL = 400, 24  # cases in the table, sweep.csv has them all; rows from which on it scrolls within its frame
 
 
-def page(table: dict, told: Lead | None = None) -> str:
+def page(table: dict, told: SweepHeadline | None = None) -> str:
     """The whole HTML page of a sweep; told: the `lead_of` its table, where it is known.
 
     table: `title`, `of` (the scene's own title; may be missing), `version`, `command` (the line that made it),
@@ -126,7 +126,7 @@ def _change(table: dict, found: limits.Limits) -> list:
     return [Section("change", "Change relative to the first case", text)] if text else []
 
 
-def _lead(table: dict, said: Lead) -> str:
+def _lead(table: dict, said: SweepHeadline) -> str:
     """The verdict: the answer, how many cases, over what, how they ended, and what else the sweep says."""
     number, over = len(table["outcome"]), " × ".join(one["name"] for one in table["keys"])
     ended = ", ".join(f"{count} {label(name)}" for name, count in Counter(table["outcome"]).most_common())

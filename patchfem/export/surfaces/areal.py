@@ -10,7 +10,7 @@ from zipfile import ZIP_DEFLATED, ZipFile
 import numpy as np
 
 from ... import __version__
-from ...disk.whole import write_bytes, write_text
+from ...disk.atomic_write import write_bytes, write_text
 
 MAX_TEXT_ROWS = 1_000_000  # heights; a longer text takes seconds to write and to read
 _MAIN_XML = """<?xml version="1.0" encoding="UTF-8"?>

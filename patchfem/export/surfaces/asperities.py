@@ -4,7 +4,7 @@ import numpy as np
 
 from ...contact.skin_laws import HertzSkin
 from ...core import PatchfemError, say
-from ...scales import short
+from ...formatting import short
 from ...surface.roughness.peaks import (
     PERSSON,
     Peaks,

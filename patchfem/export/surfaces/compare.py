@@ -10,7 +10,7 @@ import numpy as np
 from ... import __version__
 from ...campaigns.compare import Pressed
 from ...campaigns.compare import data_of as pressed_data
-from ...disk.whole import write_text
+from ...disk.atomic_write import write_text
 from ...surface.areal import level_plane
 from ...surface.compare.compare import Comparison
 from ...surface.profile import Profile, even, level
@@ -18,7 +18,7 @@ from ...surface.quantity import LEVEL
 from ...surface.roughness.spectrum import BAND
 from ...surface.scans.change import Change, hidden_wear
 from ..pages.document import Section, document, figure, prose, table, warned
-from ..pages.words import pair
+from ..pages.sentences import pair
 from . import pictures
 from .areal import write_columns, write_x3p
 from .pictures import Picture

@@ -6,8 +6,8 @@ from pathlib import Path
 
 from ... import __version__
 from ...core import PatchfemError
-from ...disk.whole import write_rows, write_text
-from ...scales import plain
+from ...disk.atomic_write import write_rows, write_text
+from ...formatting import plain
 from ...surface.compare import pairs, verdict
 from ..pages.document import Section, document, figure, prose, table, warned
 from . import compare, worn

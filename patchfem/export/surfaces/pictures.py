@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...scales import axis_unit
+from ...formatting import axis_unit
 from ...surface.profile import even, level
 from ...surface.quantity import Quantity
 from ...surface.roughness.parameters import Heights, abbott

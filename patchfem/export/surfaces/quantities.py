@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...scales import LADDERS, plain, step_of
+from ...formatting import LADDERS, plain, step_of
 from ...surface.compare.reference import NO_LIMIT
 from ...surface.quantity import Quantity
 from ..pages.document import prose, table

@@ -7,8 +7,8 @@ import numpy as np
 
 from ... import __version__
 from ...core import PatchfemError, say
-from ...disk.whole import write_rows, write_text
-from ...scales import LADDERS, plain, step_of
+from ...disk.atomic_write import write_rows, write_text
+from ...formatting import LADDERS, plain, step_of
 from ...surface.roughness.means import KINDS, Means, average_reports
 from ...surface.roughness.peaks import TraceMoments, trace_moments
 from ...surface.roughness.report import RoughnessReport, fitting_cutoff

@@ -7,14 +7,14 @@ import numpy as np
 
 from ... import __version__
 from ...core import say
-from ...disk.whole import write_text
-from ...scales import axis_unit
+from ...disk.atomic_write import write_text
+from ...formatting import axis_unit
 from ...surface.quantity import LEVEL, Quantity
 from ..drawing.charts import axis, chart, line, loop, mark
 from ..drawing.pictures import draw
 from ..pages.document import Section, figure, table
+from ..pages.sentences import pair
 from ..pages.sweep import label
-from ..pages.words import pair
 from .compare import SIDES, TABLE_HEADS, WORDS, Article, sides_lines
 from .pictures import GREY, Picture, PressedSide, depth_axis, draw_maps, draw_pressures
 from .pictures import SIDES as SIDE_COLOURS

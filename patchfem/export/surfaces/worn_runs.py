@@ -11,8 +11,8 @@ from ...surface.compare import ratios
 from ...surface.compare.compare import AMPLITUDE, SLOPE
 from ...surface.profile import Profile, level
 from ...surface.quantity import Quantity, refused
-from ..pages import beside
-from ..readback import numeric, readable, variables, wanted
+from ..pages import several_runs
+from ..read_results import numeric, readable, variables, wanted
 
 REQUIRED = {  # variable: possible numbers of dimensions
     "x": (1,),
@@ -72,7 +72,7 @@ class PatchRun(NamedTuple):
     and friction force [N] (k,) of the last cycle, None without a drive; cycles of wear.
     """
 
-    run: "beside.FinishedRun"
+    run: "several_runs.FinishedRun"
     path: str
     surface: PatchSurface
     pressure: np.ndarray
@@ -141,7 +141,7 @@ def compare_runs(before: Path, after: Path) -> Wear:
 
 def read_run(path: Path) -> PatchRun:
     """Read the run of a patch from a results folder; raises PatchfemError if there is none."""
-    run = beside.read(path)
+    run = several_runs.read(path)
     if "contact" not in run.resolved:
         raise PatchfemError(f"{path}: a run without [contact] has no surfaces to compare")
     file = path / "result.nc"
@@ -190,7 +190,7 @@ def _last_loop(run, fields: dict) -> tuple | None:
     if slide is None or "friction_force" not in fields or fields["friction_force"].ndim != 1:
         return None
     time = fields["time"]
-    period = beside.period_of(run)
+    period = several_runs.period_of(run)
     start = time[-1] - period * (1 + 1e-9) if period else time[0]
     return slide[time >= start], fields["friction_force"][time >= start]
 

@@ -8,15 +8,15 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 
-from ...disk.whole import write_text
-from ...runs.many.answers import FAILED
-from ..pages.lead import Lead
+from ...disk.atomic_write import write_text
+from ...runs.batch.case_results import FAILED
+from ..pages.headline import SweepHeadline
 from ..pages.limits import as_json
 
 NONE = MappingProxyType({})
 
 
-def answer_of(lead: Lead, outcome: Sequence, sign: str = "", of: Mapping = NONE) -> dict:
+def answer_of(lead: SweepHeadline, outcome: Sequence, sign: str = "", of: Mapping = NONE) -> dict:
     """What a sweep comes to; outcome: of each case; sign, of: what the tables were written for (`run.sign_of`,
     `run.signed_of`).
 

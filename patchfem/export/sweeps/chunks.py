@@ -19,15 +19,15 @@ from pathlib import Path
 import h5py
 import numpy as np
 
-from ...disk.whole import write_bytes
-from ...runs.many.answers import Answers
+from ...disk.atomic_write import write_bytes
+from ...runs.batch.case_results import CaseResults
 
 CHUNKS, ENDING = "chunks", ".h5"
 MOST = 4096  # cases of a file
 PARTS = ("values", "errors", "floors")
 
 
-def write(folder: Path, numbers: Sequence[int], names: np.ndarray, found: Answers) -> str:
+def write(folder: Path, numbers: Sequence[int], names: np.ndarray, found: CaseResults) -> str:
     """Write the answers of cases into a folder; the name of the file: numbers of the first and last, and the sign of
     its bytes.
 
@@ -67,12 +67,12 @@ def _opened(path: Path) -> h5py.File:
     return h5py.File(BytesIO(image), "r")
 
 
-def read(path: Path) -> tuple[np.ndarray, Answers]:
+def read(path: Path) -> tuple[np.ndarray, CaseResults]:
     """(names (n,), Answers) of a file; OSError, ValueError, KeyError or TypeError where it is damaged."""
     with _opened(path) as file:
         about, names = json.loads(bytes(file.attrs["about"])), _column(file["case"], np.uint64)
         count = names.size
-        found = Answers.blank(count)
+        found = CaseResults.blank(count)
         found.outcome[:] = np.array(about["outcomes"], object)[_column(file["outcome"], np.uint8, count)]
         found.seconds[:] = _column(file["seconds"], np.float32, count)
         measures = [(str(name), str(unit)) for name, unit in about["measures"]]
@@ -132,7 +132,7 @@ class Chunks:
             others.append(names[~wanted])
         self.held, self.others = held[same], np.unique(np.concatenate(others)).size
 
-    def parts(self, numbers: np.ndarray) -> Iterator[tuple[np.ndarray, Answers]]:
+    def parts(self, numbers: np.ndarray) -> Iterator[tuple[np.ndarray, CaseResults]]:
         """(numbers, Answers) of those of the wanted cases that are there, file by file; a damaged file has none."""
         numbers = np.asarray(numbers, int)
         for place in np.unique(self.held[numbers]).tolist():
@@ -156,7 +156,7 @@ class Chunks:
             kept = set()
             for first in range(0, wanted.size, MOST):
                 numbers = wanted[first:first + MOST]
-                found = Answers.blank(numbers.size)
+                found = CaseResults.blank(numbers.size)
                 for at, part in self.parts(numbers):
                     found.place(np.searchsorted(numbers, at), part)
                 kept.add(write(self.folder, numbers.tolist(), self.names[numbers], found))

@@ -20,12 +20,12 @@ import numpy as np
 from ... import __version__
 from ...campaigns.sweeps.cases import Cases
 from ...core import Measure, Missing, PatchfemError
-from ...disk.claim import Claim
+from ...disk.atomic_write import Unwritten, unmade, write_bytes, write_inside
 from ...disk.exchange import put
-from ...disk.whole import Unwritten, unmade, write_bytes, write_inside
+from ...disk.lock import Claim
 from ...effects import EFFECTS
 from ...model.model import Model
-from ...runs.many.answers import FAILED, Answers
+from ...runs.batch.case_results import FAILED, CaseResults
 from ..folder import save
 from ..results import LOCK, PAGE, refuse_others
 from ..summary import read_summary, summary
@@ -43,7 +43,7 @@ class Summaries:
 
     cases: Cases
 
-    def __call__(self, number: int, model: Model | PatchfemError, found: Answers, case: int) -> str:
+    def __call__(self, number: int, model: Model | PatchfemError, found: CaseResults, case: int) -> str:
         """The text of summary.json of a case; found: Answers with the case at place `case`."""
         values = {axis.key: text for axis, text in zip(self.cases.axes, self.cases.texts(number))}
         known = isinstance(model, Model)
@@ -60,7 +60,7 @@ class Summaries:
                           ensure_ascii=False) + "\n"
 
 
-def _measures(found: Answers, case: int) -> dict:
+def _measures(found: CaseResults, case: int) -> dict:
     out = {}
     for name, unit in found.units.items():
         if found.has(name, case):
@@ -101,7 +101,7 @@ class Writer:
     keep: str
     token: str = ""
 
-    def __call__(self, numbers: Sequence[int], found: Answers, texts: Sequence[str]) -> bool:
+    def __call__(self, numbers: Sequence[int], found: CaseResults, texts: Sequence[str]) -> bool:
         """Write what `put` does; False where the folder is not seen from here, or has no room for it."""
         try:
             there = (self.target / CHUNKS / self.token).is_file()
@@ -111,7 +111,7 @@ class Writer:
         except Missing:  # who asked says so
             return False
 
-    def put(self, numbers: Sequence[int], found: Answers, texts: Sequence[str]) -> None:
+    def put(self, numbers: Sequence[int], found: CaseResults, texts: Sequence[str]) -> None:
         """Write the answers of cases, first their folders where these are kept; Missing where that fails."""
         for case, (number, text) in enumerate(zip(numbers, texts)):
             if self.keep == "summaries" or case in found.messages:  # the results folder of another is there
@@ -183,7 +183,7 @@ class Folder:
                     numbers.append(number)
         for first in range(0, len(numbers), chunks.MOST):
             part = slice(first, first + chunks.MOST)
-            answers = Answers.blank(len(numbers[part]))
+            answers = CaseResults.blank(len(numbers[part]))
             for case, one in enumerate(found[part]):
                 measures = {name: Measure(m["value"], m["unit"], m["error"], m["floor"], reason=m.get("reason", ""))
                             for name, m in one["measures"].items()}
@@ -245,7 +245,7 @@ class Folder:
         return text[:1] == b"{" and text.rstrip()[-1:] == b"}" and \
             all(os.path.isfile(os.path.join(place, name)) for name in asked)
 
-    def answers(self, total: Answers) -> Answers:
+    def answers(self, total: CaseResults) -> CaseResults:
         """`total` with the answers of all cases that have one."""
         self.chunks.look()
         for at, part in self.chunks.parts(np.arange(len(total))):

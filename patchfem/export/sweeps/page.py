@@ -14,15 +14,15 @@ from pathlib import Path
 import numpy as np
 
 from ... import __version__
-from ...campaigns.sweeps.asked import Asked
+from ...campaigns.sweeps.case_models import Asked
 from ...campaigns.sweeps.cases import Cases
 from ...core import PatchfemError
-from ...disk.whole import write_text
-from ...runs.many.answers import Answers
+from ...disk.atomic_write import write_text
+from ...runs.batch.case_results import CaseResults
 from ...runs.results.result import meaning
 from ..pages import sweep
-from ..pages.lead import Lead
-from ..readback import HUGE, wanted
+from ..pages.headline import SweepHeadline
+from ..read_results import HUGE, wanted
 from ..written import NUMBER
 from .tables import FACTS, facts, names_of
 
@@ -30,12 +30,12 @@ AGAIN = "--cases", "sweep.csv"  # rows whose command is not known
 WHOLE, SHORT = "report.html", "summary.json"  # what a click on a case opens: its page where it has one
 
 
-def write_page(table: dict, lead: Lead, folder: Path) -> None:
+def write_page(table: dict, lead: SweepHeadline, folder: Path) -> None:
     """Write the page of all cases beside their tables."""
     write_text(folder / WHOLE, sweep.page(table, lead))
 
 
-def table_of(asked: Asked, cases: Cases, found: Answers, keys: list, folder: Path) -> dict:
+def table_of(asked: Asked, cases: Cases, found: CaseResults, keys: list, folder: Path) -> dict:
     """The table of `pages.sweep.page` from the answers of the cases."""
     columns = columns_of(cases)
     measures = {name: {"unit": found.units[name], "means": meaning(name), "values": found.values[name],

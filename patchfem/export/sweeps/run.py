@@ -12,16 +12,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...campaigns.sweeps.asked import Asked
+from ...campaigns.sweeps.case_models import Asked
 from ...campaigns.sweeps.cases import Cases
 from ...campaigns.sweeps.estimate import FEW, TABLED
 from ...campaigns.sweeps.executors.cluster import own_of
 from ...campaigns.sweeps.sweep import Clock, Work, solved
 from ...core import Missing, PatchfemError
-from ...runs.many.answers import Answers
+from ...runs.batch.case_results import CaseResults
 from ...scene.axes import Axis, Written
 from .. import netcdf
-from ..pages.lead import lead_of
+from ..pages.headline import lead_of
 from .answer import answer_of, read_answer, write_answer
 from .folder import TABLES, Folder, Summaries, Whole, Writer
 from .page import WHOLE, command, opened, table_of, write_page
@@ -50,7 +50,7 @@ class Place:
 
 
 def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable | None = None,
-               told: Callable | None = None) -> Answers:
+               told: Callable | None = None) -> CaseResults:
     """Answer the cases into a folder and write its tables; a shard writes none.
 
     told(done, total, seconds left or None): called as cases are done, first with those that were there. What was
@@ -74,7 +74,7 @@ def sweep_into(asked: Asked, cases: Cases, place: Place, executor, say: Callable
             folder.unfinish()
         if told is not None:
             told(there.size, wanted.size, None)
-        total = Answers.blank(len(cases), folder.target)
+        total = CaseResults.blank(len(cases), folder.target)
         try:
             died = _solve(Jobs(asked, cases, folder, keep), left, executor, say,
                           told and (lambda done, seconds: told(there.size + done, wanted.size, seconds)))
@@ -108,7 +108,7 @@ def _left_out(count: int) -> str:
             "chunks/; to include them, run again with --resume and name all values")
 
 
-def _so_far(asked: Asked, cases: Cases, folder: Folder, found: Answers, page: bool) -> None:
+def _so_far(asked: Asked, cases: Cases, folder: Folder, found: CaseResults, page: bool) -> None:
     """Write the tables of what an interrupted sweep has, where it has anything."""
     if any(found.outcome):
         write_tables(asked, cases, found, folder, page)
@@ -143,9 +143,9 @@ def _solve(jobs: Jobs, numbers: np.ndarray, executor, say: Callable | None, told
     return died
 
 
-def swept(asked: Asked, cases: Cases, executor, say: Callable | None = None, estimate: bool = True) -> Answers:
+def swept(asked: Asked, cases: Cases, executor, say: Callable | None = None, estimate: bool = True) -> CaseResults:
     """Answers of the cases in memory alone; estimate: False leaves out the errors of cases that run one by one."""
-    total = Answers.blank(len(cases))
+    total = CaseResults.blank(len(cases))
     for numbers, found, *_ in solved(Work(asked, cases, estimate=estimate), range(len(cases)), executor, say):
         for part in (found.warnings, found.notes, found.numerics):  # in no table
             part.clear()
@@ -153,10 +153,10 @@ def swept(asked: Asked, cases: Cases, executor, say: Callable | None = None, est
     return total
 
 
-def collect(asked: Asked, cases: Cases, target: Path, page: bool = True) -> Answers:
+def collect(asked: Asked, cases: Cases, target: Path, page: bool = True) -> CaseResults:
     """All tables of a sweep whose shards are all done, from its folder. Missing where cases have no answer yet."""
     with Folder(target, cases.names(asked)) as folder:
-        found = folder.answers(Answers.blank(len(cases), folder.target))
+        found = folder.answers(CaseResults.blank(len(cases), folder.target))
         missing = int(np.sum(found.outcome == ""))
         if missing:
             raise Missing(f"{target}: {missing} of {len(cases)} cases have no answer; run their shards again, or "
@@ -186,7 +186,7 @@ def _written(sign: str, folder: Folder, page: bool) -> bool:
         (folder.target / name).is_file() for name in names if page or name != WHOLE)
 
 
-def write_tables(asked: Asked, cases: Cases, found: Answers, folder: Folder, page: bool = True,
+def write_tables(asked: Asked, cases: Cases, found: CaseResults, folder: Folder, page: bool = True,
                  every: bool = False, sign: str = "") -> None:
     """Write sweep.json, report.html, and of TABLED cases at most, or where `every` asks for them, sweep.csv and
     sweep.nc; what is not written is not left of other cases. sign: as of `sign_of`, where every case has an answer that

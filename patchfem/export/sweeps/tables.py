@@ -13,12 +13,12 @@ from typing import NamedTuple
 import numpy as np
 
 from ... import __version__
-from ...campaigns.sweeps.asked import Asked
+from ...campaigns.sweeps.case_models import Asked
 from ...campaigns.sweeps.cases import Cases
 from ...core import PatchfemError
-from ...disk.whole import write_rows
+from ...disk.atomic_write import write_rows
 from ...response import rows
-from ...runs.many.answers import Answers
+from ...runs.batch.case_results import CaseResults
 from ...runs.results.patch_rows import TABLE as STATIC
 from ...runs.results.result import meaning
 from ...scene.keys import types
@@ -42,12 +42,12 @@ class Column(NamedTuple):
     long_name: str
 
 
-def names_of(found: Answers) -> list[str]:
+def names_of(found: CaseResults) -> list[str]:
     """Sort the measures of the cases in the order of the reference, whatever order the cases came in."""
     return sorted(found.values, key=lambda name: (ORDER.get(rows.of_first(name), len(ORDER)), name))
 
 
-def columns_of(found: Answers, name: str) -> list[Column]:
+def columns_of(found: CaseResults, name: str) -> list[Column]:
     """Return the columns of a measure: its values and their errors."""
     unit = found.units[name]
     return [
@@ -56,13 +56,13 @@ def columns_of(found: Answers, name: str) -> list[Column]:
     ]
 
 
-def head(cases: Cases, found: Answers, keys: Sequence[str] = ()) -> list[str]:
+def head(cases: Cases, found: CaseResults, keys: Sequence[str] = ()) -> list[str]:
     """Return the names of the columns of `lines`."""
     measures = [column.name for name in names_of(found) for column in columns_of(found, name)]
     return [*(axis.key for axis in cases.axes), "outcome", *measures, "message", *(["case"] if keys else [])]
 
 
-def lines(cases: Cases, found: Answers, keys: Sequence[str] = ()) -> Iterator[list[str]]:
+def lines(cases: Cases, found: CaseResults, keys: Sequence[str] = ()) -> Iterator[list[str]]:
     """Yield a line of sweep.csv per case; "" stands for what a case has not.
 
     The swept keys as written, outcome, every measure with its error in SI, the message of a failed case, and the name
@@ -78,13 +78,13 @@ def lines(cases: Cases, found: Answers, keys: Sequence[str] = ()) -> Iterator[li
             yield [*cases.texts(number), str(found.outcome[number]), *cells, found.messages.get(number, ""), *folder]
 
 
-def write_csv(cases: Cases, found: Answers, keys: Sequence[str], path: Path) -> Path:
+def write_csv(cases: Cases, found: CaseResults, keys: Sequence[str], path: Path) -> Path:
     """Write sweep.csv to `path`."""
     write_rows(path, chain([head(cases, found, keys)], lines(cases, found, keys)))
     return path
 
 
-def contents(asked: Asked, cases: Cases, found: Answers, keys: Sequence[str] = (), answer: str = "") -> netcdf.Contents:
+def contents(asked: Asked, cases: Cases, found: CaseResults, keys: Sequence[str] = (), answer: str = "") -> netcdf.Contents:
     """Return what sweep.nc holds, in SI.
 
     A dimension per swept key, dots as underscores, or the one dimension `case` where the cases are rows; a variable

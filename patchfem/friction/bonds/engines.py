@@ -8,7 +8,7 @@ The list has two settings, the tail that its cut-off may lose and the width up t
 from dataclasses import dataclass
 from math import ceil, inf, sqrt
 
-from ... import rates
+from ... import cost_model
 from .list_numbers import AGED, MOMENTS, POWER, SHARES, cutoff, form_of
 from .parameters import Bonds
 
@@ -68,7 +68,7 @@ def choose(law: Bonds, tolerance: float, stroke: float, steps: float, engine: st
     if reason:
         raise ValueError(f"{engine} {reason}")
     if engine == "recursion" or (engine == "auto" and form_of(law) == MOMENTS):
-        return Choice("recursion", 0.0, 0.0, 0.0, 0.0, rates.RECURSION)
+        return Choice("recursion", 0.0, 0.0, 0.0, 0.0, cost_model.RECURSION)
     cut = tail if tail is not None else min(1e-3 * tolerance, 1e-6)
     width = merge if merge is not None else min(0.02, sqrt(0.09 * tolerance / _merging(law)))
     found = {name: _priced(law, name, cut * drops, width * joins, stroke, steps)
@@ -99,11 +99,11 @@ def _priced(law: Bonds, name: str, tail: float, merge: float, stroke: float, ste
         strips *= 2
     if merge > 0:
         strips = min(strips, 5 / merge + 20 + 2 * min(reach / stroke, 50) + (180 if form == AGED else 0))
-    cost = rates.STRIP[int(form)]
+    cost = cost_model.STRIP[int(form)]
     if form in (POWER, SHARES) and law.order not in (0, 1, 2):
-        cost = rates.ANY_ORDER
+        cost = cost_model.ANY_ORDER
     panels = 1 if each <= 1 else 2 + ceil(each).bit_length()
-    seconds = rates.LIST_STEP + PASSES * (rates.PASS + cost * strips) * (1 if each <= 0.1 else 5 / 2 * panels)
+    seconds = cost_model.LIST_STEP + PASSES * (cost_model.PASS + cost * strips) * (1 if each <= 0.1 else 5 / 2 * panels)
     error = tail
     if merge > 0 and form != MOMENTS:
         error += _merging(law) * merge**2 + (YOUNG if form == AGED and law.order < 0 else 0.0)

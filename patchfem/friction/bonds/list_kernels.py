@@ -4,11 +4,11 @@ One list sums eq. 2.17 along a line for every order and reading. Two numbers of 
 engines of `accuracy.quadrature` of it: the cut-off that drops old strips (`truncated`) and the width up to which
 `list_merge_kernels` joins neighbours (`merged`); with neither it keeps every bond (`direct`).
 
-c: a named tuple with the arrays of a list, such as `dynamics.contacts.arrays.BondList`: bondlist (10, capacity), the
+c: a named tuple with the arrays of a list, such as `dynamics.interfaces.arrays.BondList`: bondlist (10, capacity), the
 rows of `list_sum_kernels`; law (24,) of `list_numbers.law_numbers`; growth (6,) of eq. 2.10; table (k,) of
 `list_numbers.share_table`; now (6,): q, path, damage, growth J, mature length, ref; tally (16,): first strip, end,
 spread ones, length after the last merge, stored energy [m], force [1], created and dissipated [m], pieces beyond one
-per step, strips merged although their places differ, largest length, energy owed [m] (`dynamics.contacts`), first and
+per step, strips merged although their places differ, largest length, energy owed [m] (`dynamics.interfaces`), first and
 last entry + 1 of its room in the array, which several lists may share, pressure under which bonds form, and that which
 the first bonds formed under, over that of the friction limit.
 """
@@ -17,8 +17,8 @@ from math import ceil, exp, expm1
 
 import numpy as np
 
-from ...compiled.inner import njit
-from ..flags_kernels import LEAN
+from ...compiled.jit import njit
+from ..flags_kernels import NJIT_NO_REFCOUNT
 from .list_math_kernels import fexp, flog, share
 from .list_merge_kernels import merge
 from .list_sum_kernels import (
@@ -49,7 +49,7 @@ LEAST_BALANCED = 1e-3  # increment in bond lengths below which a difference of e
 LEAST_WIDE = 1e-6  # the same behind shear, where a solve does not find a step that ends at a change of the rule
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _after(dq, now, growth, v0, v1, dt):
     """(q, path, damage, J, mature length, length half way) after the increment."""
     eps, more = grow(now[4], v0, v1, abs(dq), dt, growth)
@@ -57,14 +57,14 @@ def _after(dq, now, growth, v0, v1, dt):
     return now[0] + dq, now[1] + abs(dq), now[2] + abs(dq) / middle, now[3] + more, eps, middle
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def goal_length(before, after, more):
     """Length that 2.10 tends to in a step that multiplies the distance to it by exp(-more)."""
     rest = -expm1(-more)
     return after if rest == 0 else before + (after - before) / rest
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _pieces(size, eps, more, law):
     """(strips that a step is cut into, strips of it that still count)."""
     count = max(1.0, size / (PIECE * eps))
@@ -76,7 +76,7 @@ def _pieces(size, eps, more, law):
     return count, kept
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _young(size, before, after, more, middle, law):
     """Weight of the growing bonds that form in one increment."""
     goal = goal_length(before, after, more)
@@ -91,7 +91,7 @@ def _young(size, before, after, more, middle, law):
     return total * law[4] * size / (2 * count * law[2])
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def list_state(dq, c, v0, dt):
     """(force weight [1], energy in the bonds that were there [m]) after the straight increment dq.
 
@@ -100,15 +100,15 @@ def list_state(dq, c, v0, dt):
     q, path, damage, _, _, _ = _after(dq, c.now, c.growth, v0, v0, dt)
     first, stored = first_bonds(q, path, damage, c.law)
     force, energy = later_state(dq, c, v0, dt)
-    return c.tally[15] * first + force, c.tally[15] * stored + energy
+    return c.counters[15] * first + force, c.counters[15] * stored + energy
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def later_state(dq, c, v0, dt):
     """`list_state` without the first bonds."""
-    bonds, tally, now, law = c.bondlist, c.tally, c.now, c.law
+    bonds, counters, now, law = c.bondlist, c.counters, c.now, c.law
     q, path, damage, age, eps, middle = _after(dq, now, c.growth, v0, v0, dt)
-    head, end, many, p, coarse = int(tally[0]), int(tally[1]), int(tally[2]), law[0], law[5] * law[2]
+    head, end, many, p, coarse = int(counters[0]), int(counters[1]), int(counters[2]), law[0], law[5] * law[2]
     size, young, force, energy = abs(dq), 0.0, 0.0, 0.0
     if law[1] == MOMENTS:
         _, z, s2 = moments_of(q, exp(now[5] - damage), bonds, head, end)
@@ -132,10 +132,10 @@ def later_state(dq, c, v0, dt):
             young = _young(size, now[4], eps, age - now[3], middle, law)
         else:
             young = formed(size, middle if law[1] <= POWER else law[2], law)
-    return force + np.copysign(tally[14] * young, dq), energy
+    return force + np.copysign(counters[14] * young, dq), energy
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def list_force(dq, c, v0, dt):
     """Weight [1] of the list after the straight increment dq: friction force = mu_s N * weight.
 
@@ -144,21 +144,21 @@ def list_force(dq, c, v0, dt):
     return list_state(dq, c, v0, dt)[0]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def list_energy(dq, c, v0, dt):
     """Energy [m] of all bonds, those of the increment too, after the straight increment dq in the stretch reading."""
     middle = _after(dq, c.now, c.growth, v0, v0, dt)[5]
     young = middle * middle / c.law[2] * share(c.law[0] + 1, abs(dq) / middle)
-    return c.tally[14] * young + list_state(dq, c, v0, dt)[1]
+    return c.counters[14] * young + list_state(dq, c, v0, dt)[1]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _force(dq, c, v0, dt):
     """The force that means are taken of: without the first bonds in the print, whose mean is closed."""
     return later_state(dq, c, v0, dt)[0] if c.law[1] >= SHARES else list_force(dq, c, v0, dt)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _panel(energy, low, high, dq, c, v0, dt):
     """Integral of the force, or of the energy, over a share of the increment by five Gauss points."""
     out = 0.0
@@ -173,7 +173,7 @@ def _panel(energy, low, high, dq, c, v0, dt):
     return (high - low) * out
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def list_mean(dq, c, v0, dt):
     """Path-mean weight over the increment.
 
@@ -184,9 +184,9 @@ def list_mean(dq, c, v0, dt):
     reading an increment that touches the place of the first bonds takes Gauss points as well: their force may jump
     there, and its value at the place itself is that of neither side.
     """
-    tally, now, law = c.tally, c.now, c.law
+    counters, now, law = c.counters, c.now, c.law
     if dq == 0:
-        return tally[5]
+        return counters[5]
     if law[1] == MOMENTS:
         return list_slope(dq, c, v0, dt)[0]
     size = abs(dq) / now[4]
@@ -194,30 +194,30 @@ def list_mean(dq, c, v0, dt):
     touched = low <= TOUCH * abs(dq) and high >= -TOUCH * abs(dq)
     touched = (touched and law[1] < SHARES) or (law[7] > 0 and law[0] < 1)  # there no change of the rule either
     least = LEAST_BALANCED if law[7] == 0 else LEAST_WIDE
-    short = tally[1] > tally[0] and size <= (0.1 if law[0] >= 1 else 0.03) and law[0] >= 0 and not touched
+    short = counters[1] > counters[0] and size <= (0.1 if law[0] >= 1 else 0.03) and law[0] >= 0 and not touched
     kinked = low <= 0.0 <= high and law[3] > 0 and law[0] < 1  # the force of the first bonds turns within the increment
     if law[1] == POWER and (size > least or kinked):
-        gain = list_energy(dq, c, v0, dt) - tally[4]
+        gain = list_energy(dq, c, v0, dt) - counters[4]
         middle = _after(dq, now, c.growth, v0, v0, dt)[5]
-        spent = _path_mean(True, short, gain + tally[4], dq, c, v0, dt)
+        spent = _path_mean(True, short, gain + counters[4], dq, c, v0, dt)
         return (spent * abs(dq) / middle + gain) / dq
     last = 0.0
     if short:
         last = _force(dq, c, v0, dt)
     mean = _path_mean(False, short, last, dq, c, v0, dt)
-    return mean + tally[15] * first_mean(dq, now[0], now[1], law) if law[1] >= SHARES else mean
+    return mean + counters[15] * first_mean(dq, now[0], now[1], law) if law[1] >= SHARES else mean
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _path_mean(energy, short, last, dq, c, v0, dt):
     """Path mean of the force, or of the energy, over the increment; last: its value at the end of a short one."""
     if short:
         if energy:
             half = list_energy(0.5 * dq, c, v0, 0.5 * dt)
-            return (c.tally[4] + 4 * half + last) / 6
-        half, before = _force(0.5 * dq, c, v0, 0.5 * dt), c.tally[5]
+            return (c.counters[4] + 4 * half + last) / 6
+        half, before = _force(0.5 * dq, c, v0, 0.5 * dt), c.counters[5]
         if c.law[1] >= SHARES:
-            before -= c.tally[15] * first_bonds(c.now[0], c.now[1], c.now[2], c.law)[0]
+            before -= c.counters[15] * first_bonds(c.now[0], c.now[1], c.now[2], c.law)[0]
         return (before + 4 * half + last) / 6
     size = abs(dq) / c.now[4]
     if size <= 0.5:
@@ -230,65 +230,65 @@ def _path_mean(energy, short, last, dq, c, v0, dt):
     return out
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def list_slope(dq, c, v0, dt):
     """(path-mean weight [1], its derivative over dq [1/m]) of an increment, exact in the stretch reading of order 1.
 
     dq [m]; c: the list; v0 [m/s], dt [s] set the bond length of the step. Friction force = mu_s N * weight.
     """
-    tally, now, law = c.tally, c.now, c.law
-    m, z, _ = moments_of(now[0], exp(now[5] - now[2]), c.bondlist, int(tally[0]), int(tally[1]))
-    first = tally[15] * law[3] * exp(-now[2])
+    counters, now, law = c.counters, c.now, c.law
+    m, z, _ = moments_of(now[0], exp(now[5] - now[2]), c.bondlist, int(counters[0]), int(counters[1]))
+    first = counters[15] * law[3] * exp(-now[2])
     middle, _ = grow(now[4], v0, v0, abs(dq) / 2, dt / 2, c.growth)
-    mean, slope = bond_mean(m + first, z + first * now[0], dq, tally[14], middle)
+    mean, slope = bond_mean(m + first, z + first * now[0], dq, counters[14], middle)
     return mean / law[2], slope / law[2]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def list_step(dq, c, v0, v1, dt):
     """Commit an increment: append its strips, drop strips beyond the cut-off, merge now and then; False without room.
 
     dq [m]; c: the list, changed in place; v0, v1: speeds [m/s] at the ends of the step of dt [s]. The energy it stores
-    and the force after the step stand in `tally`.
+    and the force after the step stand in `counters`.
     """
-    bonds, tally, now, law = c.bondlist, c.tally, c.now, c.law
+    bonds, counters, now, law = c.bondlist, c.counters, c.now, c.law
     before, place, way, harm, age = now[4], now[0], now[1], now[2], now[3]
     q, path, damage, grown, eps, middle = _after(dq, now, c.growth, v0, v1, dt)
     now[0], now[1], now[2], now[3], now[4] = q, path, damage, grown, eps
-    _rescale(bonds, tally, now, law)
+    _rescale(bonds, counters, now, law)
     size, done = abs(dq), True
-    if size > 0 and tally[14] > 0:
-        done = _append(dq, place, way, harm, before, grown - age, middle, bonds, tally, now, law)
+    if size > 0 and counters[14] > 0:
+        done = _append(dq, place, way, harm, before, grown - age, middle, bonds, counters, now, law)
     if size > 0:
-        _cut(bonds, tally, now, law)
+        _cut(bonds, counters, now, law)
         # a merge passes over the whole list: wait until it has grown by a fifth
-        if law[5] > 0 and tally[1] - tally[0] > 1.2 * tally[3] + 12:
-            merge(bonds, tally, now, law)
-    tally[5], tally[4] = list_state(0.0, c, 0.0, 0.0)
-    tally[10] = max(tally[10], tally[1] - tally[0])
+        if law[5] > 0 and counters[1] - counters[0] > 1.2 * counters[3] + 12:
+            merge(bonds, counters, now, law)
+    counters[5], counters[4] = list_state(0.0, c, 0.0, 0.0)
+    counters[10] = max(counters[10], counters[1] - counters[0])
     return done
 
 
-@njit(error_model="numpy", **LEAN)
-def _rescale(bonds, tally, now, law):
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _rescale(bonds, counters, now, law):
     """Move the reference of the scaled numbers before they overflow."""
     if law[1] == SHARES:
         return
-    clock = now[3] if law[1] == AGED else now[2]
-    if clock - now[5] < 300:  # exp(300) = 1e130; the range of numbers ends at exp(709)
+    time_state = now[3] if law[1] == AGED else now[2]
+    if time_state - now[5] < 300:  # exp(300) = 1e130; the range of numbers ends at exp(709)
         return
-    less = exp(now[5] - clock)
-    for k in range(int(tally[0]), int(tally[1])):
+    less = exp(now[5] - time_state)
+    for k in range(int(counters[0]), int(counters[1])):
         bonds[5, k] *= less
         bonds[6, k] *= less
-    now[5] = clock
+    now[5] = time_state
 
 
-@njit(error_model="numpy", **LEAN)
-def _append(dq, place, way, harm, before, more, middle, bonds, tally, now, law):
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _append(dq, place, way, harm, before, more, middle, bonds, counters, now, law):
     """Strips of the increment dq that began at `place`; False when there is no room."""
-    mode, size, end, dense = law[1], abs(dq), int(tally[1]), tally[14]
-    if mode == SHARES and end > tally[0] + tally[2] and (bonds[1, end - 1] - bonds[0, end - 1]) * dq > 0 \
+    mode, size, end, dense = law[1], abs(dq), int(counters[1]), counters[14]
+    if mode == SHARES and end > counters[0] + counters[2] and (bonds[1, end - 1] - bonds[0, end - 1]) * dq > 0 \
             and bonds[9, end - 1] == way and bonds[5, end - 1] == dense:
         k = end - 1
         bonds[1, k] = now[0]
@@ -300,11 +300,11 @@ def _append(dq, place, way, harm, before, more, middle, bonds, tally, now, law):
     count, kept = (1, 1) if mode == SHARES else _pieces(size, middle, more, law)
     if mode == MOMENTS:
         count = kept = 1
-    tally[8] += count - 1
-    room = min(int(tally[13]), bonds.shape[1])
-    if end + kept > room:
-        end = _pack(bonds, tally)
-        if end + kept > room:
+    counters[8] += count - 1
+    workspace = min(int(counters[13]), bonds.shape[1])
+    if end + kept > workspace:
+        end = _pack(bonds, counters)
+        if end + kept > workspace:
             return False
     goal = goal_length(before, now[4], more)
     for piece in range(int(kept) - 1, -1, -1):
@@ -330,11 +330,11 @@ def _append(dq, place, way, harm, before, more, middle, bonds, tally, now, law):
                 bonds[5 + half, end] = goal * exp(now[3] - back * more - now[5]) \
                     + (before - goal) * exp(now[3] - more - now[5])
         end += 1
-    tally[1] = end
+    counters[1] = end
     return True
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _as_moments(bonds, k, dq, eps, now):
     """Weight, centre and variance of the bonds of one increment that survive it, exact at a constant length."""
     x, g = abs(dq) / eps, np.copysign(1.0, dq)
@@ -352,10 +352,10 @@ def _as_moments(bonds, k, dq, eps, now):
     bonds[5, k] = zero * exp(now[2] - now[5])
 
 
-@njit(error_model="numpy", **LEAN)
-def _cut(bonds, tally, now, law):
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _cut(bonds, counters, now, law):
     """Pass over the strips older than the cut-off."""
-    head, end = int(tally[0]), int(tally[1])
+    head, end = int(counters[0]), int(counters[1])
     while head < end:
         old = (now[1] - bonds[9, head]) if law[1] >= SHARES else now[2] - bonds[2, head]
         if law[1] == MOMENTS:
@@ -363,16 +363,16 @@ def _cut(bonds, tally, now, law):
         if old <= law[6]:
             break
         head += 1
-        tally[2] = max(tally[2] - 1, 0.0)
-    tally[0] = head
+        counters[2] = max(counters[2] - 1, 0.0)
+    counters[0] = head
 
 
-@njit(error_model="numpy", **LEAN)
-def _pack(bonds, tally):
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _pack(bonds, counters):
     """Move the list to the front of its room; returns its end."""
-    head, end, front = int(tally[0]), int(tally[1]), int(tally[12])
+    head, end, front = int(counters[0]), int(counters[1]), int(counters[12])
     for i in range(bonds.shape[0]):
         for k in range(head, end):
             bonds[i, k - head + front] = bonds[i, k]
-    tally[0], tally[1] = front, end - head + front
+    counters[0], counters[1] = front, end - head + front
     return end - head + front

@@ -7,13 +7,13 @@ from math import exp, lgamma, log
 
 import numpy as np
 
-from ...compiled.inner import njit
-from ..flags_kernels import LEAN
+from ...compiled.jit import njit
+from ..flags_kernels import NJIT_NO_REFCOUNT
 
-FAST = {"reassoc", "contract", "arcp"}
+FASTMATH_FLAGS = {"reassoc", "contract", "arcp"}
 
 
-@njit(error_model="numpy", fastmath={"contract"}, **LEAN)
+@njit(error_model="numpy", fastmath={"contract"}, **NJIT_NO_REFCOUNT)
 def fexp(x):
     """exp(x) to 2.3e-16 relative for x in [-708, 709], held at exp(-708) below it (Cody-Waite and Taylor)."""
     x = min(max(x, -708.0), 709.0)
@@ -34,7 +34,7 @@ def fexp(x):
     return p * np.int64((np.int64(n) + 1023) << np.int64(52)).view(np.float64)
 
 
-@njit(error_model="numpy", fastmath={"contract"}, **LEAN)
+@njit(error_model="numpy", fastmath={"contract"}, **NJIT_NO_REFCOUNT)
 def flog(x):
     """Natural logarithm of a normal number x > 0 to 2.3e-16; -709.09 at zero."""
     bits = np.float64(x).view(np.int64)
@@ -54,7 +54,7 @@ def flog(x):
     return np.float64(e) * 0.6931471805599453 + 2 * s * (1 + z * p)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def gamma_p(a, x):
     """Regularised lower incomplete gamma P(a, x), a > 0 (twin: scipy.special.gammainc), to 1e-14."""
     if x <= 0:
@@ -87,7 +87,7 @@ def gamma_p(a, x):
     return 1 - front * h
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def share(p, x):
     """P(p + 1, x) [1] to 1e-15 absolute: the share of the limit in the bonds that formed on the last x bond lengths.
 
@@ -100,7 +100,7 @@ def share(p, x):
     return gamma_p(p + 1, x)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def tabled(p, x, table, norm):
     """P(p + 1, x) from its values `table` (k,) at multiples of 1/32, to 1e-10; exact where x < 1.
 

@@ -3,8 +3,8 @@ long the run, small the strokes or fine the steps. First moments stay, the error
 
 from math import exp
 
-from ...compiled.inner import njit
-from ..flags_kernels import LEAN
+from ...compiled.jit import njit
+from ..flags_kernels import NJIT_NO_REFCOUNT
 from .list_math_kernels import fexp, flog
 from .list_sum_kernels import AGED, FIRST, MOMENTS, POWER, SECOND, SHARES, start_length
 
@@ -13,13 +13,13 @@ MOST_AGED = 0.1  # widest growth J across one strip of growing bonds
 MOST_YOUNGER = 0.1  # share that the last bond of a strip may be shorter than its first
 
 
-@njit(error_model="numpy", **LEAN)
-def merge(bonds, tally, now, law):
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def merge(bonds, counters, now, law):
     """Join neighbours while they stay narrower than delta eps_0 exp(R/3 eps_0): of one pass of the slide end to end,
     or of several passes over the same places, taken as spread evenly over them and, of those, oldest first."""
-    head, end = int(tally[0]), int(tally[1])
+    head, end = int(counters[0]), int(counters[1])
     many, out, delta, eps0 = 0, head, law[5], law[2]
-    old_many = int(tally[2])
+    old_many = int(counters[2])
     for k in range(head, end):
         age = (now[1] - bonds[9, k]) / eps0
         limit = delta * eps0 * exp(min(age / 3, 200.0))
@@ -42,7 +42,7 @@ def merge(bonds, tally, now, law):
             if law[1] == SHARES or (law[1] == AGED and law[0] < 1):
                 grown = grown and _even(bonds, last, k, now, law)
             if narrow and grown and last <= head + many and _alike(bonds, last, k, delta * delta * delta * eps0 * exp(
-                    min(age, 200.0)), tally):
+                    min(age, 200.0)), counters):
                 if last == head + many:
                     _spread(bonds, last, law)
                     many += 1
@@ -58,16 +58,16 @@ def merge(bonds, tally, now, law):
         if spread and out == head + many:
             many += 1
         out += 1
-    tally[1], tally[2], tally[3] = out, many, out - head
+    counters[1], counters[2], counters[3] = out, many, out - head
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _gone(bonds, k, now):
     """Whether nothing is left of the starting lengths of a strip."""
     return exp(now[5] - now[3]) * start_length(0.0, bonds[5, k], bonds[6, k]) <= GONE * now[4]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _even(bonds, i, k, now, law):
     """Whether the bonds of two strips together weigh alike over them, or so little that it does not matter.
 
@@ -83,7 +83,7 @@ def _even(bonds, i, k, now, law):
     return abs(p) * part * joint <= law[5] * law[5] * far
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _as_dense(bonds, i, k, limit, eps0):
     """Whether two strips that lie end to end weigh nearly alike per path.
 
@@ -94,7 +94,7 @@ def _as_dense(bonds, i, k, limit, eps0):
     return abs(left - right) * (bonds[8, i] + bonds[8, k]) * eps0 <= limit * limit * (left + right)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _evenly_aged(bonds, i, k, now):
     """Whether the starting lengths of two strips together are gone, or span less than MOST_AGED e-folds while the bonds
     themselves differ by less than the share MOST_YOUNGER in length."""
@@ -105,8 +105,8 @@ def _evenly_aged(bonds, i, k, now):
     return young <= exp(MOST_AGED) * old and now[4] - left * young >= (1 - MOST_YOUNGER) * (now[4] - left * old)
 
 
-@njit(error_model="numpy", **LEAN)
-def _alike(bonds, i, k, most, tally):
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def _alike(bonds, i, k, most, counters):
     """Whether two strips cover the same places closely enough to be spread over their mean range."""
     low, high = min(bonds[0, i], bonds[1, i]), max(bonds[0, i], bonds[1, i])
     low2, high2 = min(bonds[0, k], bonds[1, k]), max(bonds[0, k], bonds[1, k])
@@ -116,12 +116,12 @@ def _alike(bonds, i, k, most, tally):
     if miss <= 1e-3 * wide:
         return True
     if joint * miss <= most * wide:
-        tally[9] += 1
+        counters[9] += 1
         return True
     return False
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _join_moments(bonds, i, k):
     a, b = bonds[5, i], bonds[5, k]
     total = a + b
@@ -133,7 +133,7 @@ def _join_moments(bonds, i, k):
     _join_clock(bonds, i, k)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _join_clock(bonds, i, k):
     bonds[3, i] += bonds[3, k]
     bonds[4, i] += bonds[4, k]
@@ -141,7 +141,7 @@ def _join_clock(bonds, i, k):
     bonds[2, i], bonds[9, i] = bonds[2, k], bonds[9, k]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _join_ends(bonds, i, k, now, law):
     """Two strips of one pass, end to end; their first moments stay."""
     left, right = bonds[3, i], bonds[3, k]
@@ -160,7 +160,7 @@ def _join_ends(bonds, i, k, now, law):
             bonds[5 + half, i] = 0.5 * bonds[4, i] * exp(bonds[2, i] - part * bonds[3, i] - now[5])
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _aged_at(back, left, right, bonds, i, k, now):
     """Scaled starting length at `back` [m] from the end of two strips, zero once it is gone from both."""
     if _gone(bonds, k, now):
@@ -169,7 +169,7 @@ def _aged_at(back, left, right, bonds, i, k, now):
     return start_length(part, bonds[5, j], bonds[6, j])
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _spread(bonds, k, law):
     """Take a strip of one pass as spread evenly over its places."""
     low, high = min(bonds[0, k], bonds[1, k]), max(bonds[0, k], bonds[1, k])
@@ -179,7 +179,7 @@ def _spread(bonds, k, law):
         bonds[6, k] = 0.0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _join_spread(bonds, i, k, spread, now, law):
     """Add strip k to the spread strip i: mean range by the path covered."""
     a, b = bonds[8, i], bonds[8, k]

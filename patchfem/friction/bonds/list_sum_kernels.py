@@ -16,9 +16,9 @@ from math import exp
 import numpy as np
 from numba import uint64
 
-from ...compiled.inner import njit
-from ..flags_kernels import LEAN
-from .list_math_kernels import FAST, fexp, flog, share, tabled
+from ...compiled.jit import njit
+from ..flags_kernels import NJIT_NO_REFCOUNT
+from .list_math_kernels import FASTMATH_FLAGS, fexp, flog, share, tabled
 
 MOMENTS, POWER, SHARES, AGED = 0.0, 1.0, 2.0, 3.0
 SPROUTING = 0.05  # length of the last bond over that of the first of a strip, below which all of them are growing
@@ -26,7 +26,7 @@ AT_PLACE = 1e-14  # of the path: a slide as near to a place is at it
 FIRST, SECOND = 0.21132486540518713, 0.7886751345948129  # two Gauss points, seen from the end of a strip
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def moments_of(q, scale, bonds, head, end):
     """(sum k, sum k u, sum k u^2) [m, m2, m3] of strips in MOMENTS form, k the weight without the factor 1/eps_0.
 
@@ -41,7 +41,7 @@ def moments_of(q, scale, bonds, head, end):
     return m * scale, z * scale, s2 * scale
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _powers(q, bonds, first, end, p):
     """Sums of w |u|^p sgn u and of w |u|^(p + 1) over both Gauss points of strips that one pass left."""
     force, energy = 0.0, 0.0
@@ -71,7 +71,7 @@ def _powers(q, bonds, first, end, p):
     return force, energy
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _reach_in(size, slope, nodes, p):
     """Integral from 0 to size of t^p exp(slope t), by four points with t^p as their weight."""
     if size <= 0:
@@ -82,7 +82,7 @@ def _reach_in(size, slope, nodes, p):
     return total * fexp((p + 1) * flog(size))
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _beside_turn(q, a, b, dl, w0, p, odd, nodes):
     """One strip near u = 0, the power integrated from u = 0 where it bends: each side by the difference of two."""
     step = b - a
@@ -94,7 +94,7 @@ def _beside_turn(q, a, b, dl, w0, p, odd, nodes):
     return front * (behind - ahead if odd else behind + ahead)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def spread_over(q, a, b, p):
     """Means of |u|^p sgn u and of |u|^(p + 1) over places uniform between a < b."""
     wide, middle = b - a, q - (a + b) / 2
@@ -111,7 +111,7 @@ def spread_over(q, a, b, p):
     return (f - g) / ((p + 1) * wide), (f * u - g * v) / ((p + 2) * wide)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def sloped_over(q, a, b, w0, w1, p):
     """Sums of w |u|^p sgn u and of w |u|^(p + 1) over places from a to b whose weight is linear between them.
 
@@ -128,7 +128,7 @@ def sloped_over(q, a, b, w0, w1, p):
     return middle * odd + slope * even, middle * even + slope * third
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def power_sums(q, damage, bonds, head, many, end, p, coarse, nodes):
     """Scaled (sum w |u|^p sgn u, sum w |u|^(p + 1)) over strips in POWER form; the first `many` are spread.
 
@@ -162,7 +162,7 @@ def power_sums(q, damage, bonds, head, many, end, p, coarse, nodes):
     return force, energy
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _shares_closed(q, path, bonds, first, end, p, eps0):
     """Force and energy [m] of strips of one pass for p = 0, 1, 2; S = 1 - (1 + ..) exp(-x), lever (p + 1) S - x phi."""
     force, energy = 0.0, 0.0
@@ -188,7 +188,7 @@ def _shares_closed(q, path, bonds, first, end, p, eps0):
     return force, energy
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def shares_sums(q, path, bonds, head, many, end, p, eps0, table, norm):
     """(force [1], energy [m]) per unit mu_s N of the printed law (2.17) at constant bond length, exact.
 
@@ -229,7 +229,7 @@ def shares_sums(q, path, bonds, head, many, end, p, eps0, table, norm):
     return force, energy
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _lever(p, x, s, norm):
     """Integral from 0 to x of y phi(y): (p + 1) P(p + 1, x) - x phi(x), s = P(p + 1, x)."""
     if x <= 0:
@@ -237,7 +237,7 @@ def _lever(p, x, s, norm):
     return (p + 1) * s - norm * fexp((p + 1) * flog(x) - x)
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def _aged(q, path, psi, length, bonds, first, end, p):
     """Sums over both Gauss points of W/2 f(R/own), own = length - psi c, times sgn u and times |u| [m]."""
     force, energy, least = 0.0, 0.0, 1e-9 * length
@@ -264,7 +264,7 @@ def _aged(q, path, psi, length, bonds, first, end, p):
     return 0.5 * force, 0.5 * energy
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def start_length(part, c0, c1):
     """Scaled length that the bonds at a place of a strip started with, log-linear between its two Gauss points.
 
@@ -275,7 +275,7 @@ def start_length(part, c0, c1):
     return c0 * exp(rise * (flog(c1) - flog(c0))) if c0 > 1e-300 and c1 > 1e-300 else max(c0, c1)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def own_length(part, psi, length, c0, c1):
     """Bond length [m] at a place of a strip: length - psi start_length, at least 1e-9 length.
 
@@ -284,13 +284,13 @@ def own_length(part, psi, length, c0, c1):
     return max(length - psi * start_length(part, c0, c1), 1e-9 * length)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _bends(p):
     """Whether R^p is too steep at R = 0, or bends too sharply there, for two Gauss points in R."""
     return p < 2 and p != np.floor(p)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _aged_split(q, path, psi, length, a, b, at, wide, c0, c1, p):
     """One strip of growing bonds with u = 0 inside, or near the present with a fractional p: two points on each side of
     u = 0.
@@ -325,7 +325,7 @@ def _aged_split(q, path, psi, length, a, b, at, wide, c0, c1, p):
     return force, energy
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def aged_sums(q, path, psi, length, bonds, head, many, end, p, coarse):
     """Sums of path f(R/own) sgn u [m] and of the same times |u| [m2] over strips of growing bonds of the printed law.
 
@@ -361,7 +361,7 @@ def aged_sums(q, path, psi, length, bonds, head, many, end, p, coarse):
     return force, energy
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def first_bonds(q, path, damage, law):
     """(force [1], energy [m]) per unit mu_s N of the initial bonds, of density m_0 and unstressed at q = 0.
 
@@ -385,7 +385,7 @@ def first_bonds(q, path, damage, law):
     return f * np.sign(q), f * (abs(q) - wide / 2)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def first_mean(dq, q, path, law):
     """Path mean [1] of the force of the first bonds of the print over the increment dq [m] from the slide q, path [m]
     before it: exact on both sides of their place, where it jumps, or turns over the width law[7]."""
@@ -402,7 +402,7 @@ def first_mean(dq, q, path, law):
     return way * law[3] * total * eps0 / size
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def formed(size, eps, law):
     """Weight [1], after one straight increment, of the bonds that form on it.
 

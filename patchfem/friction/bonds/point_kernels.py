@@ -5,13 +5,13 @@ Flags: only fast-math that keeps NaN and infinity meaningful. All arrays are C-o
 
 from math import exp, log
 
-from ...compiled.inner import njit
-from ..flags_kernels import FAST, LEAN
+from ...compiled.jit import njit
+from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
 SHORT = 0.5  # bond lengths up to which the series of a slide do for every point
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def shape(x):
     """(f1, f2, exp(-x)) [1] for one x >= 0: f1 = (1 - exp(-x))/x, f2 = (1 - f1)/x, without cancellation.
 
@@ -26,7 +26,7 @@ def shape(x):
     return f1, (1 - f1) / x, e
 
 
-@njit(error_model="numpy", fastmath=FAST, forceinline=True, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def short_shape(x):
     """`shape` for 0 <= x <= SHORT, by the series alone: without a branch, so a loop over points takes several at once.
 
@@ -39,7 +39,7 @@ def short_shape(x):
     return f1, f2, 1 - x * f1
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def moments(x, e):
     """Integrals from 0 to x of y exp(-y), y^2 exp(-y) and of the latter once more, without cancellation; e = exp(-x).
 
@@ -50,7 +50,7 @@ def moments(x, e):
     return moments_of(x, e, 6 - e * (x * x * x + 3 * x * x + 6 * x + 6))
 
 
-@njit(error_model="numpy", fastmath=FAST, forceinline=True, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def short_moments(x, e):
     """`moments` for 0 <= x <= SHORT, by the series alone."""
     return moments_of(x, e, x ** 4 * (1 / 4 - x * (1 / 5 - x * (1 / 12 - x * (1 / 42 - x * (
@@ -58,14 +58,14 @@ def short_moments(x, e):
             1 / 4717440 - x * (1 / 50803200 - x * (1 / 598752000 - x / 7664025600)))))))))))))
 
 
-@njit(error_model="numpy", fastmath=FAST, forceinline=True, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def moments_of(x, e, c):
     """The three integrals of `moments` from that of y^3 exp(-y)."""
     third = (c + x * x * x * e) / 3
     return (third + x * x * e) / 2, third, x * third - c
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def bond_mean(m, z, dq, sigma, eps):
     """Path-mean stretch [Pa m] of one point over an increment (2.17, stretch, p = 1), and its slope over dq [Pa].
 
@@ -76,14 +76,14 @@ def bond_mean(m, z, dq, sigma, eps):
     return mean_of(m, z, dq, sigma, eps, f1, f2)
 
 
-@njit(error_model="numpy", fastmath=FAST, forceinline=True, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def short_mean(m, z, dq, sigma, eps):
     """`bond_mean` for |dq| <= SHORT eps, without a branch."""
     f1, f2, _ = short_shape(abs(dq) / eps)
     return mean_of(m, z, dq, sigma, eps, f1, f2)
 
 
-@njit(error_model="numpy", fastmath=FAST, forceinline=True, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def mean_of(m, z, dq, sigma, eps, f1, f2):
     """`bond_mean` from the shape functions of |dq|/eps."""
     g = 1.0 if dq > 0 else -1.0
@@ -94,7 +94,7 @@ def mean_of(m, z, dq, sigma, eps, f1, f2):
     return mean, slope
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def bond_step(m, z, s2, dq, sigma, eps):
     """(m [Pa], z [Pa m], s2 [Pa m2]) of one point after an increment dq [m], and the integral of s2 dR/eps [Pa m2].
 
@@ -107,7 +107,7 @@ def bond_step(m, z, s2, dq, sigma, eps):
     return step_of(m, z, s2, dq, sigma, eps, f1, e, a2, a3, a4)
 
 
-@njit(error_model="numpy", fastmath=FAST, forceinline=True, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def short_step(m, z, s2, dq, sigma, eps):
     """`bond_step` for |dq| <= SHORT eps, without a branch."""
     x = abs(dq) / eps
@@ -116,7 +116,7 @@ def short_step(m, z, s2, dq, sigma, eps):
     return step_of(m, z, s2, dq, sigma, eps, f1, e, a2, a3, a4)
 
 
-@njit(error_model="numpy", fastmath=FAST, forceinline=True, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
 def step_of(m, z, s2, dq, sigma, eps, f1, e, a2, a3, a4):
     """`bond_step` from the shape functions and moments of |dq|/eps."""
     path = abs(dq)
@@ -130,7 +130,7 @@ def step_of(m, z, s2, dq, sigma, eps, f1, e, a2, a3, a4):
     return m1, z1, s21, dissipated
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def free_part(play, dq, half):
     """Elastic part of an increment and the play after it (twin: `parameters.elastic_part`)."""
     start = play * half
@@ -142,7 +142,7 @@ def free_part(play, dq, half):
     return dq, end / half
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def loose_mean(m, z, play, half, dq, sigma, eps):
     """`bond_mean` of a point with an elastic range: path-mean stretch [Pa m] over dq [m], and its slope [Pa].
 
@@ -159,7 +159,7 @@ def loose_mean(m, z, play, half, dq, sigma, eps):
     return total, (mean + slope * rest - total) / dq
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def loose_step(m, z, s2, play, half, dq, sigma, eps):
     """`bond_step` of a point with an elastic range: (m, z, s2, play, integral of s2 dR/eps).
 
@@ -172,7 +172,7 @@ def loose_step(m, z, s2, play, half, dq, sigma, eps):
     return m, z, s2, play, dissipated
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def grow(eps, v0, v1, path, dt, growth):
     """(bond length after the step, I_A + I_B) of eq. 2.10 (twin: `parameters.grow`).
 
@@ -195,14 +195,14 @@ def grow(eps, v0, v1, path, dt, growth):
     return target + (eps - target) * exp(-total), total
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def _primitive(v, floor):
     if abs(v) < floor:
         return v / floor
     return (1 + log(abs(v) / floor)) * (1.0 if v > 0 else -1.0)
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def bond_end(m, z, dq, sigma, eps):
     """(stretch sum, slope) of one point at the end of the slide dq (z of `bond_step`)."""
     g = 1.0 if dq > 0 else -1.0
@@ -213,7 +213,7 @@ def bond_end(m, z, dq, sigma, eps):
     return z1, sigma - young * e - g * z1 / eps
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def press_point(m, z, s2, s0, s1, initial, length):
     """Bonds of one point after a change of its load at rest (twin: `recursion.pressed`)."""
     if s1 >= s0:

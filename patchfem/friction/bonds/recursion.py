@@ -32,7 +32,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError
-from ...effects import unbuilt
+from ...effects import not_supported_message
 from ..protocol import Step
 from .parameters import Bonds, elastic_part, grow
 
@@ -155,7 +155,7 @@ def refuse_directions(law: Bonds, directions: int) -> None:
     """Raise PatchfemError for a law with breakaway in more than one direction: its elastic range has no form in a
     plane."""
     if directions > 1 and law.breakaway:
-        raise PatchfemError(unbuilt("breakaway in two directions", "elastic range"))
+        raise PatchfemError(not_supported_message("breakaway in two directions", "elastic range"))
 
 
 @dataclass(frozen=True, slots=True)

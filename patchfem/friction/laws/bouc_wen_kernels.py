@@ -9,8 +9,8 @@ from math import exp, expm1, inf, log, log1p, nan
 
 import numpy as np
 
-from ...compiled.inner import njit
-from ..flags_kernels import FAST, LAYERS, LEAN, SET_VALUED, closed, gives, knee, layer, middle
+from ...compiled.jit import njit
+from ..flags_kernels import FASTMATH_FLAGS, LAYERS, NJIT_NO_REFCOUNT, SET_VALUED, closed, gives, knee, layer, middle
 from .exponential_kernels import decay
 
 __all__ = ["BENDS", "FOLLOWS", "LAYERS", "SET_VALUED", "after", "begin", "closed", "commit", "finish", "flow",
@@ -24,7 +24,7 @@ BENT = 0.05  # of the piece next to zero
 FLAT = 36.0  # w from which y is 1 to the last digit
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def pace(w, n):
     """dw/dx of w = -ln(1 - y) above zero: (1 - y^n)/(1 - y), between 1 and n; n the exponent, x the slide over eps.
 
@@ -43,13 +43,13 @@ def pace(w, n):
     return -expm1(power) * exp(w)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def density(u, n, give, rising):
     """(dx/du, |y|) of the variable of integration u: u = w above zero (`rising`), u = -y below; give = 1 - 2 s."""
     return (1 / pace(u, n), -expm1(-u)) if rising else (1 / (1 - give * u**n), u)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def piece(low, size, n, give, rising, bent):
     """(x, integral of |y|) over a piece of u; bent: it begins at zero, where a power of u is not smooth, and is taken
     in the root of u."""
@@ -65,7 +65,7 @@ def piece(low, size, n, give, rising, bent):
     return x, area
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def between(low, high, n, give, rising):
     """(slide x, integral of |y| over x) [1] between two values low < high of u, as in `density`."""
     x, area, rest = 0.0, 0.0, low
@@ -86,13 +86,13 @@ def between(low, high, n, give, rising):
     return x, area
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def scaled(area, way, x):
     """The integral over a slide x of what was integrated over `way`, which misses it by the last digit of its end."""
     return area * (x / way) if way > 0 else 0.0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def unloaded(y, x, n, give):
     """(y, slide left over, integral of y) [1] of an unloading from y < 0 over a slide x > 0 in lengths eps, to y = 0 at
     most."""
@@ -109,7 +109,7 @@ def unloaded(y, x, n, give):
     return -u, 0.0, -scaled(area, way, x)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def along(y, x, n, s):
     """(y, integral of y over x) [1] after a slide x >= 0 in lengths eps, from y = z sgn dq. Twin:
     `bouc_wen.BoucWen.along`."""
@@ -129,13 +129,13 @@ def along(y, x, n, s):
     return -expm1(-w), area + (scaled(rest, way, x) if way > 0 else x * y)
 
 
-@njit(error_model="numpy", forceinline=True, **LEAN)
+@njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def slope(y, n, s):
     """dy/dx at y [1]: 1 - y^n above zero, 1 - (1 - 2 s) |y|^n below."""
     return 1 - (1.0 if y >= 0 else 1 - 2 * s) * abs(y)**n
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def flowing(k, z, v, way):
     """(force [N] at a stretch z = eps times the z of the law [m], slope of the stretch over the slide in the direction
     `way`, slopes of the force over stretch [N/m] and speed, 0); k: limit [N], eps [m], n, s."""
@@ -143,13 +143,13 @@ def flowing(k, z, v, way):
     return stiffness * z, slope(way * z / k[1], k[2], k[3]), stiffness, 0.0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def quickly(u, n, s):
     """dw/dx of w = -ln(u), u = 1 - y: `slope` over u, between 1/2 and n, so that any step in x is stable."""
     return n * (1 - 0.5 * (n - 1) * u) if u < 1e-5 else slope(1 - u, n, s) / u
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def along_knee(u, x, n, s):
     """(u, integral of u over x) after a slide x in lengths eps, u = 1 - y: a step of Runge and Kutta's order 4 in w =
     -ln(u), and Simpson's rule over u, whose integrand is one over the pace of w."""
@@ -161,7 +161,7 @@ def along_knee(u, x, n, s):
     return end, (u - end) / 6 * (1 / k0 + 4 / quickly(0.5 * (u + end), n, s) + 1 / quickly(end, n, s))
 
 
-@njit(error_model="numpy", forceinline=True, **LEAN)
+@njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def after(k, z, square, dx, way):
     """(stretch [m], its square [m2], work of its force [J]) after a slide dx [m] of any length in the direction `way`:
     exact for n = 1 above zero, else of order 4."""
@@ -175,7 +175,7 @@ def after(k, z, square, dx, way):
     return stretch, stretch * stretch, k[0] * k[1] * (x - left)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def mean(num, mem, e, q, dq, eps, dt):
     """Path-mean force [N] of the Bouc-Wen law over an increment dq [m], and its slope over dq [N/m].
 
@@ -190,7 +190,7 @@ def mean(num, mem, e, q, dq, eps, dt):
     return way * limit * area / x, limit / length * (end - area / x) / x
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit(num, mem, e, dq, force, v0, v1, dt, eps):
     """Move z over the increment dq [m]; returns the energy dissipated [J], work less the gain of the stored energy."""
     limit, length, n, s, z = num[e, 1], num[e, 2], num[e, 3], num[e, 4], mem[e, 0]
@@ -200,7 +200,7 @@ def commit(num, mem, e, dq, force, v0, v1, dt, eps):
     return limit * length * (area - 0.5 * (end * end - z * z))
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def state(num, mem, e, q, v):
     """(force mu N z [N], stored energy [J], irreversible part q - eps z of the slide [m]) of a contact at the slide q
     [m]."""
@@ -208,7 +208,7 @@ def state(num, mem, e, q, v):
     return num[e, 1] * z, 0.5 * num[e, 1] * num[e, 2] * z * z, q - num[e, 2] * z
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def flow(num, e, z, dq, dt):
     """(stretch eps z [m] after a slide dq [m] from the stretch z [m], its slopes over the stretch before, dq [1] and dt
     [m/s]).
@@ -225,14 +225,14 @@ def flow(num, e, z, dq, dt):
     return way * length * end, kept, rise, 0.0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def pull(num, e, z, v):
     """(force [N] at a stretch z = eps times the z of the law [m], its slopes over the stretch [N/m] and the speed [N
     s/m], 0)."""
     return num[e, 1] / num[e, 2] * z, num[e, 1] / num[e, 2], 0.0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def begin(num, mem, way, y):
     """Set the rate state z of a motion that begins in the direction `way`; returns the path [m] to z = 0 on unloading,
     where the rate has a kink, infinite on loading."""
@@ -242,7 +242,7 @@ def begin(num, mem, way, y):
     return num[0, 2] * between(0.0, abs(y[0]), num[0, 3], 1 - 2 * num[0, 4], False)[0]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def rate(num, mem, turn, dq, v, y, out):
     """Force [N] at z; writes z' [1/s] at the speed v [m/s] into out. turn: direction, path to the kink [m]."""
     along = turn[0] * y[0]
@@ -251,13 +251,13 @@ def rate(num, mem, turn, dq, v, y, out):
     return num[0, 1] * y[0]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def shown(num, mem, turn, dq, q, v, y):
     """(force mu N z [N], stored energy [J], irreversible part q - eps z of the slide [m])."""
     return num[0, 1] * y[0], 0.5 * num[0, 1] * num[0, 2] * y[0] * y[0], q - num[0, 2] * y[0]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def finish(num, mem, turn, dq, v, y):
     """Keep z, 0 at the kink; nan, as only the work tells what is dissipated."""
     mem[0, 0] = 0.0 if turn[0] * dq >= turn[1] * (1 - 1e-12) else y[0]

@@ -9,14 +9,14 @@ stretch [m] averaged with stiffness * yield slide, then the stretch (t,) of ever
 
 from math import exp, sqrt
 
-from ...compiled.inner import njit
-from ..flags_kernels import FAST, LEAN, middle
+from ...compiled.jit import njit
+from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT, middle
 
 __all__ = ["at_end", "closed", "commit", "mean", "middle", "press_springs", "pulled", "spring_end", "spring_mean",
            "spring_step", "state"]
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def pulled(start, move, most):
     """(end, integral of the stretch over the move, elastic part of the move) of a spring that slips at +-most; all [m].
 
@@ -29,7 +29,7 @@ def pulled(start, move, most):
     return end, elastic * (start + end) * 0.5 + rest * end, elastic
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def mean(num, mem, e, q, dq, eps, dt):
     """Path-mean force [N] of elastic-plastic elements over an increment dq [m], and its slope over dq [N/m].
 
@@ -50,7 +50,7 @@ def mean(num, mem, e, q, dq, eps, dt):
     return force / dq, 0.5 * slope / dq / dq
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def closed(num, mem, e, free, beta):
     """(dq [m], path-mean force [N], whether it is) of a step dq = free - beta force of one element alone: no iteration.
 
@@ -73,7 +73,7 @@ def closed(num, mem, e, free, beta):
     return way * dq, way * stiffness * (most - 0.5 * left * left / dq), True
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def commit(num, mem, e, dq, force, v0, v1, dt, eps):
     """Move the elements over the increment dq [m]; returns the energy that they dissipate [J], limit times slip of
     each."""
@@ -93,7 +93,7 @@ def commit(num, mem, e, dq, force, v0, v1, dt, eps):
     return lost
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def at_end(num, e, before, speed, travel):
     """(force [N], its slope over the speed [N s/m], over the travel [N/m]) of a single element after a slide `travel`
     [m] from the force `before` [N]."""
@@ -101,20 +101,20 @@ def at_end(num, e, before, speed, travel):
     return num[e, 2] * end, 0.0, num[e, 2] if elastic == travel else 0.0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def state(num, mem, e, q, v):
     """(force [N], stored energy [J], irreversible part of the slide [m]) of a contact as it stands at the slide q
     [m]."""
     return mem[e, 0], mem[e, 1], q - mem[e, 2]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def press_springs(y, springs, sigma):
     """(traction/mu, springs) of one point under another load (twin: `ElasticPlastic.press`)."""
     return min(max(y, -sigma), sigma), max(springs, sigma) if sigma > 0 else 0.0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def spring_mean(y, springs, sigma, dq, length):
     """(path-mean traction/mu [N], its slope [N/m]) of one point under the load `sigma` over a slide dq [m]."""
     rate = springs / length
@@ -125,14 +125,14 @@ def spring_mean(y, springs, sigma, dq, length):
     return area / (rate * dq), 0.5 * rate * part * part
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def spring_end(y, springs, sigma, dq, length):
     """(traction/mu [N], slope [N/m]) of one point at the end of the slide dq [m]."""
     end, _, elastic = pulled(y, springs / length * dq, sigma)
     return end, springs / length if elastic == springs / length * dq else 0.0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def spring_step(y, springs, sigma, dq, length):
     """(traction/mu, springs) of one point after the slide dq [m] under the load `sigma`: those beyond it break."""
     move = springs * dq / length

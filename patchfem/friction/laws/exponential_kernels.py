@@ -1,12 +1,12 @@
 """An exponential that a compiler can take for several cases at once. Twin: `math.exp`."""
 
-from ...compiled.inner import njit
-from ..flags_kernels import FAST, LEAN
+from ...compiled.jit import njit
+from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 
 MOST = 36.0  # argument from which 1 - exp(-y) is 1 to the last bit
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def decay(y):
     """exp(-y) to 2e-13 for y from -1 on, beyond MOST its value there, by the 16th power of twelve terms of its series
     in pairs, so that few wait for each other."""

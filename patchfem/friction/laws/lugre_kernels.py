@@ -6,9 +6,21 @@ constant speed of a step z relaxes towards +-g/stiffness over that length of pat
 
 from math import inf, nan
 
-from ...compiled.inner import njit
+from ...compiled.jit import njit
 from ..bonds.point_kernels import shape
-from ..flags_kernels import BENDS, FAST, FOLLOWS, LAYERS, LEAN, SET_VALUED, after, closed, gives, layer, middle
+from ..flags_kernels import (
+    BENDS,
+    FASTMATH_FLAGS,
+    FOLLOWS,
+    LAYERS,
+    NJIT_NO_REFCOUNT,
+    SET_VALUED,
+    after,
+    closed,
+    gives,
+    layer,
+    middle,
+)
 from .exponential_kernels import decay
 
 __all__ = ["BENDS", "FOLLOWS", "LAYERS", "SET_VALUED", "after", "begin", "closed", "commit", "finish", "flow",
@@ -20,13 +32,13 @@ FADED = 6.0  # times v_s: beyond it the limit is the kinetic one to the last dig
 TRACE = 1e-9  # least limit over the static one: z relaxes over limit/stiffness, which must not be 0
 
 
-@njit(error_model="numpy", forceinline=True, **LEAN)
+@njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def numbers(num, e):
     """Numbers of a contact as `flowing` takes them."""
     return num[e, 1], num[e, 2], num[e, 3], num[e, 4], num[e, 5], num[e, 6]
 
 
-@njit(error_model="numpy", forceinline=True, **LEAN)
+@njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
 def reach(k, v):
     """(length g/stiffness [m] over which z relaxes, its slope over v [s]) at a speed v [m/s]; where no friction is left
     at speed, a trace of the length at rest; k: numbers of the law."""
@@ -35,7 +47,7 @@ def reach(k, v):
     return max(k[1] + more, TRACE * k[2]) / k[0], -2 * ratio / k[3] * more / k[0]
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def flowing(k, z, v, way):
     """(force [N] at a stretch z [m] and a speed v [m/s], slope of the stretch over the slide in the direction `way`,
     slopes of the force over stretch [N/m] and speed [N s/m])."""
@@ -45,7 +57,7 @@ def flowing(k, z, v, way):
         k[4] * (gain + way * z * v * bend / (length * length)) + k[5]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def relaxed(num, e, z, dq, dt):
     """(z after a slide dq in dt, its path mean, slopes of both over dq, slopes of the first over z and dt); a jump in
     no time has the kinetic length."""
@@ -68,7 +80,7 @@ def relaxed(num, e, z, dq, dt):
     return after, mean, way * slope_after, way * slope_mean, kept, by_time
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def mean(num, mem, e, q, dq, eps, dt):
     """Path-mean force [N] of the LuGre law over an increment dq [m] in dt [s], and its slope over dq [N/m].
 
@@ -82,7 +94,7 @@ def mean(num, mem, e, q, dq, eps, dt):
     return force, slope
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit(num, mem, e, dq, force, v0, v1, dt, eps):
     """Move z over the increment dq [m] in dt [s]; returns the energy dissipated [J], force times dq less the gain in
     store."""
@@ -91,41 +103,41 @@ def commit(num, mem, e, dq, force, v0, v1, dt, eps):
     return force * dq - 0.5 * num[e, 1] * (mem[e, 0] * mem[e, 0] - z * z)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def pull(num, e, z, v):
     """(force [N] at a stretch z [m] and a speed v [m/s], its slopes over z [N/m] and v [N s/m])."""
     force, _, by_stretch, by_speed = flowing(numbers(num, e), z, v, 1.0 if v > 0 else -1.0)
     return force, by_stretch, by_speed
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def state(num, mem, e, q, v):
     """(force at the speed v [m/s] [N], stored energy [J], irreversible part q - z of the slide [m])."""
     z = mem[e, 0]
     return pull(num, e, z, v)[0], 0.5 * num[e, 1] * z * z, q - z
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def flow(num, e, z, dq, dt):
     """(z [m] after a slide dq [m] in dt [s] from the stretch z [m], its slopes over z, dq [1] and dt [m/s])."""
     after, _, by_slide, _, kept, by_time = relaxed(num, e, z, dq, dt)
     return after, kept, by_slide, by_time
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def knee(num):
     """Speed [m/s] below which the limit rises: no step from beyond it sees the rise inside itself."""
     return FADED * num[0, 4] if num[0, 3] > num[0, 2] else 0.0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def begin(num, mem, way, y):
     """Set the rate state z [m] of a motion that begins; the path [m] to the next kink is infinite."""
     y[0] = mem[0, 0]
     return inf
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def rate(num, mem, turn, dq, v, y, out):
     """Force [N] at the speed v [m/s] in the direction turn[0]; writes z' [m/s] into out."""
     force, gain, _, _ = flowing(numbers(num, 0), y[0], v, turn[0])
@@ -133,13 +145,13 @@ def rate(num, mem, turn, dq, v, y, out):
     return force
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def shown(num, mem, turn, dq, q, v, y):
     """(force at the speed v [m/s] [N], stored energy [J], irreversible part q - z of the slide [m])."""
     return pull(num, 0, y[0], v)[0], 0.5 * num[0, 1] * y[0] * y[0], q - y[0]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def finish(num, mem, turn, dq, v, y):
     """Keep z; nan, as only the work tells what is dissipated."""
     mem[0, 0] = y[0]

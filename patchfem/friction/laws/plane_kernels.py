@@ -9,13 +9,13 @@ Pressure Vessel Technol. 99, 510, 1977, for metals that yield). Of motions along
 
 from math import atan, exp, expm1, log1p, sqrt
 
-from ...compiled.inner import njit
-from ..flags_kernels import LEAN
+from ...compiled.jit import njit
+from ..flags_kernels import NJIT_NO_REFCOUNT
 
 TURNS = 100  # of Newton's method before a step counts as failed
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def along(k, m, sx, sy, dx, dy):
     """(path-mean force (2) [N], its slopes xx, xy, yx, yy over the slide [N/m], stretch at the end (2) [m], energy
     dissipated [J]) of a straight slide (dx, dy) [m] from the stretch (sx, sy) [m]; k [N/m], m [m] as in the head."""
@@ -51,7 +51,7 @@ def along(k, m, sx, sy, dx, dy):
             eu * ux - ew * uy, eu * uy + ew * ux, k * lost)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def solve(gx, gy, xx, xy, yy, k, m, sx, sy, dx, dy, goal):
     """(slide (2) [m], path-mean force (2) [N], iterations) of a step with slide = free slide (gx, gy) - give force.
 
@@ -80,7 +80,7 @@ def solve(gx, gy, xx, xy, yy, k, m, sx, sy, dx, dy, goal):
     return dx, dy, fx, fy, -TURNS
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit(num, mem, e, f, dx, dy):
     """Move the memories of elements e and f, the two directions of one, over the slide (dx, dy) [m]; energy dissipated
     [J]. That of e holds the energy stored in both."""

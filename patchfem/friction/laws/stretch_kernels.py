@@ -9,9 +9,9 @@ exponentials of the slide, and (eps, m, z, s2) where it grows.
 
 from math import exp, expm1, inf, nan
 
-from ...compiled.inner import njit
+from ...compiled.jit import njit
 from ..bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step
-from ..flags_kernels import BENDS, FAST, LAYERS, LEAN, SET_VALUED, closed, gives, layer
+from ..flags_kernels import BENDS, FASTMATH_FLAGS, LAYERS, NJIT_NO_REFCOUNT, SET_VALUED, closed, gives, layer
 from .exponential_kernels import decay
 
 __all__ = ["BENDS", "LAYERS", "SET_VALUED", "after", "begin", "closed", "commit", "finish", "flow", "flowing", "gives",
@@ -22,14 +22,14 @@ FREE = 7  # of num: share of the bond length that stretches without damage
 UNITS, FOLLOWS = "N/m m", True  # of the numbers k of the law in lanes; as of `flags_kernels`
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def middle(num, mem, e, v, dt):
     """Bond length [m] in the middle of a step of dt [s] at the speed v [m/s] (eq. 2.10), which the solve of the step
     uses."""
     return grow(mem[e, 0], v, v, abs(v) * dt / 2, dt / 2, num[e, GROWTH:WEIGHT])[0]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def mean(num, mem, e, q, dq, eps, dt):
     """Path-mean force [N] of eq. 2.17 (stretch, p = 1) over an increment dq [m], and its slope over dq [N/m]; 10 ns.
 
@@ -42,7 +42,7 @@ def mean(num, mem, e, q, dq, eps, dt):
     return num[e, WEIGHT] * force, num[e, WEIGHT] * slope
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit(num, mem, e, dq, force, v0, v1, dt, eps):
     """Move the bonds over the increment dq [m] and let them grow; returns the energy that they dissipate [J].
 
@@ -58,7 +58,7 @@ def commit(num, mem, e, dq, force, v0, v1, dt, eps):
     return num[e, WEIGHT] * lost / 2
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def flow(num, e, z, dq, dt):
     """(stretch z [m] of full-grown bonds after a slide dq [m], its slopes over z, dq [1] and dt [m/s]), for harmonic
     balance.
@@ -72,14 +72,14 @@ def flow(num, e, z, dq, dt):
     return z * kept - end * expm1(-abs(dq) / length), kept, (1 - z / end) * kept, 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def flowing(k, z, v, way):
     """(force [N] of full-grown bonds of a constant length stretched by z [m], slope of the stretch over the slide in
     the direction `way`, slopes of the force over stretch [N/m] and speed, 0); k: mu_s N/eps [N/m] and eps [m]."""
     return k[0] * z, 1 - way * z / k[1], k[0], 0.0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def after(k, z, square, dx, way):
     """(stretch [m], mean square of the stretches [m2] of these bonds, work of their force [J]) after a slide dx [m] in
     the direction `way`: they relax towards way eps over the path eps."""
@@ -89,13 +89,13 @@ def after(k, z, square, dx, way):
         k[0] * end * (dx + rest * (1 - kept))
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def pull(num, e, z, v):
     """(force [N] of full-grown bonds stretched by z [m], its slopes over z [N/m] and over the speed, 0)."""
     return num[e, WEIGHT] * z, num[e, WEIGHT], 0.0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def state(num, mem, e, q, v):
     """(force [N], stored energy [J], irreversible part of the slide [m]) of a contact as it stands at the slide q [m].
 
@@ -105,13 +105,13 @@ def state(num, mem, e, q, v):
     return weight * z, 0.5 * weight * mem[e, 3], mem[e, 4] - z / m if weight * m > 0 else q
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def knee(num):
     """Speed [m/s] at which the rates of eq. 2.10 have a kink, the floor v_h; 0 where bonds do not grow."""
     return num[0, GROWTH + 2] if num[0, GROWTH] >= 0 else 0.0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def begin(num, mem, way, y):
     """Set the rate states y of a motion that begins in the direction `way`; returns the path [m] to the next kink.
 
@@ -125,8 +125,8 @@ def begin(num, mem, way, y):
     return ahead if ahead > 0 else inf
 
 
-@njit(error_model="numpy", **LEAN)
-def slid(num, mem, turn, dq):
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def slip_path(num, mem, turn, dq):
     """(m, z [m]) after a slide dq [m] in one direction at a constant bond length, from the memory; turn as in
     `rate`."""
     m, z, way, eps = mem[0, 1], mem[0, 2], turn[0], mem[0, 0]
@@ -138,7 +138,7 @@ def slid(num, mem, turn, dq):
     return m + (1 - m) * broken, z * kept + way * eps * (broken - (1 - m) * x * kept)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def rate(num, mem, turn, dq, v, y, out):
     """Force [N] after a slide dq [m] since `begin`, at the speed v [m/s]; writes the rates of y into out (eq. 2.10).
 
@@ -146,7 +146,7 @@ def rate(num, mem, turn, dq, v, y, out):
     """
     weight = num[0, WEIGHT]
     if y.size == 0:
-        return weight * slid(num, mem, turn, dq)[1]
+        return weight * slip_path(num, mem, turn, dq)[1]
     eps, m, z, s2 = y[0], y[1], y[2], y[3]
     speed = turn[0] * v
     floor = num[0, GROWTH + 2]
@@ -159,21 +159,21 @@ def rate(num, mem, turn, dq, v, y, out):
     return weight * z
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def shown(num, mem, turn, dq, q, v, y):
     """(force [N], stored energy [J], irreversible part of the slide q [m]) after a slide dq [m] since `begin`."""
     weight = num[0, WEIGHT]
     if y.size > 0:
         m, z, s2 = y[1], y[2], y[3]
     elif turn[1] < inf:
-        m, z = slid(num, mem, turn, dq)
+        m, z = slip_path(num, mem, turn, dq)
         s2 = mem[0, 3] + dq * (mem[0, 2] + z)
     else:
         m, z, s2, _ = bond_step(mem[0, 1], mem[0, 2], mem[0, 3], dq, 1.0, mem[0, 0])
     return weight * z, 0.5 * weight * s2, q - z / m if weight * m > 0 else q
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def finish(num, mem, turn, dq, v, y):
     """Move the memory over the slide dq [m] since `begin`; returns the energy dissipated [J], or nan where only the
     work tells."""

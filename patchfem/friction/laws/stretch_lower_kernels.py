@@ -8,15 +8,15 @@ mean of the pressures at the ends of its way; where none is left the bonds are l
 
 import numpy as np
 
-from ...compiled.inner import njit
+from ...compiled.jit import njit
 from ..bonds.point_kernels import bond_mean, bond_step, grow, loose_mean, loose_step
-from ..flags_kernels import FAST, LEAN
+from ..flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
 from .stretch_kernels import FREE, GROWTH, WEIGHT, closed, middle
 
 __all__ = ["closed", "commit", "mean", "middle", "state"]
 
 
-@njit(error_model="numpy", fastmath=FAST, **LEAN)
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def points(num, mem, e):
     """(weights mu_s area/eps_0 (m,) [m], pressures (m,) [Pa], bonds 5 x (m,)) of element e, as views of its numbers."""
     m, row = int(num[e, 1]), mem[e]
@@ -25,7 +25,7 @@ def points(num, mem, e):
     return num[e, WEIGHT:WEIGHT + m], num[e, WEIGHT + m:WEIGHT + 2 * m], bonds
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def pressure_at(place, x, sigma):
     """Pressure [Pa] of the pattern sigma (m,) on x (m,) at one place, linear between nodes, 0 outside."""
     if place < x[0] or place > x[-1]:
@@ -35,7 +35,7 @@ def pressure_at(place, x, sigma):
     return (1 - part) * sigma[j] + part * sigma[j + 1]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def pattern(num, e):
     """(places of the points (m,) [m], pressures they come to (m,) [Pa], places (p,) [m], pressures (p,) [Pa] of the
     pattern)."""
@@ -45,7 +45,7 @@ def pattern(num, e):
     return num[e, at:at + m], num[e, at + m:x], num[e, x:x + p], num[e, x + p:x + 2 * p]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def mean(num, mem, e, q, dq, eps, dt):
     """Path-mean force [N] over an increment dq [m] from the slide q [m], and its slope over dq [N/m] at fixed
     pressures.
@@ -68,7 +68,7 @@ def mean(num, mem, e, q, dq, eps, dt):
     return force, slope
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit(num, mem, e, dq, force, v0, v1, dt, eps):
     """Move the bonds under the pressures of the last `mean`; returns the energy that they dissipate or lose [J].
 
@@ -93,7 +93,7 @@ def commit(num, mem, e, dq, force, v0, v1, dt, eps):
     return lost
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def state(num, mem, e, q, v):
     """(force [N], stored energy [J], irreversible part of the slide [m]) of a contact as it stands at the slide q [m].
 

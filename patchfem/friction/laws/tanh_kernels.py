@@ -6,12 +6,12 @@ limit and 1/v_0.
 
 from math import inf, nan, tanh
 
-from ...compiled.inner import njit
+from ...compiled.jit import njit
 from ..flags_kernels import (
     BENDS,
-    FAST,
+    FASTMATH_FLAGS,
     FOLLOWS,
-    LEAN,
+    NJIT_NO_REFCOUNT,
     SET_VALUED,
     after,
     closed,
@@ -29,7 +29,7 @@ REACH = 5.0  # times v_0, to which the layer of the speed is taken
 SHARP, FINE = 20.0, 0.25  # times v_0 and the step, by which the speed may change in one within the layer; times v_0
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def hyperbolic(y):
     """tanh(y) to 2e-13, beyond SATURATED its value there: y times a ratio of polynomials of y^2, fitted for the least
     largest error, its terms in pairs, so that few wait for each other: half as long as by an exponential. No branch,
@@ -47,72 +47,72 @@ def hyperbolic(y):
     return w * over / under
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def flowing(k, z, v, way):
     """(force, slope 0 of a stretch, that there is not, over the slide, slopes of the force over stretch and speed)."""
     part = hyperbolic(v * k[1])
     return k[0] * part, 0.0, 0.0, k[0] * k[1] * (1 - part) * (1 + part)
 
 
-@njit(error_model="numpy", forceinline=True, fastmath=FAST, **LEAN)
+@njit(error_model="numpy", forceinline=True, fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
 def layer(k, h):
     """(force beyond the layer of speeds in which tanh is not +-1, the speed to which it is taken, the change of the
     speed in a part of a step h that follows it: the finer the step, the less)."""
     return k[0], REACH / k[1], max(SHARP * h, FINE) / k[1]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def creep(speed, limit, reference):
     """(force [N], slope over the speed [N s/m]) of eq. 2.4 at a speed [m/s]; limit [N], reference: v_0 [m/s]."""
     part = tanh(speed / reference)
     return limit * part, limit * (1 - part) * (1 + part) / reference
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def mean(num, mem, e, q, dq, eps, dt):
     """Path-mean force [N] of eq. 2.4 at the mean speed of a step dq [m] in dt > 0 [s], and its slope over dq [N/m]."""
     force, slope = creep(dq / dt, num[e, 1], num[e, 2])
     return force, slope / dt
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def commit(num, mem, e, dq, force, v0, v1, dt, eps):
     """Energy dissipated [J] over the increment dq [m]: all work of the force [N]; there is no memory to move."""
     return force * dq
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def at_end(num, e, before, speed, travel):
     """(force [N], its slope over the speed [N s/m], over the travel [N/m]) at a speed [m/s]."""
     force, slope = creep(speed, num[e, 1], num[e, 2])
     return force, slope, 0.0
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def state(num, mem, e, q, v):
     """(force at the speed v [m/s] [N], stored energy 0 [J], irreversible part of the slide [m], all of q)."""
     return creep(v, num[e, 1], num[e, 2])[0], 0.0, q
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def begin(num, mem, way, y):
     """Nothing to set; the path [m] to the next kink is infinite."""
     return inf
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def rate(num, mem, turn, dq, v, y, out):
     """Force [N] of eq. 2.4 at the speed v [m/s]; there are no states."""
     return creep(v, num[0, 1], num[0, 2])[0]
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def shown(num, mem, turn, dq, q, v, y):
     """(force at the speed v [m/s] [N], stored energy 0 [J], irreversible part of the slide [m], all of q)."""
     return creep(v, num[0, 1], num[0, 2])[0], 0.0, q
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def finish(num, mem, turn, dq, v, y):
     """There is no memory; nan, as only the work tells what is dissipated."""
     return nan

@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...core import PatchfemError
-from ...effects import has, module_of, unbuilt
+from ...effects import has, module_of, not_supported_message
 
 ALIKE = 1e-9  # relative difference of the limits forward and backward that counts as none
 
@@ -33,7 +33,7 @@ def limit_share(model, patch) -> float:
     weight, sigma = patch.pieces.interface.weight, patch.pressure.sigma_n
     forward, back = _law().limits(patch.x, sigma, weight, f.bond_length, f.order)
     if abs(forward - back) > ALIKE * max(forward, back):
-        raise PatchfemError(unbuilt(
+        raise PatchfemError(not_supported_message(
             f"law '{f.law}' with a pressure that is not symmetric (slip force {forward * f.static:.6g} N forward, "
             f"{back * f.static:.6g} N back)", "make the patch symmetric, or prescribe "
                                               "the slide with a table [slide]"), "friction.law")

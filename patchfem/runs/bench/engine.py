@@ -9,7 +9,7 @@ from math import ceil
 
 import numpy as np
 
-from ... import rates
+from ... import cost_model
 from ...core import Missing
 from ...dynamics.march import capacity
 from ...effects import has, listed
@@ -61,15 +61,15 @@ def bench_engine(model, slide, points: int = 1, choice: "bond_engines.Choice | N
         varies = model.grooves is not None or pressure_changes(model)
         if model.grooves is None and (listed(f) or engine_named(model) not in ("auto", "recursion")):
             return _summed(model, slide, points, choice or sum_of(model, slide), points)
-        return BenchEngine(POINTS, rates.behind_modes(points, modes, varies))
+        return BenchEngine(POINTS, cost_model.behind_modes(points, modes, varies))
     if soft:
-        return BenchEngine(ELEMENTS, rates.SLIP_NODE * points + rates.SAMPLE)
+        return BenchEngine(ELEMENTS, cost_model.SLIP_NODE * points + cost_model.SAMPLE)
     if pressure_changes(model) and model.grooves is None:
         return _stepped(model, slide, points)
     if has(f.law, "memoryless"):
-        return BenchEngine(CLOSED, rates.SAMPLE)
+        return BenchEngine(CLOSED, cost_model.SAMPLE)
     if not has(f.law, "bonds"):
-        return BenchEngine(ELEMENTS, rates.SAMPLE)
+        return BenchEngine(ELEMENTS, cost_model.SAMPLE)
     return _summed(model, slide, points, choice or sum_of(model, slide))
 
 
@@ -129,7 +129,7 @@ def _summed(model, slide, points: int, found: "bond_engines.Choice", lists: int 
     """The engine of a sum over bonds; lists: of them, one a point behind shear modes."""
     law = model.bonds
     if found.engine == "recursion":
-        return BenchEngine(RECURSION, rates.RECURSION, found)
+        return BenchEngine(RECURSION, cost_model.RECURSION, found)
     if law.breakaway and lists == 1:  # a list has no elastic range
         return _stepped(model, slide, points)
     size = slide.size
@@ -150,11 +150,11 @@ def _stepped_seconds(model, slide, points: int) -> float:
     """Seconds of a step in NumPy: laws of the last increment, or a sum over the strips of the path."""
     f = model.friction
     if not listed(f):
-        return rates.LAW_STEP
+        return cost_model.LAW_STEP
     moved = max(float(np.abs(np.diff(slide)).mean()), 1e-300)
     strips = min(slide.size / 2, 40 * f.bond_length / moved + 64)
-    return (3 if model.load_varies else 1) * (rates.PATH_STEP + rates.PATH_STRIP * strips
-                                               + rates.PATH_POINT * strips * points)
+    return (3 if model.load_varies else 1) * (cost_model.PATH_STEP + cost_model.PATH_STRIP * strips
+                                               + cost_model.PATH_POINT * strips * points)
 
 
 def slips_by_elements(model) -> bool:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...effects import has, listed
-from ...response.coarser import Coarser, coarser_space, estimate, left_open
+from ...response.coarser import CoarserRuns, coarser_space, estimate, left_open
 from ...response.errors import FrictionScale, convergence_errors, finer_errors, friction_errors, step_errors
 from ...slip import shear_modes
 from . import bench, rigid, shear
@@ -56,7 +56,7 @@ def ladder_of(model, patches: list, fine, steps: int) -> list:
     half, few = Pass(max(4, steps // 8 * 4), 0, choice), Pass(max(4, steps // 16 * 4), 0, choice)
     # elements follow any path exactly, so samples of it change harmonics alone
     rule = convergence_errors if slips_by_elements(model) else partial(step_errors, steps=steps)
-    out, meshed, patch = [Coarser((half, few), rule, of="steps")], len(patches) > 1, patches[0]
+    out, meshed, patch = [CoarserRuns((half, few), rule, of="steps")], len(patches) > 1, patches[0]
     if meshed and slips_by_elements(model):
         length = model.friction.bond_length
         same = model.slide.steps(MESH_TOL, model.accuracy.steps_per_cycle, length)
@@ -70,7 +70,7 @@ def ladder_of(model, patches: list, fine, steps: int) -> list:
         out.append(rigid.coarser_cells(few))
     if fine.engine.kind in (LIST, LISTS) and choice.merge > 0:
         narrow = few._replace(choice=replace(choice, merge=FINER * choice.merge))
-        out.append(Coarser((narrow,), finer_errors, few, "bonds"))
+        out.append(CoarserRuns((narrow,), finer_errors, few, "bonds"))
     return out
 
 

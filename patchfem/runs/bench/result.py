@@ -6,10 +6,10 @@ import numpy as np
 
 from ...core import Outcome
 from ...effects import has
+from ...formatting import short
 from ...response.errors import with_errors
 from ...response.outcome import OPEN_LOOP
 from ...response.rows import judged
-from ...scales import short
 from ..results.notes import climbing_as_one, of_growth, unbounded_bonds, unripe, warming, work_check_warning
 from ..results.result import FRAMES, Result, frames_of, on_a_mesh_of_known_error, without_errors
 from ..results.travel import FAR, largest_slide, outcome_on_piece, travelled

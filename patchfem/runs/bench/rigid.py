@@ -16,7 +16,7 @@ from ...dynamics.march.models import ContactModel, element_model, list_model, po
 from ...effects import has
 from ...friction.laws.elastic_plastic import parallel
 from ...friction.record import law_from
-from ...response.coarser import Coarser
+from ...response.coarser import CoarserRuns
 from ...response.errors import merged_cell_errors
 from .engine import ELEMENTS, BenchEngine
 from .follow import follow_path
@@ -76,8 +76,8 @@ def one_point(model, load: float, engine: BenchEngine, springs=None) -> ContactM
     return list_model(law, f.static * load, found.reach(law.order), found.merge)
 
 
-def coarser_cells(few) -> Coarser:
+def coarser_cells(few) -> CoarserRuns:
     """The passes of a bench in which each four cells of a density of sliders are one; few: variant of `errors` beside
     them."""
     runs = tuple(few._replace(springs=partial(cells_joined, *one)) for one in JOINED)
-    return Coarser(runs, merged_cell_errors, few, "cells")
+    return CoarserRuns(runs, merged_cell_errors, few, "cells")

@@ -7,7 +7,7 @@ from ...core import NotConverged
 from ...dynamics.march.models import jenkins_model, lists_model, points_model, under_the_lower
 from ...effects import has
 from ...friction.record import law_from
-from ...response.coarser import Coarser
+from ...response.coarser import CoarserRuns
 from ...response.errors import GAPS, change, convergence_errors
 from ...slip.fields import element_fields, point_fields, shear_of
 from ..patch.jenkins_elements import elements
@@ -125,13 +125,13 @@ def lists_of(patch, law, shear, found, force=None):
     return lists_model(law, law.static * force, sigma, shear, found.reach(law.order), found.merge)
 
 
-def coarser_elements(count: int, few) -> Coarser:
+def coarser_elements(count: int, few) -> CoarserRuns:
     """Return the coarser meshes of a bench of elements.
 
     count: number of coarser meshes; few: the variant of `errors` that they are compared with.
     """
     runs = tuple(few._replace(level=level) for level in range(1, count + 1))
-    return Coarser(runs, mesh_errors, few, "mesh")
+    return CoarserRuns(runs, mesh_errors, few, "mesh")
 
 
 def mesh_errors(*values: dict) -> dict:

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contact.active_set import Ask
-from ...contact.fine.products import Products, ends_of, smooth_modes, stiffness_of
-from ...contact.fine.strip import end_effect, strip_compliance
+from ...contact.active_set import ContactProblem
 from ...contact.gradients import gradients
+from ...contact.half_space.products import Products, ends_of, smooth_modes, stiffness_of
+from ...contact.half_space.strip import end_effect, strip_compliance
 from ...core import NotConverged
 from ...elasticity.elasticity import assemble
 from ...elasticity.lapack import one_thread
@@ -184,7 +184,7 @@ def _pressed(asked, normal: Products, gap, start) -> tuple:
     low = gap.min() if asked.approach is None else asked.approach
     moment = None if asked.approach is not None else asked.moment
     load = asked.load if asked.approach is None else None
-    force, count = gradients(normal, Ask(x, gap - low, load, moment, asked.spring), CONTACT_TOL, MAX_ITERATIONS, begin)
+    force, count = gradients(normal, ContactProblem(x, gap - low, load, moment, asked.spring), CONTACT_TOL, MAX_ITERATIONS, begin)
     touches = force > 0
     if asked.approach is not None or not touches.any():
         return force, float(low), 0.0, count

@@ -4,7 +4,7 @@ from dataclasses import replace
 from math import sqrt
 from typing import NamedTuple
 
-from ... import rates
+from ... import cost_model
 from ...core import say
 from ...elasticity.grid_fronts import predicted_bytes
 from ...mesh.nested import finer, plan_of
@@ -104,11 +104,11 @@ def pressing_cost(asked, tolerance: float) -> Cost:
     of the finest grid, was measured over random patches.
     """
     found = expected_grids(asked, tolerance)
-    per_second = rates.OUTLINED if found.outlined else rates.CONDENSED
-    times = {"pressing": rates.PRESSED - rates.FIELDS, "condensing": per_second * found.seconds, "fields": rates.FIELDS}
+    per_second = cost_model.OUTLINED if found.outlined else cost_model.CONDENSED
+    times = {"pressing": cost_model.PRESSED - cost_model.FIELDS, "condensing": per_second * found.seconds, "fields": cost_model.FIELDS}
     size = PACKAGES + (OUTLINED_NODE * found.nodes if found.outlined else CONDENSED * found.bytes)
     if not asked.still:
-        times["fields"] += rates.MOVING + rates.MOVING_NODE * found.nodes
+        times["fields"] += cost_model.MOVING + cost_model.MOVING_NODE * found.nodes
         size += FRAMES_NODE * found.nodes
     sizes = {"interface_points": found.points, "elastic_unknowns_about": int(2 * found.nodes)}
     return Cost(times, (MemoryPart(size, "pieces"),), sizes=sizes)

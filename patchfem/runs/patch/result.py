@@ -6,12 +6,12 @@ from dataclasses import replace
 import numpy as np
 
 from ...core import Outcome, say
+from ...formatting import short
 from ...mesh import recognise
 from ...mesh.nested import plan_of
 from ...mesh.tensor import TensorGrid
 from ...model.pieces import bodies_of
 from ...model.source import placed
-from ...scales import short
 from ...surface import nodes
 from ..results.patch_rows import TABLE
 from ..results.result import Result, at_rest

@@ -9,8 +9,8 @@ from ...contact import skin_laws
 from ...contact.edges import BEARING
 from ...contact.strips import press_strips
 from ...core import Compliance, PatchfemError, Pressure, frozen_array, say
+from ...formatting import short
 from ...model import peaks as traces
-from ...scales import short
 from ...surface.roughness import peaks
 
 

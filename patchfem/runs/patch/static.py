@@ -1,6 +1,6 @@
 """Static measures of many patches on the condensed pieces that they share, as `measures` gives them one by one.
 
-It takes bare pieces, or pieces behind a linear skin, under a load: contacts of one stretch (`contact.many`). What
+It takes bare pieces, or pieces behind a linear skin, under a load: contacts of one stretch (`contact.batch`). What
 presses otherwise is left to single runs.
 """
 
@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contact.many.intervals import SOLVED, Intervals, Pressed
+from ...contact.batch.intervals import SOLVED, Intervals, Pressed
 from ...core import Measure, Outcome, Pressure, frozen_array
 from ...elasticity.lapack import one_thread
 from ...mesh.tensor import TensorGrid

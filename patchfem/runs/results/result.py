@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from ...core import Outcome
+from ...formatting import tidied
 from ...response import rows
-from ...scales import tidied
 from . import patch_rows
 
 FRAMES = 16  # of the interface, in the last cycle

@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ... import compiled, rates
+from ... import compiled, cost_model
 from ...core import Missing
-from ...dynamics import resume
+from ...dynamics import checkpoint
 from ...dynamics.events import cost as events_cost
-from ...dynamics.events import plant
+from ...dynamics.events import modal_system
 from ...effects import has
 from ...friction import record
 from ...friction.bonds import engines
@@ -126,7 +126,7 @@ def pieces_per_cycle(model: Model) -> float:
 def ringing_and_events(model: Model) -> tuple:
     """Pieces per cycle of a motion whose elements hold all the time, and those of every event and row."""
     modes, drive = model.rig.modes, model.rig.drive
-    (count, stiff), made = expected_elements(model), plant.plant_of(modes)
+    (count, stiff), made = expected_elements(model), modal_system.plant_of(modes)
     faces, damping = len(made.faces), made.damping_most
     rate = damping / 2 + sqrt(damping**2 / 4 + made.square_most + stiff * max(made.reach, default=0.0))
     rows = 0 if drive.segments else len(drive.breaks) / model.rig.cycles
@@ -148,14 +148,14 @@ def _jumps(model: Model) -> float:
 
 def seconds_of_pieces(model: Model) -> float:
     """Seconds of a run from event to event at most, by which its engine is chosen: all holds all the time."""
-    cycles, each = model.rig.cycles, rates.MOST_PIECE + _of_size(model)
-    return (each * cycles + rates.READ_PIECE * min(cycles, 10.0)) * pieces_per_cycle(model)
+    cycles, each = model.rig.cycles, cost_model.MOST_PIECE + _of_size(model)
+    return (each * cycles + cost_model.READ_PIECE * min(cycles, 10.0)) * pieces_per_cycle(model)
 
 
 def _of_size(model: Model) -> float:
     """Seconds of a piece of several modes and interfaces besides that of one."""
     modes = model.rig.modes
-    return rates.PIECE_MODE * (modes.omega.size - 1) + rates.PIECE_FACE * max(0, len(modes.interfaces) - 1)
+    return cost_model.PIECE_MODE * (modes.omega.size - 1) + cost_model.PIECE_FACE * max(0, len(modes.interfaces) - 1)
 
 
 def expected_seconds(model: Model) -> float:
@@ -166,14 +166,14 @@ def expected_seconds(model: Model) -> float:
     push = rig.force or rig.mass * largest(rig.drive)
     ringing, events = ringing_and_events(model)
     share = min(1.0, limit / push)**HELD if stiff and push else 1.0
-    return (rates.PIECE + _of_size(model) + rates.PIECE_ELEMENT * count) * (ringing * share + events) * rig.cycles
+    return (cost_model.PIECE + _of_size(model) + cost_model.PIECE_ELEMENT * count) * (ringing * share + events) * rig.cycles
 
 
 def seconds_of_steps(model: Model) -> float:
     """Estimated seconds of a march with the coarser runs of its error, which has none of the exactness."""
     count, many = expected_elements(model)[0], len(model.rig.interfaces)
-    step = rates.STEP + rates.STEP_ELEMENT * count
-    return 1.75 * model.rig.cycles * (rates.CYCLE + steps_per_cycle(model) * many * step)
+    step = cost_model.STEP + cost_model.STEP_ELEMENT * count
+    return 1.75 * model.rig.cycles * (cost_model.CYCLE + steps_per_cycle(model) * many * step)
 
 
 def dear_events(model: Model) -> str:
@@ -202,7 +202,7 @@ def refuse_endless(model: Model, numerics=None) -> None:
 def exact_cost(model: Model, numerics, points: int) -> Cost:
     """Return the cost of a run from event to event."""
     steps = int(pieces_per_cycle(model) * numerics.cycles)
-    times = {"motion": expected_seconds(model), "histories": rates.KEPT_EVENT_SAMPLE * kept_samples(numerics)}
+    times = {"motion": expected_seconds(model), "histories": cost_model.KEPT_EVENT_SAMPLE * kept_samples(numerics)}
     code = EVENT_CODE if model.rig.interfaces else LINEAR_CODE
     if _python_seconds(model) <= compiled.PATIENCE:
         # without machine code such a run takes 86 MB; with it 152 MB, because it loads the library of LLVM
@@ -238,7 +238,7 @@ def history_parts(model: Model, numerics, history: HistoryBytes) -> tuple[Memory
     width = 2.0 * len(rig.frequencies) + 12 + 6 * len(rig.interfaces)
     length_key = "drive.duration" if rig.waveform.is_random else "drive.cycles"
     key = "accuracy.steps_per_cycle" if model.accuracy.steps_per_cycle else length_key
-    turns = min(TURNS * rig.cycles, resume.MOST_KEPT)
+    turns = min(TURNS * rig.cycles, checkpoint.MOST_KEPT)
     early = history.cycle * rig.cycles + history.turn * width * turns
     return (MemoryPart(history.sample * width * samples, f"{samples:.0f} samples of the last cycles", key),
             MemoryPart(early, f"the histories of {rig.cycles:.3g} cycles", length_key))
@@ -319,6 +319,6 @@ def smooth_cost(model: Model, numerics, points: int) -> Cost:
     if sinusoidal(rig.drive) and (decay := slowest(rig.modes) * rig.drive.period) > 0:  # then it repeats
         cycles = min(cycles, 20 + REPEATS / decay)
     steps = 2 * cycles * smooth_steps(model, smooth_element(model))
-    times = {"motion": rates.SMOOTH + rates.SMOOTH_STEP * steps,
-             "histories": rates.KEPT_SAMPLE * kept_samples(numerics)}
+    times = {"motion": cost_model.SMOOTH + cost_model.SMOOTH_STEP * steps,
+             "histories": cost_model.KEPT_SAMPLE * kept_samples(numerics)}
     return Cost(times, history_parts(model, numerics, SMOOTH_HISTORY), (), int(steps)) + SMOOTH_CODE.cost()

@@ -1,7 +1,7 @@
 """Frequency and damping of a released rig over its amplitude, with the errors of its coarser runs and of its mesh.
 
 Where the nodes of a mesh and of a coarser one hold, their decays are alike, and both leave out the loss of micro-slip.
-So the error of the mesh is read off the static loops of its elements at the same amplitudes (`slip.grain`).
+So the error of the mesh is read off the static loops of its elements at the same amplitudes (`slip.mesh_correction`).
 """
 
 from dataclasses import replace
@@ -14,7 +14,7 @@ from ...dynamics.harmonic import forces, quasi_static
 from ...dynamics.march import models
 from ...response.decay_curve import FAINT, DecayCurve, curve_of, of_turns, turns
 from ...response.errors import MAX_ORDER, error_of_change
-from ...slip.grain import SPREAD_FACTOR, spread
+from ...slip.mesh_correction import SPREAD_FACTOR, spread
 from ..patch import faces
 from . import interface, numerics
 from .solution import Solution
@@ -107,7 +107,7 @@ def mesh_error(fine, rough, read) -> np.ndarray:
     """Return the error by the mesh of what read(Group) gives of a patch that slips part by part.
 
     It is the change by a coarser mesh at second order, and no less than what the elements change when they spread over
-    the yield slides between the nodes (`slip.grain`): a slide in which no node slips shows no change at all.
+    the yield slides between the nodes (`slip.mesh_correction`): a slide in which no node slips shows no change at all.
 
     Parameters
     ----------
@@ -125,7 +125,7 @@ def mesh_error(fine, rough, read) -> np.ndarray:
 
 
 def _spread(stiffness, slide) -> tuple:
-    """`slip.grain.spread` of elements in any order."""
+    """`slip.mesh_correction.spread` of elements in any order."""
     order = np.argsort(slide, kind="stable")
     return spread(stiffness[order], slide[order])
 
@@ -170,7 +170,7 @@ def left_by_mesh_on(amplitude, frequency: float, model, patch, coarse) -> tuple:
 def without_slip_between_nodes(whys: dict, ways) -> list:
     """Sentences on errors that leave out what `left_by_mesh` would add.
 
-    whys: reason, or "", by what has these errors; ways() -> the `Coarser` runs in space that are part of them.
+    whys: reason, or "", by what has these errors; ways() -> the `CoarserRuns` runs in space that are part of them.
     """
     out = []
     for why in dict.fromkeys(filter(None, whys.values())):

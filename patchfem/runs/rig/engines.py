@@ -16,7 +16,7 @@ import numpy as np
 from ...dynamics.events.elements import JOINED
 from ...effects import NO_WAVEFORM, has
 from ...model.model import Model
-from ...response.coarser import Coarser, coarser_space
+from ...response.coarser import CoarserRuns, coarser_space
 from ...response.errors import (
     FrictionScale,
     coarser_errors,
@@ -26,7 +26,7 @@ from ...response.errors import (
     step_errors,
 )
 from ...scene.rules import methods
-from ...scene.rules.draft import acts, pinned
+from ...scene.rules.scene_draft import acts, pinned
 from ...slip import shear_modes
 from ..patch import faces
 from .costs import dear_elements, dear_events, not_smooth, pieces_per_cycle
@@ -63,7 +63,7 @@ class Engine(NamedTuple):
     numerics), which raises Missing where a run would not end; cost: function(model, numerics, unknowns) -> (steps,
     seconds); words: function(model, numerics) -> sentences of a plan; notes: function(model, numerics, patch, Solution)
     -> notes of a run. All of these are "module function" of this folder, "" where there is none. in_time(model,
-    numerics, patch) and in_space(model, numerics, patch, coarse, solution) -> list of `Coarser`; least: relative error
+    numerics, patch) and in_space(model, numerics, patch, coarse, solution) -> list of `CoarserRuns`; least: relative error
     that stays; closes: gap of the energy balance beyond which a run has not converged, None where the engine's own
     error of the balance says it, infinite of methods that are shown with what they lose. tells: numbers of a run that
     its summary has; resumes: it keeps its state on the way; steady: it finds
@@ -94,7 +94,7 @@ class Engine(NamedTuple):
             return []
         few = _fewer(numerics, 4) if self.in_time is _march_in_time else numerics
         beside = None if few is numerics else Variant(few, patch)
-        return [Coarser((Variant(replace(few, richer=True), patch),), finer_errors, beside, "reduced")]
+        return [CoarserRuns((Variant(replace(few, richer=True), patch),), finer_errors, beside, "reduced")]
 
     @property
     def run(self) -> Callable:
@@ -183,7 +183,7 @@ def _exact_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     """
     averaged = model.friction is not None and has(model.friction.law, "averaged")
     meshed = coarse is not None and (model.rig.strips_slide_apart or averaged)
-    samples = [Coarser((), sampling_errors)] if model.rig.strips_slide_apart else []
+    samples = [CoarserRuns((), sampling_errors)] if model.rig.strips_slide_apart else []
     return [*samples, coarser_space(Variant(numerics, coarse))] if meshed else samples
 
 
@@ -193,12 +193,12 @@ def _pieces_in_space(model: Model, numerics, patch, coarse, solution) -> list:
     meshes = [Variant(one, patch) for one in _meshed(model, numerics)]
     if coarse is not None and model.soft:
         meshes = [Variant(numerics, coarse), *meshes]
-    out = [Coarser((variant,), coarser_errors, of="mesh") for variant in meshes]
+    out = [CoarserRuns((variant,), coarser_errors, of="mesh") for variant in meshes]
     cells = any(has(one.numbers.law, "cells") for one in model.rig.interfaces)
     if not cells:
         return out
     merged = tuple(Variant(replace(numerics, joined=one), patch) for one in JOINED)
-    return [*out, Coarser(merged, merged_cell_errors, of="cells")]
+    return [*out, CoarserRuns(merged, merged_cell_errors, of="cells")]
 
 
 def _meshed(model: Model, numerics) -> list:
@@ -213,7 +213,7 @@ def _fewer(numerics, share: int):
 
 def _march_in_time(model: Model, numerics, patch) -> list:
     """The coarser runs of the march in time: half and a quarter of the steps."""
-    return [Coarser(_halves(numerics, patch), partial(step_errors, steps=numerics.steps), of="steps")]
+    return [CoarserRuns(_halves(numerics, patch), partial(step_errors, steps=numerics.steps), of="steps")]
 
 
 def _halves(numerics, patch) -> tuple:
@@ -244,11 +244,11 @@ def _summed(model: Model, few, patch, solution) -> list:
     choice = solution.summed
     if choice is None or not choice.error:
         return []
-    out = [Coarser((), lambda fine: _sum_errors(model, patch, choice.error, fine, solution), of="bonds")]
+    out = [CoarserRuns((), lambda fine: _sum_errors(model, patch, choice.error, fine, solution), of="bonds")]
     if choice.merge > 0 or choice.tail > LOOSE * model.accuracy.tolerance:
         finer = replace(choice, merge=FINER * choice.merge, tail=LESS * choice.tail)
         same, narrow = (Variant(replace(few, choice=one), patch) for one in (choice, finer))
-        out.append(Coarser((narrow,), finer_errors, same, "bonds"))
+        out.append(CoarserRuns((narrow,), finer_errors, same, "bonds"))
     return out
 
 
@@ -266,7 +266,7 @@ def _sum_errors(model: Model, patch, fraction: float, values: dict, solution) ->
 def _own_errors(model: Model, numerics, patch, coarse, solution) -> list:
     """What a run itself leaves open: the residual of a balance and the change at half the harmonics, or what samples do
     not resolve."""
-    return [Coarser((), lambda fine: {name: solution.errors.get(name, 0.0) for name in fine})]
+    return [CoarserRuns((), lambda fine: {name: solution.errors.get(name, 0.0) for name in fine})]
 
 
 def _steady_in_space(model: Model, numerics, patch, coarse, solution) -> list:
@@ -285,7 +285,7 @@ def _smooth_in_time(model: Model, numerics, patch) -> list:
     The error of a run follows that of its steps.
     """
     wider = Variant(replace(numerics, local=numerics.local * COARSER), patch)
-    return [Coarser((wider,), WIDER_TOLERANCE)]
+    return [CoarserRuns((wider,), WIDER_TOLERANCE)]
 
 
 EXACT = Engine("exact", "exact", "pieces run_exact", _none, _exact_in_space, "costs exact_cost",
@@ -296,9 +296,9 @@ SMOOTH = Engine("smooth", "", "smooth run_smooth", _smooth_in_time, _own_errors,
                 dearer=not_smooth, chosen="numerics by_error", least=3e-8, closes=None, tells=("iterations",))
 MARCH = Engine("march", "march", "march run_march", _march_in_time, _march_in_space, "plan march_cost",
                chosen="numerics by_steps", refuse="lists refuse_long_list",
-               notes="remarks marched_elements", tells=("steps_per_cycle", "iterations"), resumes=True)
+               notes="motion_warnings marched_elements", tells=("steps_per_cycle", "iterations"), resumes=True)
 HARMONIC = Engine("harmonic", "harmonic", "steady.steady run_steady", _none, _steady_in_space, "plan steady_cost",
-                  words="plan steady_words", notes="remarks unmoved_elements", closes=None, steady=True)
+                  words="plan steady_words", notes="motion_warnings unmoved_elements", closes=None, steady=True)
 ENGINES = {engine.name: engine for engine in (EXACT, PIECES, SMOOTH, MARCH, HARMONIC)}
 AUTOMATIC = (EXACT, PIECES, SMOOTH, MARCH)  # in the order in which they are tried
 

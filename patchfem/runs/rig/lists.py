@@ -23,7 +23,7 @@ from .numerics import Numerics
 DECAYED = 1e-2  # share of the first stroke of a motion that is released, by which its bonds are summed
 HELD = 1e-4  # share of the drive's stroke that a block makes which the printed law holds (measured: 1e-2 to 1e-4)
 GROWING_STEP = 1e-6  # s per step and strip of a list that grows with every step (measured: 8e-8 to 4e-6)
-FAST = 2.0  # D from which a block is held fast: 0.6 and more strips per step, against 0.06 at 1.06 and 0.28 at 1.4
+MIN_STUCK_RATIO = 2.0  # D from which a block is held fast: 0.6 and more strips per step, against 0.06 at 1.06 and 0.28 at 1.4
 TURNING = 0.1  # strokes per step from which they are those of the steps
 MOST_CROWDED = 500  # strips of its list, about one per step, from which steps are not halved again: four times the cost
 MOVES, MOST_HALVINGS = 1e-3, 2  # bond lengths of slip from which a block moves; of the steps that were seen: 0 to 3
@@ -59,7 +59,7 @@ def _summed_by(model: Model, numerics: Numerics, stretch: float, engine: str):
     return engines.choose(law, accuracy.tolerance, stroke, numerics.steps / 2, engine, tail, accuracy.merge)
 
 
-def _stretch(model: Model, least: float = FAST) -> float:
+def _stretch(model: Model, least: float = MIN_STUCK_RATIO) -> float:
     """Bond lengths by which a drive moves a block that its bonds hold by their stiffness mu_s N/eps_0; inf where they
     do not hold it, their limit `least` times what that takes, or the printed law gives them no stiffness."""
     f, rig = model.friction, model.rig
@@ -110,22 +110,22 @@ def held_by_bonds(model: Model, push: float | None = None) -> float:
 
 
 def least_held(model: Model) -> float:
-    """What `held_by_bonds` is at least where a list grows with every step: FAST; 1 of a driven block where each step
+    """What `held_by_bonds` is at least where a list grows with every step: MIN_STUCK_RATIO; 1 of a driven block where each step
     leaves a strip, which no path wears away: bonds that grow, or have no stiffness by their order."""
     leaves = form_of(model.bonds) == AGED or model.friction.reading != "report"
-    return 1.0 if leaves and model.rig.kind != "free" else FAST
+    return 1.0 if leaves and model.rig.kind != "free" else MIN_STUCK_RATIO
 
 
 def chatters(model: Model) -> bool:
     """Whether the printed law holds a driven block fast: it turns back in almost every step, and its list grows by a
     strip with each."""
     return model.rig.kind != "free" and model.friction is not None and model.friction.reading == "report" \
-        and held_by_bonds(model) >= FAST
+        and held_by_bonds(model) >= MIN_STUCK_RATIO
 
 
 def stalls(model: Model) -> bool:
     """Whether growing bonds of the printed law hold a released block fast from its start on."""
-    return model.rig.kind == "free" and held_by_bonds(model) >= FAST
+    return model.rig.kind == "free" and held_by_bonds(model) >= MIN_STUCK_RATIO
 
 
 def limp(model: Model) -> bool:

@@ -5,7 +5,7 @@ from math import inf, pi
 
 import numpy as np
 
-from ... import rates
+from ... import cost_model
 from ...core import PatchfemError
 from ...dynamics.march import capacity
 from ...effects import LAWS, has
@@ -121,13 +121,13 @@ def march_cost(model: Model, numerics, points: int) -> Cost:
         parts.append(MemoryPart(capacity.most_bytes(int(entries)), "the list of bonds", "accuracy.tail"))
     elif soft and (is_bonds or model.grooves is not None or rig.load_varies):
         sizes["shear_modes"] = modes = numerics.shear_modes or shear_modes.SHEAR_MODES
-        each = rates.behind_modes(points, modes, rig.load_varies or model.grooves is not None)
+        each = cost_model.behind_modes(points, modes, rig.load_varies or model.grooves is not None)
         each += _step(rig, f) if is_bonds else 0.0
         parts.append(MemoryPart(MODE_NODE * modes * points, f"{modes} shear modes", "accuracy.shear_modes"))
     else:
         each = _step_without_modes(model, numerics, points, is_bonds)
     passes = 0.75 + 2**(lists.halvings(model) + 1) - 1  # a half and a quarter of the steps, and each halving of them
-    times = {"motion": steps * passes * each, "histories": rates.KEPT_SAMPLE * kept_samples(numerics)}
+    times = {"motion": steps * passes * each, "histories": cost_model.KEPT_SAMPLE * kept_samples(numerics)}
     parts += history_parts(model, numerics, MARCH_HISTORY)
     return Cost(times, tuple(parts), (), int(steps * passes), sizes) + march_code(model).cost()
 
@@ -141,15 +141,15 @@ def _step_without_modes(model: Model, numerics, points: int, is_bonds: bool) -> 
     """Return the seconds of a step of a march without shear modes and without a list of bonds."""
     rig, step = model.rig, _step(model.rig, model.friction)
     if model.grooves is not None:
-        return rates.CLIMB
+        return cost_model.CLIMB
     if is_bonds:
-        return rates.FIELD_NODE * points if numerics.per_point else step
+        return cost_model.FIELD_NODE * points if numerics.per_point else step
     if model.soft:
-        return rates.SLIP_NODE * points + rates.LIST_STEP
+        return cost_model.SLIP_NODE * points + cost_model.LIST_STEP
     if rig.soft:
-        return step + rates.SLIP_NODE * points
+        return step + cost_model.SLIP_NODE * points
     if rig.load_varies and model.patch is not None:
-        return rates.PRESSING_STEP + rates.PRESSING_NODE * points
+        return cost_model.PRESSING_STEP + cost_model.PRESSING_NODE * points
     return step
 
 
@@ -157,8 +157,8 @@ def _step(rig, f) -> float:
     """Seconds of a step of a march: of one mode and interface, more where bonds grow or interfaces move each other."""
     faces = len(rig.interfaces)
     grows = f is not None and f.slip_growth is not None and has(f.law, "bonds")
-    return (rates.BOND_STEP + rates.STEP_MODE * (len(rig.frequencies) - 1)) * (rates.GROWS if grows else 1.0) * (
-        rates.JOINT * faces if faces > 1 else 1.0)
+    return (cost_model.BOND_STEP + cost_model.STEP_MODE * (len(rig.frequencies) - 1)) * (cost_model.GROWS if grows else 1.0) * (
+        cost_model.JOINT * faces if faces > 1 else 1.0)
 
 
 def groups(model: Model) -> dict:
@@ -289,14 +289,14 @@ def _steady_point(model: Model, by: str) -> float:
     rig = model.rig
     if by == "balance":
         size = 2.0 * (model.accuracy.harmonics or 0) * max(1, len(rig.interfaces))
-        return rates.BALANCED_POINT + rates.BALANCE * size**3 + _smooth_laws(rig)
+        return cost_model.BALANCED_POINT + cost_model.BALANCE * size**3 + _smooth_laws(rig)
     if by == "march":
-        return MARCHED * steps_per_cycle(model) * rates.CLIMB
+        return MARCHED * steps_per_cycle(model) * cost_model.CLIMB
     if not rig.interfaces:
-        return rates.CLOSED_POINT
+        return cost_model.CLOSED_POINT
     ringing, events = ringing_and_events(model)
-    return rates.MAPPED_POINT + rates.EVENT * len(rig.frequencies) * events + ringing * (
-        rates.RINGING_PIECE + rates.RINGING_MODES * len(rig.frequencies)**2)
+    return cost_model.MAPPED_POINT + cost_model.EVENT * len(rig.frequencies) * events + ringing * (
+        cost_model.RINGING_PIECE + cost_model.RINGING_MODES * len(rig.frequencies)**2)
 
 
 def _smooth_laws(rig) -> float:
@@ -306,4 +306,4 @@ def _smooth_laws(rig) -> float:
     flowing = any("pieces" not in LAWS[law].carries.split() and not has(law, "memoryless") for law in laws)
     smooth = flowing or rig.bends or any(has(law, "creeps") for law in laws)
     size = 2 * len(rig.frequencies) + len(rig.interfaces)
-    return flowing * rates.FLOWING_POINT + smooth * rates.MULTIPLIERS[flowing] * size**3
+    return flowing * cost_model.FLOWING_POINT + smooth * cost_model.MULTIPLIERS[flowing] * size**3

@@ -18,7 +18,7 @@ from ...structure.drive_sizes import decay_rate, is_periodic
 from ..patch import faces
 from ..results.result import FRAMES, Result, on_a_mesh_of_known_error, without_errors
 from ..results.travel import outcome_on_piece
-from . import decays, flutter, levels, lists, remarks
+from . import decays, flutter, levels, lists, motion_warnings
 from .costs import MOST_STEPS
 from .engines import ENGINES, Variant, unbalanced
 from .fields import fields_of
@@ -71,8 +71,8 @@ def coupled(what, patch, coarse, seconds, warnings, say, progress, per_point, es
     for go in (_levelled, _settled, _reasoned):
         run = go(run)
     run, decay, left_out = _decayed(run, coarse[0])
-    warned = [*remarks.warnings_of(run), *remarks.peak_at_an_end(run, lambda: what.modes(what.chain))]
-    notes = [*remarks.notes_of(run), *left_out]
+    warned = [*motion_warnings.warnings_of(run), *motion_warnings.peak_at_an_end(run, lambda: what.modes(what.chain))]
+    notes = [*motion_warnings.notes_of(run), *left_out]
     if decay_rate(rig.modes) < 0 and run.rubs:
         fluttering, more = flutter.flutter_of(run)
         run, notes = replace(run, measures=run.measures | fluttering), [*notes, *more]
@@ -250,7 +250,7 @@ def _at_the_top(model, found: Solution, go) -> Solution | None:
     except NotConverged:  # the whole curve may begin where a motion is found
         return None
     name = "relative_displacement_amplitude"
-    if "at" not in near.extra or name not in near.values or remarks.at_an_end(
+    if "at" not in near.extra or name not in near.values or motion_warnings.at_an_end(
             near.extra["at"].omega / (2 * np.pi), drive.low, drive.high) is not None:
         return None
     return near if abs(near.values[name] / found.values[name] - 1) <= OTHER else None

@@ -13,8 +13,8 @@ import numpy as np
 
 from ...contact import strips
 from ...core import PatchfemError, frozen_array
-from ...disk.whole import whole
-from ...effects import unbuilt
+from ...disk.atomic_write import whole
+from ...effects import not_supported_message
 from ...wear.depth import rates
 from ...wear.jumps import Wearing, Worn, after, replayed, start
 from ..patch.measures import other_strips
@@ -122,7 +122,7 @@ def evolve(model, patch, coarse, progress=None, begin: tuple | None = None, keep
     PatchfemError for a slide in two directions.
     """
     if model.slide is not None and model.slide.across is not None:
-        text = unbuilt("with a slide in two directions", "leave out [wear], or leave the column `lateral` out of "
+        text = not_supported_message("with a slide in two directions", "leave out [wear], or leave the column `lateral` out of "
                                                          "slide.file")
         raise PatchfemError(text, "wear")
     clock, wear, motion, stopped = perf_counter(), model.wear, _Motion(model, patch), ""

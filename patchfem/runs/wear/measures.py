@@ -6,8 +6,8 @@ from itertools import pairwise
 import numpy as np
 
 from ...core import Measure, Outcome, frozen_array, say
+from ...formatting import plain
 from ...response.errors import convergence_errors, error_of_change
-from ...scales import plain
 from ..patch.measures import other_strips
 from ..patch.press import areas, pressed
 from ..patch.values import values

@@ -1,8 +1,8 @@
 """Rules of [accuracy]: an engine of the sum over bonds must be able to sum the law of the run, a knob must act."""
 
 from ...effects import LAWS, has, listed
-from .draft import KNOBS, Draft, acts, pinned
 from .methods import Motion, motion
+from .scene_draft import KNOBS, Draft, acts, pinned
 
 
 def _quadrature(draft: Draft, kind: str) -> None:

@@ -10,10 +10,10 @@ from ...effects import has, waveform_of
 from ..keys.tables import Friction
 from .accuracy import _knobs, _quadrature
 from .contact import check_contacts
-from .draft import SLIDES, Draft, _needs
 from .drive import check_drive, check_length
 from .friction import _frictions
 from .grooves import check_grooves
+from .scene_draft import SLIDES, Draft, _needs
 from .structure import check_gains, check_structure, modes_instead
 from .wear import check_wear
 

@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..keys.contact import outermost
-from .draft import ASPERITIES, PEAKS, Draft, _needs
 from .outlines import flat_of, outlines
+from .scene_draft import ASPERITIES, PEAKS, Draft, _needs
 
 TALLEST = 10_000  # times the length: at 80 000 the stiffness of a piece is lost in its round-off
 MOST_ELEMENTS = 100_000  # over the interface; the patch of a tenth of them takes gigabytes

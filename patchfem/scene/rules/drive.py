@@ -6,7 +6,7 @@ from functools import cache
 from typing import Any
 
 from ...effects import NO_WAVEFORM, WAVEFORMS, Waveform, waveform_of
-from .draft import Draft
+from .scene_draft import Draft
 from .structure import drives_mass
 
 LEAST = 0.25  # of a cycle, of a run

@@ -5,8 +5,8 @@ from __future__ import annotations
 from ...effects import either, has, takes, using
 from ..keys.contact import Contact
 from ..keys.tables import Friction, Interface
-from .draft import LAWS, Draft, _needs
 from .methods import changing_load, climbed
+from .scene_draft import LAWS, Draft, _needs
 
 
 def check_spread(draft: Draft, at: str, law: Friction) -> None:

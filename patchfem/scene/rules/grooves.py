@@ -5,10 +5,10 @@ from __future__ import annotations
 from math import pi
 from typing import Any
 
-from ...effects import carries, has, listed, named, refusal, unbuilt
+from ...effects import carries, has, listed, named, not_supported_message, refusal
 from ..keys import removed
-from .draft import Draft
 from .methods import changing_load, turning
+from .scene_draft import Draft
 
 
 def check_grooves(draft: Draft, kind: str) -> None:
@@ -61,33 +61,33 @@ def _beside(draft: Draft, at: str, grooves: Any, law: Any) -> None:
     beside = f"with [{at}]"
     if has(law.law, "bonds") and (listed(law) or law.breakaway):
         key = "reading" if law.reading == "report" else "breakaway" if law.breakaway else "order"
-        draft.say(f"friction.{key}", unbuilt(beside, "recursion"))
+        draft.say(f"friction.{key}", not_supported_message(beside, "recursion"))
     elif law.law in removed.LAWS_OVER_GROOVES:
         draft.say("friction.law", f"{named(law)} {beside} was removed in patchfem 1.0; {refusal('grooves')}")
     elif not carries(law, "grooves"):
-        draft.say("friction.law", unbuilt(f"{named(law)} {beside}", refusal("grooves", odd=law)))
+        draft.say("friction.law", not_supported_message(f"{named(law)} {beside}", refusal("grooves", odd=law)))
     accuracy = draft.tables.accuracy  # None where [accuracy] could not be read
     if has(law.law, "bonds") and accuracy is not None and accuracy.quadrature not in (None, "auto", "recursion"):
-        draft.say("accuracy.quadrature", unbuilt(f"'{accuracy.quadrature}' {beside}",
+        draft.say("accuracy.quadrature", not_supported_message(f"'{accuracy.quadrature}' {beside}",
                                                  "use 'recursion' or 'auto'"))
     if accuracy is not None and accuracy.method == "harmonic" and accuracy.harmonics is not None:
         draft.say("accuracy.harmonics", f"harmonic balance {beside} was removed in patchfem 1.0; leave `harmonics` "
                                         "out: method 'harmonic' then integrates in time until the motion repeats")
     if contact is not None and contact.gives_way:
         if contact.holder is not None and contact.holder.tangential_stiffness is not None:
-            draft.say("contact.holder.tangential_stiffness", unbuilt(beside, "out"))
+            draft.say("contact.holder.tangential_stiffness", not_supported_message(beside, "out"))
     if contact is not None and contact.strips is not None and (turning(draft.tables) or contact.gives_way):
-        draft.say(at, unbuilt("with strips that yaw or are elastic", "either"))
+        draft.say(at, not_supported_message("with strips that yaw or are elastic", "either"))
     if cause := changing_load(draft.tables):
         over = "a normal load that oscillates over grooves was removed in patchfem 1.0; leave one of the two out"
-        draft.say(cause, over if cause == "normal.amplitude" else unbuilt(beside, "either"))
+        draft.say(cause, over if cause == "normal.amplitude" else not_supported_message(beside, "either"))
     lower = [f"contact.{name}.on" for name, one in (contact.shapes if contact is not None else {}).items()
              if one.on == "lower"]
     if lower:
-        draft.say(lower[0], unbuilt(f"'lower' {beside}", "shapes"))
+        draft.say(lower[0], not_supported_message(f"'lower' {beside}", "shapes"))
     if structure is None:
         return
     if structure.stiffening is not None:
-        draft.say("structure.stiffening", unbuilt(beside, "either"))
+        draft.say("structure.stiffening", not_supported_message(beside, "either"))
     if structure.bonded is not None and structure.bonded.wavelength is not None:
-        draft.say("structure.bonded.wavelength", unbuilt(beside, "either"))
+        draft.say("structure.bonded.wavelength", not_supported_message(beside, "either"))

@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ...effects import MEANWHILE, carries, has, listed, named, refusal, takes, unbuilt
+from ...effects import MEANWHILE, carries, has, listed, named, not_supported_message, refusal, takes
 from ..keys.contact import Contact
 from ..keys.tables import Friction, Interface, Tables
 from .contact import OfInterface, of_interfaces
-from .draft import Draft
 from .methods import beside_load, changing_load, check_method, turning
+from .scene_draft import Draft
 
 NOT_YET_BUILT = "structure.mode.lateral"  # valid in a scene, but no run can do it
 
@@ -37,10 +37,10 @@ def combinations(draft: Draft, kind: str) -> None:
     if kind == "rig" and (cause := changing_load(draft.tables)):
         _under_changing_load(draft, law, shear, cause)
     if kind == "bench" and _still(law) and draft.tables.normal is not None and draft.tables.normal.amplitude:
-        draft.say("normal.amplitude", unbuilt(f"with law '{law.law}'", refusal("varying-load")))
+        draft.say("normal.amplitude", not_supported_message(f"with law '{law.law}'", refusal("varying-load")))
     if (kind == "rig" or shear) and has(law.law, "bonds") and law.breakaway and law.order != 1:
         where = "in a rig" if kind == "rig" else f"and {shear}"
-        draft.say("friction.breakaway", unbuilt(f"with order = {law.order:g} {where}", "order"))
+        draft.say("friction.breakaway", not_supported_message(f"with order = {law.order:g} {where}", "order"))
     if kind == "rig":
         _yawing(draft, law, contact)
     if shear:
@@ -48,9 +48,9 @@ def combinations(draft: Draft, kind: str) -> None:
     if contact is not None:
         _on_pieces(draft, contact, _only_on_upper(kind, law, shear))
         if contact.strips is not None and shear and not _slips_in_strips(kind, contact, law):
-            draft.say("contact.strips", unbuilt(f"with {shear}", "either"))
+            draft.say("contact.strips", not_supported_message(f"with {shear}", "either"))
         elif contact.strips is not None and has(law.law, "averaged"):
-            draft.say("contact.strips", unbuilt(f"with law '{law.law}'", "out"))
+            draft.say("contact.strips", not_supported_message(f"with law '{law.law}'", "out"))
 
 
 def _slips_in_strips(kind: str, contact: Contact, law: Friction) -> bool:
@@ -69,9 +69,9 @@ def _interfaces(draft: Draft, interfaces: tuple) -> None:
         if one.contact is None and one.load is None and not draft.given(f"{at}.load"):
             draft.lacks(f"{at}.load", "or give this interface a patch with [structure.interface.contact]")
         if one.spread is not None and takes(one.law, "spread"):
-            draft.say(f"{at}.spread", unbuilt("with masses, where an interface has no width", "out"))
+            draft.say(f"{at}.spread", not_supported_message("with masses, where an interface has no width", "out"))
         if len(interfaces) > 1 and one.law is not None and not carries(one, "joints"):
-            draft.say(f"{at}.law", unbuilt(f"{named(one)} with other interfaces", refusal("joints", odd=one)))
+            draft.say(f"{at}.law", not_supported_message(f"{named(one)} with other interfaces", refusal("joints", odd=one)))
         if one.lateral is not None:
             _in_plane(draft, at, one)
     for own in of_interfaces(draft):
@@ -81,10 +81,10 @@ def _interfaces(draft: Draft, interfaces: tuple) -> None:
 def _in_plane(draft: Draft, at: str, one: Interface) -> None:
     """An interface that slides in a plane is a point, with a law that has a form in two directions."""
     if one.contact is not None:
-        draft.say(f"{at}.lateral", unbuilt("with [structure.interface.contact]", "give the interface a load, or leave "
+        draft.say(f"{at}.lateral", not_supported_message("with [structure.interface.contact]", "give the interface a load, or leave "
                                            "lateral out"))
     if one.law is not None and not carries(one, "plane"):
-        draft.say(f"{at}.lateral", unbuilt(f"with {named(one)}", "stiff" if has(one.law, "set-valued") else
+        draft.say(f"{at}.lateral", not_supported_message(f"with {named(one)}", "stiff" if has(one.law, "set-valued") else
                                            f"{refusal('plane')}, or leave lateral out"))
 
 
@@ -96,21 +96,21 @@ def _of_patch(draft: OfInterface, contact: Contact, law: Interface, alone: bool)
         draft.say("friction.load", f"{patch} has its own load; leave this key out")
     for key, instead in (("approach", "give contact.load instead"), ("grooves", "out")):
         if draft.given(f"contact.{key}"):
-            draft.say(f"contact.{key}", unbuilt("with [[structure.interface]]", instead))
+            draft.say(f"contact.{key}", not_supported_message("with [[structure.interface]]", instead))
     _on_pieces(draft, contact, "with [[structure.interface]]")
     if law.law is None:
         return
     if alone and not carries(law, "joints") and not soft:
-        draft.say("friction.law", unbuilt(f"{named(law)} with {patch}", refusal("joints", odd=law)))
+        draft.say("friction.law", not_supported_message(f"{named(law)} with {patch}", refusal("joints", odd=law)))
     if not soft:
         return
     if not (carries(law, "pieces") and carries(law, "shear")):
-        draft.say("friction.law", unbuilt(f"{named(law)} with {soft}", f"leave out {soft}, or "
+        draft.say("friction.law", not_supported_message(f"{named(law)} with {soft}", f"leave out {soft}, or "
                                           f"{refusal('pieces', 'shear')}"))
     else:
         _behind_shear(draft, law, soft)
     if contact.strips is not None and not _slips_in_strips("rig", contact, law):
-        draft.say("contact.strips", unbuilt(f"with {soft}", "either"))
+        draft.say("contact.strips", not_supported_message(f"with {soft}", "either"))
 
 
 def _quadrature(draft: Draft, kind: str, law: Friction, shear: str) -> None:
@@ -122,10 +122,10 @@ def _quadrature(draft: Draft, kind: str, law: Friction, shear: str) -> None:
     lower = contact is not None and any(shape.on == "lower" for shape in contact.shapes.values())
     if kind == "rig" and (lower or law.breakaway) and not listed(law):
         beside = "a shape on the lower piece" if lower else "friction.breakaway"
-        draft.say("accuracy.quadrature", unbuilt(f"'{engine}' with {beside} in a rig", "use 'recursion' or 'auto'"))
+        draft.say("accuracy.quadrature", not_supported_message(f"'{engine}' with {beside} in a rig", "use 'recursion' or 'auto'"))
     varies = normal is not None and normal.amplitude
     if kind == "bench" and engine == "merged" and (lower or law.breakaway or varies):
-        draft.say("accuracy.quadrature", unbuilt("'merged' with friction.breakaway, or with a pressure that changes at "
+        draft.say("accuracy.quadrature", not_supported_message("'merged' with friction.breakaway, or with a pressure that changes at "
                                                  "a point during the slide,", "use 'auto', 'direct' or 'truncated'"))
 
 
@@ -148,7 +148,7 @@ def sideways(tables: Tables) -> str:
     else:
         return ""
     what, _, remedy = reason.partition(": ")
-    return unbuilt(f"a lateral column with {what}", f"{remedy}, or leave the lateral column out")
+    return not_supported_message(f"a lateral column with {what}", f"{remedy}, or leave the lateral column out")
 
 
 def _yawing(draft: Draft, law: Friction, contact: Contact | None) -> None:
@@ -160,7 +160,7 @@ def _yawing(draft: Draft, law: Friction, contact: Contact | None) -> None:
         draft.say(key, "`yaw` rotates the patch about its normal; add [contact.strips], whose strips slide "
                        "independently")
     elif not carries(law, "joints"):
-        draft.say(key, unbuilt(f"in strips with {named(law)}", refusal("joints", odd=law)))
+        draft.say(key, not_supported_message(f"in strips with {named(law)}", refusal("joints", odd=law)))
 
 
 def _under_changing_load(draft: Draft, law: Friction, shear: str, cause: str) -> None:
@@ -169,25 +169,25 @@ def _under_changing_load(draft: Draft, law: Friction, shear: str, cause: str) ->
     if contact is None and cause != "normal.amplitude":
         draft.say(cause, "a single contact point cannot heave or pitch: use [contact] in place of [normal]")
     if not has(law.law, "bonds") and not carries(law, "varying-load"):
-        draft.say("friction.law", unbuilt(f"'{law.law}' {beside}", refusal("varying-load")))
+        draft.say("friction.law", not_supported_message(f"'{law.law}' {beside}", refusal("varying-load")))
     elif has(law.law, "bonds") and (law.breakaway or (listed(law) and law.reading != "report")):
         key = "reading" if law.reading == "report" else "breakaway" if law.breakaway else "order"
-        draft.say(f"friction.{key}", unbuilt(beside, "recursion"))
+        draft.say(f"friction.{key}", not_supported_message(beside, "recursion"))
     if shear and has(law.law, "set-valued") and carries(law, "shear"):
-        draft.say("friction.law", unbuilt(f"'{law.law}' {beside} and {shear}", "stiff"))
+        draft.say("friction.law", not_supported_message(f"'{law.law}' {beside} and {shear}", "stiff"))
     if structure is not None and structure.stiffening is not None:
-        draft.say("structure.stiffening", unbuilt(beside, "either"))
+        draft.say("structure.stiffening", not_supported_message(beside, "either"))
     if structure is not None and structure.bonded is not None and structure.bonded.wavelength is not None:
-        draft.say("structure.bonded.wavelength", unbuilt(beside, "either"))
+        draft.say("structure.bonded.wavelength", not_supported_message(beside, "either"))
     if contact is None:
         return
     if contact.strips is not None:
-        draft.say("contact.strips", unbuilt(beside, "either"))
+        draft.say("contact.strips", not_supported_message(beside, "either"))
     if contact.asperities is not None and contact.asperities.law not in ("linear", None):
-        draft.say("contact.asperities.law", unbuilt(f"'{contact.asperities.law}' {beside}", "linear"))
+        draft.say("contact.asperities.law", not_supported_message(f"'{contact.asperities.law}' {beside}", "linear"))
     for name, shape in contact.shapes.items():
         if shape.on == "lower":
-            draft.say(f"contact.{name}.on", unbuilt(f"'lower' {beside}", "shapes"))
+            draft.say(f"contact.{name}.on", not_supported_message(f"'lower' {beside}", "shapes"))
 
 
 def _behind_shear(draft: Draft, law: Friction, shear: str) -> None:
@@ -197,10 +197,10 @@ def _behind_shear(draft: Draft, law: Friction, shear: str) -> None:
                                             "(R/eps)^order is unbounded for bonds at rest; set initial_bonds = 0 or "
                                             "use order >= 0")
     if not has(law.law, "bonds") and not carries(law, "shear"):
-        draft.say("friction.law", unbuilt(f"'{law.law}' with {shear}", f"leave out {shear}, or {refusal('shear')}"))
+        draft.say("friction.law", not_supported_message(f"'{law.law}' with {shear}", f"leave out {shear}, or {refusal('shear')}"))
     weakens = law.static is not None and _inside(law.kinetic, -1, law.static)
     if has(law.law, "set-valued") and carries(law, "shear") and weakens:
-        draft.say("friction.kinetic", unbuilt(f"{law.kinetic:g} below static = {law.static:g} with {shear}",
+        draft.say("friction.kinetic", not_supported_message(f"{law.kinetic:g} below static = {law.static:g} with {shear}",
                                               "kinetic"))
 
 
@@ -227,9 +227,9 @@ def _on_pieces(draft: Draft, contact: Contact, only_upper: str) -> None:
         key = next((key for key in reversed(sides) if draft.given(key)), next(iter(sides)))
         piece = "the upper piece" if only_upper else "one piece"
         names = " and ".join(key.removesuffix(".on") for key in sides)
-        draft.say(key, unbuilt(f"{names} on different pieces", f"put all shapes on {piece}"))
+        draft.say(key, not_supported_message(f"{names} on different pieces", f"put all shapes on {piece}"))
     elif lower and only_upper:
-        draft.say(lower[0], unbuilt(f"'lower' {only_upper}", "shapes"))
+        draft.say(lower[0], not_supported_message(f"'lower' {only_upper}", "shapes"))
 
 
 def _inside(value: float | None, low: float, high: float = float("inf")) -> bool:

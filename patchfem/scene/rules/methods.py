@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from ...effects import Waveform, carries, has, named, refusal, unbuilt, waveform_of
+from ...effects import Waveform, carries, has, named, not_supported_message, refusal, waveform_of
 from ..keys.tables import Interface, Tables
-from .draft import Draft
+from .scene_draft import Draft
 
 KEY = "accuracy.method"
 
@@ -189,18 +189,18 @@ def _harmonic(m: Motion, method: str) -> str:
         return ("'harmonic' needs a constant acceleration over a sweep; give drive.acceleration in place of "
                 "drive.displacement")
     if why := lacking(method, m):
-        return unbuilt(f"'{method}' {why}", "march")
+        return not_supported_message(f"'{method}' {why}", "march")
     if not m.laws or not all(lacking(engine, m) for engine in METHODS["exact"]) or m.spring.endswith("grooves]"):
         return ""  # over grooves a march is brought to repeat
     law = m.laws[0]
     if len(m.laws) > 1:
-        return unbuilt("'harmonic' with several interfaces and a law without exact solution or a nonlinear spring",
+        return not_supported_message("'harmonic' with several interfaces and a law without exact solution or a nonlinear spring",
                        "march")
     if has(law.law, "set-valued") and not m.soft:
-        return unbuilt(f"'harmonic' with law '{law.law}', whose force jumps, and {m.spring}", "march or stiff")
+        return not_supported_message(f"'harmonic' with law '{law.law}', whose force jumps, and {m.spring}", "march or stiff")
     if not has(law.law, "set-valued") and not carries(law, "harmonic"):
-        return unbuilt(f"'harmonic' with {named(law)}", f"use 'march', or {refusal('harmonic', odd=law)}")
+        return not_supported_message(f"'harmonic' with {named(law)}", f"use 'march', or {refusal('harmonic', odd=law)}")
     beside = next((key for key in ("rest_growth", "breakaway") if getattr(law, key)), "")
     beside = f"friction.{beside}" if beside else m.soft or m.lower
-    return unbuilt(f"'harmonic' with law '{law.law}' and {beside}", "march") if has(law.law, "bonds") and beside \
+    return not_supported_message(f"'harmonic' with law '{law.law}' and {beside}", "march") if has(law.law, "bonds") and beside \
         else ""

@@ -1,7 +1,7 @@
 """Rules of the outline of each piece: its length and what its ends look like."""
 
 from ..keys.contact import Contact
-from .draft import Draft
+from .scene_draft import Draft
 
 ENDS = ("chamfer", "end_radius")
 LEAST = 1e-5  # of the length of a piece: an end, or a difference of lengths, below it is no shape that a mesh can show

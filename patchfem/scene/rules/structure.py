@@ -5,9 +5,9 @@ from __future__ import annotations
 from math import pi, sqrt
 from typing import Any
 
-from ...effects import unbuilt, waveform_of
+from ...effects import not_supported_message, waveform_of
 from ..keys.types import choices
-from .draft import Draft
+from .scene_draft import Draft
 
 MATRICES, MEASURED = (".npz", ".mat"), (".uff", ".unv")
 REDUCED = (".mtx", ".mat", ".npz", ".op4", ".pch", ".bdf", ".dat")  # matrices of finite-element programs
@@ -133,7 +133,7 @@ def _instruments(draft: Draft, modes: tuple) -> None:
         beside = "drive.kind = 'free'" if drive.kind == "free" else \
             f"drive.waveform = '{drive.waveform}'" if (waveform.is_swept or waveform.has_levels) and not steady else ""
     if beside:
-        draft.say(written[0], unbuilt(f"with {beside}", "give `accelerometer` and `gauge` the value of `output`"))
+        draft.say(written[0], not_supported_message(f"with {beside}", "give `accelerometer` and `gauge` the value of `output`"))
 
 
 def _masses(draft: Draft, structure: Any) -> None:
@@ -179,10 +179,10 @@ def _lateral(draft: Draft, key: str, interface: Any, count: int | None) -> None:
         draft.say(key, f"{what} {both[0]} is already in `between`; the second direction needs coordinates of its own, "
                        "which must move at right angles to the coordinates of `between`")
     if draft.given("structure.file"):
-        draft.say(key, unbuilt("with structure.file", "use structure.masses or [structure.reduced], or leave this key "
+        draft.say(key, not_supported_message("with structure.file", "use structure.masses or [structure.reduced], or leave this key "
                                                       "out"))
     if draft.given("structure.bonded"):
-        draft.say(key, unbuilt("with [structure.bonded]", "write a [[structure.spring]] between the same places"
+        draft.say(key, not_supported_message("with [structure.bonded]", "write a [[structure.spring]] between the same places"
                                if draft.given("structure.masses") else "either"))
 
 

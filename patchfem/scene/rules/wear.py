@@ -3,10 +3,10 @@
 from itertools import pairwise
 from math import pi
 
-from ...effects import has, takes, unbuilt, using, waveform_of
+from ...effects import has, not_supported_message, takes, using, waveform_of
 from ..keys.tables import WornFriction
-from .draft import Draft
 from .grooves import grooves_of
+from .scene_draft import Draft
 
 LATER = "leave out [wear] or {}"
 
@@ -19,7 +19,7 @@ def check_wear(draft: Draft, kind: str) -> None:
     if kind == "patch":
         draft.say("wear", "wear needs a slide: add [friction] with [slide], or with [structure] and [drive]")
     for key, words in _beside(draft, tables, kind):
-        draft.say("wear", unbuilt(f"with {key}", words))
+        draft.say("wear", not_supported_message(f"with {key}", words))
     if tables.wear.friction is not None:
         _friction(draft, tables.wear.friction)
     if tables.normal is not None:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import say
-from ...scales import plain
+from ...formatting import plain
 from ..profile import Profile
 from .alignment import SHORT_END, Alignment
 from .boxes import N_PARTS, part_means, split_edges, subtract_line

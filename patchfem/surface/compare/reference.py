@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import say
-from ...scales import plain
+from ...formatting import plain
 from ..profile import runs_of
 from ..quantity import SIDE, Quantity, refused
 from .alignment import LONG_END, MIN_FILLED, SHORT_END, Alignment

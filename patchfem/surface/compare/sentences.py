@@ -3,7 +3,7 @@
 import numpy as np
 
 from ...core import say
-from ...scales import plain
+from ...formatting import plain
 from ..areal import Areal
 from ..profile import Profile
 from ..quantity import SIDE, Quantity

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError, frozen_array, say
-from ...scales import told
+from ...formatting import told
 from ..areal import Areal
 from ..areal import level as level_scan
 from ..profile import Profile, level

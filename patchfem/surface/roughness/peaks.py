@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core import PatchfemError, say
-from ...scales import plain
+from ...formatting import plain
 from ..profile import Profile, despiked, even, level
 from .filter import filter_trace
 from .parameters import MIN_SAMPLES, ROUND_OFF

@@ -8,15 +8,15 @@ fill from their first entries on under the drive (k,) [m s-2]. The text runs wit
 
 import numpy as np
 
-from patchfem.compiled.inner import njit
+from patchfem.compiled.jit import njit
 from patchfem.dynamics.modal_kernels import narrowed
-from patchfem.friction.flags_kernels import LEAN
+from patchfem.friction.flags_kernels import NJIT_NO_REFCOUNT
 from patchfem.friction.laws import tanh_kernels as law
 
 COULOMB, HEAD = 0, 4  # first number of a row of set-valued friction; numbers of a row before those of its law
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def law_force(laws, c, speed, travel, before, hold):
     """Force [N] of interface c at a slide speed [m/s].
 
@@ -31,7 +31,7 @@ def law_force(laws, c, speed, travel, before, hold):
     return law.at_end(laws[:, HEAD:], c, before, speed, travel)[0]
 
 
-@njit(error_model="numpy", cache=True, **LEAN)
+@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def first_forces(laws, speed, force):
     """Forces (i,) [N] of a start at slide speeds (i,) [m/s] into `force`; 0 where a force may hold the interface."""
     for c in range(force.size):
@@ -39,7 +39,7 @@ def first_forces(laws, speed, force):
         force[c] = 0.0 if held else law_force(laws, c, speed[c], 0.0, 0.0, 0.0)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def dot(row, x):
     """Scalar product of two rows."""
     out = 0.0
@@ -48,7 +48,7 @@ def dot(row, x):
     return out
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def accelerate(rig, drive, z, v, force, out):
     """Modal accelerations (n,) [m s-2] under friction forces (i,) [N] into `out`."""
     omega, dampers, faces, base, mass = rig
@@ -56,27 +56,27 @@ def accelerate(rig, drive, z, v, force, out):
         out[i] = -base[i] * drive - omega[i]**2 * z[i] - dot(dampers[i], v) - dot(faces[:, i], force) / mass
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def holding(rig, c, accel, force):
     """Force [N] at interface c that leaves it no acceleration, from the accelerations (n,) under all forces (i,)."""
     face = rig[2][c]
     return force[c] + dot(face, accel) * rig[4] / dot(face, face)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def step_of(row, z, v, first, last):
     """Value at the end of a step by a row (4,) of a map: of z, v and the accelerations at both ends of the step."""
     return row[0] * z + row[1] * v + row[2] * first + row[3] * last
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def copied(values, out):
     """Write values (n,) into `out`; as a slice, numba would allocate a copy of what it cannot tell apart."""
     for i in range(out.size):
         out[i] = values[i]
 
 
-@njit(error_model="numpy", cache=True, **LEAN)
+@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def duhamel_loop(rig, maps, stop, drive, laws, filled, room):
     """Fill z, v, force, residual and iterations; returns the number of steps that did not converge.
 
@@ -120,7 +120,7 @@ def duhamel_loop(rig, maps, stop, drive, laws, filled, room):
     return failed
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def implicit_force(laws, c, speed, travel, back_speed, back_travel, before):
     """Force [N] of a law at the end of a step in which it acts back on the slide.
 
@@ -142,7 +142,7 @@ def implicit_force(laws, c, speed, travel, back_speed, back_travel, before):
     return min(max(force, -limit), limit)
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def settle(laws, stuck, direction, free, soft, before, force):
     """Forces (i,) at the end of a step by sweeps over the interfaces; stuck ones that need more than their static limit
     are released. free: (speed, travel) (i,) without friction; soft: ([m/s/N], [m/N]), (i, i) what each force takes off
@@ -169,7 +169,7 @@ def settle(laws, stuck, direction, free, soft, before, force):
     return count
 
 
-@njit(error_model="numpy", **LEAN)
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
 def arrest(rig, stuck, v, accel, force):
     """Stop all stuck interfaces: take their slide speed and slide acceleration away, by sweeps.
 
@@ -190,7 +190,7 @@ def arrest(rig, stuck, v, accel, force):
             return
 
 
-@njit(error_model="numpy", cache=True, **LEAN)
+@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def newmark_loop(rig, maps, drive, laws, by_force, filled, room):
     """Fill z, v, force, residual and iterations by average acceleration; returns the number of stops.
 
@@ -244,7 +244,7 @@ def newmark_loop(rig, maps, drive, laws, by_force, filled, room):
     return stops
 
 
-@njit(error_model="numpy", cache=True, **LEAN)
+@njit(error_model="numpy", cache=True, **NJIT_NO_REFCOUNT)
 def euler_loop(rig, drive, laws, h, filled, room):
     """Fill z, v and force: z += h z', z' += h z'', all from the start of the step. room: as of `duhamel_loop`."""
     z, v, force, faces, (few, many) = filled[0], filled[1], filled[2], rig[2], room

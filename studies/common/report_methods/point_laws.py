@@ -7,7 +7,7 @@ import numpy as np
 
 from patchfem import compiled
 from patchfem.core import ModalBasis, PatchfemError
-from patchfem.dynamics.contacts.dispatch import COULOMB, law_of, number_of
+from patchfem.dynamics.interfaces.dispatch import COULOMB, law_of, number_of
 from patchfem.friction.protocol import Element
 
 HEAD = 4  # numbers of a row before those of its law

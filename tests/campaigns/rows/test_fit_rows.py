@@ -16,7 +16,7 @@ from patchfem.campaigns.rows.search import residual_of
 from patchfem.core import G_N, PatchfemError
 from patchfem.export.fits.rows import Starts, describe_answer
 from patchfem.model.model import build
-from patchfem.runs.many.watched import Watcher
+from patchfem.runs.batch.watched import Watcher
 from patchfem.runs.run import run
 from patchfem.scene.ranges import ranges
 from patchfem.scene.scene import SceneError, load, loads

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from patchfem.campaigns.rows.cells import FLOOR, MOST, cells_of, scores
-from patchfem.campaigns.rows.nulls import NULLS, predicted
+from patchfem.campaigns.rows.null_models import NULLS, predicted
 from patchfem.core import G_N, PatchfemError
 
 TABLE_1 = Path(__file__).parents[3] / "studies" / "rig" / "table1.csv"

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 from scene_texts import BENCH, PATCH, SMALL_PATCH
 
-from patchfem.campaigns.sweeps.ask import Request, cases_of
-from patchfem.campaigns.sweeps.asked import Asked
+from patchfem.campaigns.sweeps.case_models import Asked
 from patchfem.campaigns.sweeps.cases import Cases, product
+from patchfem.campaigns.sweeps.parse_request import Request, cases_of
 from patchfem.scene.axes import read
 from patchfem.scene.scene import SceneError, loads
 

@@ -11,7 +11,7 @@ import pytest
 from command_line import cli
 from scene_texts import BENCH
 
-from patchfem.campaigns.sweeps.asked import Asked
+from patchfem.campaigns.sweeps.case_models import Asked
 from patchfem.campaigns.sweeps.cases import Cases
 from patchfem.campaigns.sweeps.executors import cluster
 from patchfem.campaigns.sweeps.executors.cluster import Cluster, _answer, own_of

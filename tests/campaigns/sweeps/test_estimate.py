@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 from scene_texts import BENCH, COULOMB, POINT, SHORT, SMALL_PATCH
 
-from patchfem.campaigns.sweeps.ask import Request, cases_of, contradictions
-from patchfem.campaigns.sweeps.asked import Asked
+from patchfem.campaigns.sweeps.case_models import Asked
 from patchfem.campaigns.sweeps.estimate import ONCE, estimate
-from patchfem.campaigns.sweeps.executors import Here
+from patchfem.campaigns.sweeps.executors import LocalExecutor
+from patchfem.campaigns.sweeps.parse_request import Request, cases_of, contradictions
 from patchfem.export.sweeps.run import Place, sweep_into
 from patchfem.runs.plan import plan
 
@@ -28,7 +28,7 @@ def test_exact_a_sweep_takes_what_its_cases_take_but_for_what_is_done_once(text,
 def test_always_a_sweep_leaves_on_disk_about_what_it_says(tmp_path):
     asked = Asked(Path("a.toml"), POINT + COULOMB + SHORT)
     cases = cases_of(asked, Request(["friction.static=0.05..0.6:40lin"]))
-    sweep_into(asked, cases, Place(tmp_path / "a"), Here())
+    sweep_into(asked, cases, Place(tmp_path / "a"), LocalExecutor())
     files = [one.stat().st_size for one in (tmp_path / "a").rglob("*") if one.is_file() and one.suffix != ".html"]
     assert 0.5 < estimate(asked, cases)["disk_bytes"] / sum(files) < 2
 

@@ -14,14 +14,14 @@ from deadly_cases import Deadly
 from scene_texts import BENCH, COULOMB, POINT, SHORT
 
 from patchfem.campaigns.sweeps import executors
-from patchfem.campaigns.sweeps.asked import Asked
+from patchfem.campaigns.sweeps.case_models import Asked
 from patchfem.campaigns.sweeps.cases import Cases
-from patchfem.campaigns.sweeps.executors import Here
+from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.campaigns.sweeps.executors.cluster import Cluster
 from patchfem.campaigns.sweeps.executors.pool import Pool
 from patchfem.campaigns.sweeps.sweep import TRIES, Chunks, Clock, Work, solved
 from patchfem.core import Missing, PatchfemError
-from patchfem.runs.many.answers import FAILED, Answers, joined_answers
+from patchfem.runs.batch.case_results import FAILED, CaseResults, joined_answers
 from patchfem.scene.axes import read
 
 SUPPORT = Path(__file__).parents[2] / "support"
@@ -42,7 +42,7 @@ def all_of(asked: Work, executor) -> tuple:
     return joined_answers(count, [part[:2] for part in parts]), pairs
 
 
-def same(found: Answers, want: Answers, cases) -> None:
+def same(found: CaseResults, want: CaseResults, cases) -> None:
     at = list(cases)
     assert found.values.keys() == want.values.keys() >= {"loop_area"}
     assert found.outcome[at].tolist() == want.outcome[at].tolist()
@@ -66,7 +66,7 @@ def one_case_only(tmp_path: Path, once: bool, executor) -> None:
     deadly = (3, 5) if once else (3,)
     asked = work(tell=Deadly(deadly, tmp_path, once))
     found, told = all_of(asked, executor)
-    want, _ = all_of(work(), Here())
+    want, _ = all_of(work(), LocalExecutor())
     lost = [] if once else [3]
     rest = [number for number in range(8) if number not in lost]
     same(found, want, rest)
@@ -144,7 +144,7 @@ def test_exact_the_remaining_time_is_known_after_the_first_chunks():
 def test_exact_a_cluster_answers_as_this_process_does():
     pytest.importorskip("distributed")
     found, _ = all_of(work(), Cluster("", 1))
-    want, _ = all_of(work(), Here())
+    want, _ = all_of(work(), LocalExecutor())
     same(found, want, range(8))
 
 
@@ -162,7 +162,7 @@ KILLED = """\
 import os, signal, sys
 from pathlib import Path
 from typing import ClassVar
-from patchfem.campaigns.sweeps.ask import Request, asked_of
+from patchfem.campaigns.sweeps.parse_request import Request, asked_of
 from patchfem.campaigns.sweeps.executors.pool import Pool
 from patchfem.export.sweeps.run import Place, sweep_into
 def told(done, total, *_):

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scene_texts import COATED, COULOMB, DRIVE, MODE, NONLOCAL, POINT, SECOND, SHEAR, friction_of
 
-from patchfem.campaigns.sweeps.asked import Asked
+from patchfem.campaigns.sweeps.case_models import Asked
 from patchfem.core import PatchfemError
 from patchfem.model.alike import columns_of
-from patchfem.runs.many.lumped import columns, lanes
-from patchfem.scene.changed import PLAIN
+from patchfem.runs.batch.lumped import columns, lanes
+from patchfem.scene.overrides import PLAIN
 
 PLASTIC = '[friction]\nlaw = "elastic-plastic"\nstatic = 0.3\nbond_length = "10 um"\n'
 SPRINGS = PLASTIC.replace('bond_length = "10 um"', 'stiffness = "2e6 N/m"')

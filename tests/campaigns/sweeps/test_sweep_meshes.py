@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scene_texts import PATCH
 
-from patchfem.campaigns.sweeps.asked import Asked
+from patchfem.campaigns.sweeps.case_models import Asked
 from patchfem.campaigns.sweeps.cases import Cases
-from patchfem.campaigns.sweeps.executors import Here
+from patchfem.campaigns.sweeps.executors import LocalExecutor
 from patchfem.campaigns.sweeps.executors.pool import Pool
 from patchfem.campaigns.sweeps.sweep import Work, solved, with_meshes
-from patchfem.runs.many.answers import joined_answers
+from patchfem.runs.batch.case_results import joined_answers
 from patchfem.scene.axes import read
 
 WORK = Work(Asked(Path("a.toml"), PATCH), Cases(tuple(read(["contact.tilt.angle=2e-5 rad,2e-4 rad",
@@ -25,7 +25,7 @@ def test_exact_meshes_are_made_once_and_travel_with_the_work():
 
 @pytest.mark.slow
 def test_exact_processes_that_begin_before_the_meshes_are_chosen_take_them():
-    here = joined_answers(4, [part[:2] for part in solved(WORK, range(4), Here())])
+    here = joined_answers(4, [part[:2] for part in solved(WORK, range(4), LocalExecutor())])
     pool = Pool(2)
     found = joined_answers(4, [part[:2] for part in solved(WORK, range(4), pool)])
     assert pool.ready == [] and found.numerics == here.numerics

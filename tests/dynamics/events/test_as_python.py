@@ -5,7 +5,7 @@ import pytest
 from event_reference import random_basis
 
 from patchfem import compiled
-from patchfem.compiled.plain import plain
+from patchfem.compiled.no_jit import plain
 from patchfem.core import BaseSine
 from patchfem.dynamics.events import cost, histories
 from patchfem.dynamics.events.elements import coulomb, elements_of
@@ -59,7 +59,7 @@ def test_exact_a_function_is_compiled_from_where_its_work_is_long(tmp_path, monk
     entry.expect(0.4)
     assert entry(segment, 2.0, 0.25, 1.5) == 3.25 and len(calls) == 1
     entry.expect(0.5)
-    assert entry.held_call(entry.held(0.25, 1.5), segment, 2.0) == 3.25 and len(calls) == 1
+    assert entry.call_with_bound_args(entry.held(0.25, 1.5), segment, 2.0) == 3.25 and len(calls) == 1
     entry.expect(0.2)
     assert entry(segment, 2.0, 0.25, 1.5) == 7.0 and len(calls) == 2
     compiled.UNKEPT.clear()

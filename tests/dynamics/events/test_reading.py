@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from patchfem.compiled.plain import plain
+from patchfem.compiled.no_jit import plain
 from patchfem.core import BaseSine, ModalBasis
 from patchfem.dynamics.events import histories
 from patchfem.dynamics.events import names_kernels as at
@@ -47,12 +47,12 @@ def test_exact_reading_is_the_sum_over_samples_of_the_series(drive, many):
     owner = np.repeat(np.arange(len(rows)), PLACE.size)
     tau, weight = (half * (1 + PLACE)).ravel(), (half * WEIGHT).ravel()
     out, time, ends = run.dense_values(rows, owner, tau), rows[owner, 0] + tau, done.window
-    felt, span, x = run._as_response(out, time).acceleration, weight.sum(), done.reading
+    friction_force, span, x = run._as_response(out, time).acceleration, weight.sum(), done.reading
     assert x.span == pytest.approx(span, rel=1e-13) and x.period == drive.period
     turn = np.exp(-1j * drive.omega * time) * weight
-    size = np.abs(felt).max()
+    size = np.abs(friction_force).max()
     for harmonic, wave in zip((1, 3), x.waves):
-        wanted = 2 / span * abs(np.sum(weight * felt * np.exp(-1j * harmonic * drive.omega * time)))
+        wanted = 2 / span * abs(np.sum(weight * friction_force * np.exp(-1j * harmonic * drive.omega * time)))
         assert wave == pytest.approx(wanted, rel=1e-11, abs=1e-13 * size)
     assert x.acceleration == pytest.approx(np.abs(ends.acceleration).max(), rel=1e-4)  # samples miss the peak
     assert x.acceleration >= np.abs(ends.acceleration).max() * (1 - 1e-13)

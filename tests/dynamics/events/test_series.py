@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from patchfem.compiled.plain import plain
+from patchfem.compiled.no_jit import plain
 
 series = plain("patchfem.dynamics.events.series_kernels")
 

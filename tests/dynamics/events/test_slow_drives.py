@@ -9,7 +9,7 @@ from event_reference import basis_of, random_basis
 from patchfem.core import BaseSine, ModalBasis, Segment
 from patchfem.dynamics.events import histories
 from patchfem.dynamics.events.elements import elements_of
-from patchfem.dynamics.events.plant import plant_of
+from patchfem.dynamics.events.modal_system import plant_of
 from patchfem.response.measures import energy_balance
 from patchfem.structure.drives import Piecewise, Recorded, Sweep
 

@@ -180,9 +180,9 @@ def test_exact_accelerations_are_those_of_the_equation(law):
     numbers = run.numbers_of(law, some, steps)
     for k in range(4, 2 * steps + 1, 4):
         first = (k - 4) % steps
-        part, room = table[:, first:first + 5].copy(), run.room_of(numbers, motion)
+        part, workspace = table[:, first:first + 5].copy(), run.room_of(numbers, motion)
         run.kernels(law).march(numbers, np.arange(35), motion, part, 1, np.zeros((35, 1, 4)), np.zeros(35, np.int64),
-                               *room)
+                               *workspace)
         sine, pull = table[0, k % steps], run.own_of(law, motion, "FELT") if law in FLOWS else motion[:, at.PLACE]
         want = some.out * (some.push * sine - some.damp * motion[:, at.V] - some.square * motion[:, at.X] - pull) \
             + some.base * sine

@@ -11,7 +11,7 @@ from patchfem.dynamics.march.march import march
 from patchfem.dynamics.march.models import points_model
 from patchfem.friction.bonds.parameters import Bonds
 from patchfem.response import loops, measures, spectrum
-from patchfem.runs.many.samples import Samples
+from patchfem.runs.batch.samples import Samples
 from patchfem.slip.shear_modes import shear_modes
 
 ONE = ModalBasis(("a",), np.array([OMEGA]), np.full(1, 0.05), np.ones(1), np.ones(1), np.ones(1), 1.0)

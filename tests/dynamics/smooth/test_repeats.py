@@ -27,7 +27,7 @@ def test_exact_cycles_that_are_left_out_are_as_the_last_one(name):
     left.onward(400 * SINE.period)
     whole.until(400 * SINE.period)
     size = abs(whole.kept.cycles[:2]).max()
-    assert 0 < left.unlike <= REPEATS * 1e-9 and left.kept.tally[DONE] < 0.5 * whole.kept.tally[DONE]
+    assert 0 < left.unlike <= REPEATS * 1e-9 and left.kept.counters[DONE] < 0.5 * whole.kept.counters[DONE]
     assert left.time == pytest.approx(whole.time, rel=1e-14)
     scale = [size, size * OMEGA]
     assert left.moving.y[:2] / scale == pytest.approx(whole.moving.y[:2] / scale, abs=1e-7)

@@ -151,7 +151,7 @@ def test_exact_a_fork_goes_on_as_the_run_would():
     twin = run.fork(SINE)
     run.until(3 * SINE.period)
     twin.until(3 * SINE.period)
-    assert np.array_equal(run.moving.y, twin.moving.y) and twin.kept.tally[DONE] == run.kept.tally[DONE]
+    assert np.array_equal(run.moving.y, twin.moving.y) and twin.kept.counters[DONE] == run.kept.counters[DONE]
 
 
 def test_exact_phasors_of_chosen_cycles_are_those_of_every_cycle():
@@ -192,7 +192,7 @@ def test_exact_slides_far_below_the_bond_length_cost_no_small_steps(drive):
         sway = np.exp(-decay * times) * (np.cos(free * times) + decay / free * np.sin(free * times))
         want = rest + (1e-14 - rest) * sway
         assert rows[:, 1] == pytest.approx(want, abs=1e-7 * 1e-14)
-    assert run.kept.tally[DONE] < 1500
+    assert run.kept.counters[DONE] < 1500
 
 
 @pytest.mark.parametrize("share", [0.33, 0.348, 0.385])

@@ -56,7 +56,7 @@ def test_always_a_motion_that_has_crept_to_rest_comes_to_its_end():
     run = Motion(one_mode(omega, 0.05, 0.7626), free, law, 104, 1e-9, start=Start(np.array([4.631e-5]), np.zeros(1)))
     for cycle in range(105):
         run.until(cycle / 162.4)
-    z, v, done = abs(run.moving.y[0]), abs(run.moving.y[1]), run.kept.tally[DONE:REFUSED + 1].sum()
+    z, v, done = abs(run.moving.y[0]), abs(run.moving.y[1]), run.kept.counters[DONE:REFUSED + 1].sum()
     assert run.outcome is None and done < 2000
     assert z < 1e-25 * 4.631e-5 and v < 1e-25 * 4.631e-5 * omega
     # what friction and damping took is the energy of the start
@@ -73,7 +73,7 @@ def test_always_a_block_that_rings_on_its_bonds_far_from_rest_is_not_refused_for
     run = Motion(one_mode(omega, 0.05, 0.4143), drives.release(1 / 62.86), law, 108, tolerance, start=start)
     run.until(108 / 62.86)
     y, force = run.moving.y, run.settled()[0][5]
-    assert run.outcome is None and run.kept.tally[DONE:REFUSED + 1].sum() < 40_000
+    assert run.outcome is None and run.kept.counters[DONE:REFUSED + 1].sum() < 40_000
     assert abs(y[1]) < 1e-9 * omega * abs(y[0])
     assert force == pytest.approx(-0.4143 * omega**2 * y[0], rel=1e-8)  # the bonds balance the spring
 

@@ -9,7 +9,7 @@ from scene_texts import COULOMB, POINT, SHORT
 
 from patchfem.campaigns.sweeps.ranking import Share
 from patchfem.export.pages import limits, peaks, ranked
-from patchfem.export.pages.lead import lead_of
+from patchfem.export.pages.headline import lead_of
 from patchfem.export.pages.sweep import page
 from patchfem.export.sweeps.page import read_table
 from patchfem.scene.starting import text_of

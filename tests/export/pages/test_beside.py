@@ -8,7 +8,7 @@ from page_data import charts_of
 
 from patchfem.core import Measure, PatchfemError
 from patchfem.export.netcdf import of_run, write
-from patchfem.export.pages.beside import page, read
+from patchfem.export.pages.several_runs import page, read
 from patchfem.export.summary import summary, write_json
 
 SCENE = """[normal]

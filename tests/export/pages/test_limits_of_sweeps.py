@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from page_data import own_part
 
-from patchfem.export.pages.lead import lead_of
+from patchfem.export.pages.headline import lead_of
 from patchfem.export.pages.limits import _percent, as_json, limits_of_sweep, sentence
 from patchfem.export.pages.sweep import page
 from patchfem.export.sweeps.answer import answer_of

@@ -5,8 +5,8 @@ import pytest
 from scene_texts import PIECE
 
 import patchfem as pf
-from patchfem.export.missed import by_floor, counted, over, sentence
-from patchfem.export.pages.lead import lead_of
+from patchfem.export.pages.headline import lead_of
+from patchfem.export.tolerance_misses import by_floor, counted, over, sentence
 
 NAN = np.nan
 

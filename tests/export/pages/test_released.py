@@ -12,7 +12,7 @@ from patchfem.export.drawing.charts import histories
 from patchfem.export.drawing.pictures import draw
 from patchfem.export.page_data import Motion, RunData, SceneText, Verdict
 from patchfem.export.pages.released import released, swung
-from patchfem.export.pages.words import headline
+from patchfem.export.pages.sentences import headline
 from patchfem.export.report import picture
 from patchfem.scene.starting import text_of
 

@@ -11,7 +11,7 @@ from page_data import data_of, own_part, unheard
 from patchfem.export.pages import library
 from patchfem.export.pages.document import Section, document, encoded, figure
 from patchfem.export.pages.document import table as sheet
-from patchfem.export.pages.lead import span
+from patchfem.export.pages.headline import span
 from patchfem.export.pages.sweep import brief, page
 from patchfem.export.sweeps.page import joined, wide
 

@@ -13,9 +13,9 @@ from scene_texts import COULOMB, POINT, SHORT
 from patchfem.campaigns.sweeps import sweep
 from patchfem.export.sweeps import chunks
 from patchfem.export.sweeps.chunks import Chunks
-from patchfem.runs.many import answers as kept
-from patchfem.runs.many import many
-from patchfem.runs.many.answers import Answers
+from patchfem.runs.batch import batches
+from patchfem.runs.batch import case_results as kept
+from patchfem.runs.batch.case_results import CaseResults
 
 RIG = POINT + COULOMB + SHORT
 OVER = ("--over", "drive.acceleration=1 g..5 g:10", "--over", "normal.load=10 N..200 N:10,-1 N")
@@ -37,10 +37,10 @@ def swept(scene):
     return out
 
 
-def some(count: int, seed: int) -> Answers:
+def some(count: int, seed: int) -> CaseResults:
     """Answers of chance, with failed cases, measures that some have not and reasons."""
     rng = np.random.default_rng(seed)
-    found = Answers.blank(count)
+    found = CaseResults.blank(count)
     found.outcome[:] = rng.choice(np.array(["steady", "stuck"], object), count)
     for name, unit in (("loop_area", "J"), ("onset_level", "m s-2")):
         found.measure(name, unit)
@@ -52,7 +52,7 @@ def some(count: int, seed: int) -> Answers:
     return found
 
 
-def same(found: Answers, want: Answers) -> None:
+def same(found: CaseResults, want: CaseResults) -> None:
     assert found.outcome.tolist() == want.outcome.tolist() and found.messages == want.messages
     assert found.units == want.units and found.reasons == want.reasons
     for part in ("values", "errors", "floors"):
@@ -80,7 +80,7 @@ def test_exact_cases_are_found_by_their_names_in_any_order(tmp_path):
     wanted = Chunks(tmp_path, names[[9, 2, 0, 9, 5, 6]])
     wanted.look()
     assert (wanted.held >= 0).tolist() == [True] * 5 + [False]
-    total = Answers.blank(6)
+    total = CaseResults.blank(6)
     for at, part in wanted.parts(np.arange(6)):
         total.place(at, part)
     want = [second.values["loop_area"][k] for k in (3, 0)]
@@ -128,8 +128,8 @@ def test_always_a_damaged_file_is_run_again(swept, scene, tmp_path, monkeypatch,
             damage, path.read_bytes()))
         if damage == "another sign":
             path.rename(path.with_stem(path.stem[:-4] + "0000"))
-    ran, real = [], many.answers
-    monkeypatch.setattr(many, "answers", lambda models, *more: ran.extend(models) or real(models, *more))
+    ran, real = [], batches.answers
+    monkeypatch.setattr(batches, "answers", lambda models, *more: ran.extend(models) or real(models, *more))
     assert cli("sweep", scene, *OVER, "-o", out, "--resume", "--keep", "none").code == 3
     assert len(ran) == 110
     for name in TABLES:
@@ -143,8 +143,8 @@ def test_exact_a_folder_of_summaries_alone_is_gone_on_with(scene, tmp_path, monk
     before = {name: (out / name).read_bytes() for name in TABLES}
     shutil.rmtree(out / "chunks")
     (next((out / "cases").iterdir()) / "summary.json").write_text("{")
-    ran, real = [], many.answers
-    monkeypatch.setattr(many, "answers", lambda models, *more: ran.extend(models) or real(models, *more))
+    ran, real = [], batches.answers
+    monkeypatch.setattr(batches, "answers", lambda models, *more: ran.extend(models) or real(models, *more))
     assert cli(*words, "--resume").code == 3 and len(ran) == 1
     assert {name: (out / name).read_bytes() for name in TABLES} == before
 
@@ -179,7 +179,7 @@ def test_exact_columns_on_disk_make_the_same_tables(swept, scene, tmp_path, monk
     for name in TABLES:
         assert (out / name).read_bytes() == (swept / name).read_bytes()
     assert 7 <= len(list((out / "chunks").iterdir())) <= 14
-    total = Answers.blank(11, tmp_path)
+    total = CaseResults.blank(11, tmp_path)
     total.measure("loop_area", "J")
     assert isinstance(total.values["loop_area"], kept.OnDisk)
     total.values["loop_area"][[3, 5]] = 1.5, 2.5

@@ -9,10 +9,10 @@ import pytest
 from command_line import cli
 from scene_texts import COULOMB, POINT, SHORT
 
-from patchfem.export.sweeps import receipt
+from patchfem.export.sweeps import manifest
 
 OVER = ("--over", "friction.static=0.2,0.3,0.4", "--keep", "none")
-LEAN = """import sys
+NJIT_NO_REFCOUNT = """import sys
 from patchfem.__main__ import _guarded
 assert _guarded(sys.argv[1:]) == 0
 assert not {"numpy", "pydantic", "h5py", "numba"} & set(sys.modules)"""
@@ -31,7 +31,7 @@ def words(*over) -> tuple:
 
 def test_exact_a_resumed_whole_sweep_says_the_same_and_loads_no_numpy(swept):
     scene, out, first = swept
-    done = subprocess.run([sys.executable, "-c", LEAN, "sweep", scene, *OVER, "-o", out, "--resume"],
+    done = subprocess.run([sys.executable, "-c", NJIT_NO_REFCOUNT, "sweep", scene, *OVER, "-o", out, "--resume"],
                           capture_output=True, text=True, check=True)
     assert first.code == 0 and done.stdout == first.out
     told = cli("sweep", scene, *OVER, "-o", out, "--resume", "--json")
@@ -43,7 +43,7 @@ def test_always_whatever_has_changed_is_looked_at(swept, change):
     scene, out, _ = swept
     assert cli("sweep", scene, *OVER, "-o", out, "--resume").code == 0
     over = OVER[1]
-    assert receipt.read(out, receipt.sign(scene, words(over)))["cases"]["count"] == 3
+    assert manifest.read(out, manifest.sign(scene, words(over)))["cases"]["count"] == 3
     file = next((out / "chunks").glob("*.h5")) if change == "chunk" else out / "sweep.csv"
     text, stamp = scene.read_text("utf-8"), file.stat()
     if change in ("chunk", "table"):
@@ -54,16 +54,16 @@ def test_always_whatever_has_changed_is_looked_at(swept, change):
         scene.write_text(text + "# more\n", encoding="utf-8")
     asked = (over + ",0.5", "", "draw=0,0,0", "page=True") if change == "words" else \
         (over, "", "draw=0,0,0", "page=False") if change == "page" else words(over)
-    assert receipt.read(out, receipt.sign(scene, asked)) == {}
+    assert manifest.read(out, manifest.sign(scene, asked)) == {}
     scene.write_text(text, encoding="utf-8")
     again = cli("sweep", scene, *OVER, "-o", out, "--resume")  # it is whole again, and has its receipt
-    assert again.code == 0 and receipt.read(out, receipt.sign(scene, words(over)))
+    assert again.code == 0 and manifest.read(out, manifest.sign(scene, words(over)))
 
 
 def test_exact_a_sweep_with_a_failed_case_has_no_receipt(swept, tmp_path):
     scene, *_ = swept
     assert cli("sweep", scene, "--over", "friction.static=0.2,-1", "--keep", "none", "-o", tmp_path / "out").code == 3
-    assert not (tmp_path / "out" / receipt.NAME).exists()
+    assert not (tmp_path / "out" / manifest.NAME).exists()
 
 
 BENCH = POINT + COULOMB + '[slide]\nkind = "file"\nfile = "one.csv"\n'
@@ -91,7 +91,7 @@ def test_always_a_file_that_a_sweep_names_anywhere_counts(tmp_path, monkeypatch,
     first = last()
     (tmp_path / "two.csv").write_text(rows.format(20), encoding="utf-8")
     if not whole:
-        (tmp_path / "out" / receipt.NAME).unlink()
+        (tmp_path / "out" / manifest.NAME).unlink()
     if "--set" in words:  # of all cases: the folder is that of another scene
         told = cli("sweep", "rig.toml", *words, "--keep", "none", "-o", "out", "--resume")
         assert told.code == 2 and "contains a sweep of another scene" in told.err
@@ -103,7 +103,7 @@ def test_always_the_content_of_a_file_that_a_word_names_counts(swept):
     scene, *_ = swept
     other = scene.parent / "push.csv"
     other.write_text("1", encoding="utf-8")
-    before = receipt.sign(scene, words('drive.file="push.csv"'))
+    before = manifest.sign(scene, words('drive.file="push.csv"'))
     other.write_text("2", encoding="utf-8")
-    assert before != receipt.sign(scene, words('drive.file="push.csv"'))
-    assert receipt.sign(scene.parent / "none.toml", words()) == "" and receipt.read(scene.parent, "") == {}
+    assert before != manifest.sign(scene, words('drive.file="push.csv"'))
+    assert manifest.sign(scene.parent / "none.toml", words()) == "" and manifest.read(scene.parent, "") == {}

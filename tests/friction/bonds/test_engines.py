@@ -18,8 +18,8 @@ from patchfem.model.model import build
 from patchfem.runs.plan import plan
 from patchfem.runs.rig.interface import contact_model
 from patchfem.runs.rig.lists import quadrature_of
+from patchfem.runs.rig.motion_warnings import created_warning
 from patchfem.runs.rig.numerics import choose as settings_of
-from patchfem.runs.rig.remarks import created_warning
 from patchfem.scene import scene
 from patchfem.scene.keys.tables import Accuracy
 
@@ -93,7 +93,7 @@ def test_exact_reading_report_creates_energy_in_the_loop():
         forces, energies, bad, contact = follow(list_model(law, 1.0, np.inf, 0.0), path, 1.0)
         work = forces[:-1, 1] @ np.diff(path)
         assert bad == 0 and work / (4 * 0.01 * 20) == pytest.approx(want, rel=1e-3)
-        created, dissipated = contact.tally[6:8]
+        created, dissipated = contact.counters[6:8]
         assert work == pytest.approx(dissipated - created + energies[-1, 1], abs=1e-15)
         assert (created > 1e-4) == (reading == "report") and (created == 0) == (reading == "stretch")
 
@@ -105,7 +105,7 @@ def test_always_the_stretch_reading_creates_next_to_nothing(order, initial, size
     of the work in the last rows, where the force jumps or has a cusp inside a step; the mean from the energy none."""
     path = random_walk(8, 400, size)
     _, _, bad, contact = follow(list_model(Bonds(1.0, 1.0, order, initial=initial), 1.0, np.inf, 0.0), path, 1.0)
-    assert bad == 0 and contact.tally[6] <= 1e-7 * contact.tally[7]
+    assert bad == 0 and contact.counters[6] <= 1e-7 * contact.counters[7]
 
 
 @pytest.mark.parametrize("order", [-0.5, -0.9])
@@ -154,7 +154,7 @@ def test_exact_engine_of_a_scene(tmp_path):
                                          ("recursion", 1, "stretch", "element")):
         found = build(rig(tmp_path, engine, reading, order))
         numerics = settings_of(found)
-        assert contact_model(found, numerics, None).contact == f"dynamics.contacts.{kind}_kernels"
+        assert contact_model(found, numerics, None).contact == f"dynamics.interfaces.{kind}_kernels"
         used = quadrature_of(found, numerics).engine
         assert used == engine or engine == "auto"
         assert any(f"method of the sum over bonds: {used}" in line for line in plan(found).verdict)

@@ -10,8 +10,8 @@ from patchfem.scene.keys.quantities import EXAMPLES, KINDS
 from patchfem.scene.keys.tables import Interface, Tables
 from patchfem.scene.keys.types import keys, kind_of, meaning, model_of, parts, record
 from patchfem.scene.reader import is_value
-from patchfem.scene.rules.draft import SELECTORS, each
 from patchfem.scene.rules.limits import NOT_YET_BUILT
+from patchfem.scene.rules.scene_draft import SELECTORS, each
 
 FOLDER = Path(__file__).parents[3] / "patchfem" / "scene"
 FILE = FOLDER / "README.md"

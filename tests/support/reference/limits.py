@@ -25,7 +25,7 @@ SIZES = {  # constant -> what it bounds and how it is written
     "scene.keys.tables.MOST_MASSES": "number of masses in structure.masses",
     "effects.MOST_COORDINATES": "number of masses or modes of a rig",
     "scene.axes.MOST": "number of values in one range of a sweep",
-    "campaigns.sweeps.ask.MOST": "number of cases of a sweep",
+    "campaigns.sweeps.parse_request.MOST": "number of cases of a sweep",
     "inputs.cells.LARGEST": "bytes of a text file with a table", "inputs.records.LARGEST": "bytes of a laboratory file",
     "inputs.matlab.LARGEST_FILE": "bytes of a .mat file",
     "inputs.matlab5.LARGEST": "number of elements of one variable in a .mat file",
@@ -39,7 +39,7 @@ SIZES = {  # constant -> what it bounds and how it is written
     "runs.rig.costs.LONGEST": "estimated time to compute a whole motion by the event-to-event method [s]",
     "structure.drive_sizes.MOST_EVEN": "number of samples at equal spacing that are stored of a whole release, at "
                                        "least 20 per cycle; of a longer release turning points and the last cycles",
-    "dynamics.resume.MOST_KEPT": "number of samples stored before the last cycles; longer records are thinned out"}
+    "dynamics.checkpoint.MOST_KEPT": "number of samples stored before the last cycles; longer records are thinned out"}
 LEFT_OUT = f"""\
 **Two dimensions.** The pieces are sections in plane strain, or in plane stress with `contact.plane`. A note of every
 patch gives the difference between plane strain and plane stress. Effects at the two ends of the width are neglected.

@@ -1,7 +1,7 @@
 """Ways to work on the chunks of a sweep: in this process, in others beside it, on a Dask cluster.
 
 Each has `workers` and `run(work, take, say)`, which gives (chunk, seconds, answer or Died) of every chunk that `take`
-hands out. `of` finds one by its name; read `Here` first.
+hands out. `of` finds one by its name; read `LocalExecutor` first.
 """
 
 from collections.abc import Callable, Iterator
@@ -11,7 +11,7 @@ from ..sweep import Work, timed
 from . import cluster, pool
 
 
-class Here:
+class LocalExecutor:
     """The executor of this process: chunks one after the other."""
 
     workers = 1
@@ -37,5 +37,5 @@ def of(name: str = "", jobs: int = 1):
         raise PatchfemError(f"--executor {name}: not possible; use --executor dask, --executor dask:ADDRESS, or -j N "
                             "without --executor")
     if jobs == 1:
-        return Here()
+        return LocalExecutor()
     return pool.Pool(jobs)

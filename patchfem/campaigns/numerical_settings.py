@@ -1,0 +1,130 @@
+"""Numerical settings of a model that can be turned: which it has, and its values from coarse to fine."""
+
+from dataclasses import replace
+from typing import NamedTuple
+
+from ..effects import has
+from ..model.model import Model
+from ..runs.bench import engine
+from ..runs.plan import plan
+from ..runs.rig import numerics
+from ..scene.rules.scene_draft import acts
+
+KNOBS = ("element_size", "steps_per_cycle", "shear_modes", "jumps")
+LEVELS = 5  # values of a knob, each twice as fine as the one before
+TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4, 1e-5)  # of a mesh that is chosen
+SCENE_TOLERANCES = (1e-1, 1e-2, 1e-3, 1e-4)  # of a whole scene; tighter ones take long and few scenes meet them
+MOST_CELLS = 1600  # columns of the finest even mesh
+MOST_STEPS = 12800
+MIDDLE = {"shear_modes": 8, "jumps": 8}  # of the values where the scene pins none
+
+
+class Setting(NamedTuple):
+    """One value of a knob.
+
+    label: for tables; value: of the knob in SI, None where the scene's tolerance chooses; words: the setting in a
+    sentence; level: halvings of the edges of a mesh file.
+    """
+
+    label: str
+    value: float | None
+    words: str
+    model: Model
+    level: int = 0
+
+
+def knobs_of(model: Model) -> list:
+    """Knobs, of KNOBS, that change what a model computes: those of its mesh, its steps, its shear modes and its
+    jumps over cycles of wear."""
+    out, engine = ["element_size"] if model.patch is not None else [], plan(model).engine
+    engine = "bench" if model.kind == "bench" else engine  # that of its sum over bonds takes the same steps
+    out += [knob for knob in ("steps_per_cycle", "shear_modes") if acts(knob, model.kind, engine)
+            and (knob != "shear_modes" or (model.soft and has(model.friction.law, "bonds")))]
+    if model.wear is not None and model.patch is not None:
+        out.append("jumps")
+    return out
+
+
+def settings(model: Model, knob: str) -> list:
+    """Settings of a knob, coarse to fine, that of the scene itself among them; one that its tolerance chooses is last
+    where the others are numbers."""
+    if knob == "element_size":
+        if model.patch.mesh is not None:
+            return [Setting(f"file, edges / {2**level}", float(2**-level), _split_words(level), model, level)
+                    for level in range(3)]
+        return _by_tolerance(model) if model.patch.chosen else _even(model)
+    return _counted(model, knob)
+
+
+def _split_words(level: int) -> str:
+    return f"contact.mesh with every element edge halved {level} times" if level else "contact.mesh as it is"
+
+
+def with_tolerance(model: Model) -> list:
+    """Settings for a row of values of accuracy.tolerance, wide to tight, that of the scene among them."""
+    own = model.accuracy.tolerance
+    models = {one: with_setting(model, "tolerance", one) for one in SCENE_TOLERANCES} | {own: model}
+    return [Setting(f"{one:g}", one, f"tolerance {one:g}", models[one]) for one in sorted(models, reverse=True)]
+
+
+def with_setting(model: Model, key: str, value: float) -> Model:
+    """Return a model with another value of a key of [accuracy]."""
+    return replace(model, accuracy=model.accuracy.model_copy(update={key: value}))
+
+
+def _by_tolerance(model: Model) -> list:
+    """Meshes that tolerances choose; one named twice is that of the scene."""
+    own = model.accuracy.tolerance
+    return [Setting(f"tolerance {one:g}", one, "element size set by the tolerance" + f" {one:g}" * (one != own),
+                    replace(model, patch=replace(model.patch, mesh_tolerance=one)))
+            for one in sorted({*TOLERANCES, own}, reverse=True)]
+
+
+def _even(model: Model) -> list:
+    """Even meshes, and of a static patch the mesh that its tolerance chooses."""
+    length, out = model.patch.length, []
+    middle = round(length / model.patch.size)
+    for power in range(-3, LEVELS - 3):
+        cells = round(middle * 2.0**power)
+        if 8 <= cells <= MOST_CELLS or not power:
+            label, size = f"{1e6 * length / cells:.4g} um", length / cells
+            turned = replace(model, patch=model.patch.sized(size)) if power else model
+            out.append(Setting(label, size, f"element size {label}", turned))
+    if model.kind == "patch":
+        chosen = replace(model, patch=model.patch.sized(None))
+        out.append(Setting("by tolerance", None, "element size set by the tolerance", chosen))
+    return out
+
+
+def _counted(model: Model, knob: str) -> list:
+    """Values of a knob that counts, around that of the scene."""
+    pinned, middle = _pinned(model, knob), _middle(model, knob)
+    words, out = "{} " + knob.replace("_", " "), []
+    for power in range(-2, LEVELS - 2):
+        value = max(1, round(middle * 2.0**power))
+        own = not power and (pinned or knob == "steps_per_cycle")
+        if own or knob != "steps_per_cycle" or 4 <= value <= MOST_STEPS:
+            turned = model if own else _with(model, knob, value)
+            out.append(Setting(str(value), float(value), words.format(value), turned))
+    if not pinned and knob != "steps_per_cycle":
+        out.append(Setting("by tolerance", None, words.format("").strip() + " set by the tolerance", model))
+    return out
+
+
+def _pinned(model: Model, knob: str) -> int | None:
+    return model.wear.jumps if knob == "jumps" else getattr(model.accuracy, knob)
+
+
+def _middle(model: Model, knob: str) -> int:
+    if knob != "steps_per_cycle":
+        return _pinned(model, knob) or MIDDLE[knob]
+    if model.kind == "bench":
+        return engine.steps_of(model)
+
+    return numerics.choose(model).steps
+
+
+def _with(model: Model, knob: str, value: int) -> Model:
+    if knob == "jumps":
+        return replace(model, wear=replace(model.wear, jumps=value))
+    return with_setting(model, knob, value)

@@ -1,0 +1,100 @@
+"""A contact, `arrays.BondList`, of one shared list of bonds: force, solve without a slope, commit, energy book.
+
+The functions are those that `march.loop_kernels` asks of every contact.
+"""
+
+import numpy as np
+
+from ...compiled.jit import njit
+from ...friction.bonds.list_kernels import list_force, list_mean, list_slope, list_step
+from ...friction.bonds.list_sum_kernels import MOMENTS, POWER
+from ...friction.flags_kernels import NJIT_NO_REFCOUNT
+from ..modal_kernels import narrowed
+
+SHORT = 1e-9  # bond lengths of an increment, below which its slope is that of both ways
+OWED = 1e-4  # bond lengths at the friction limit: the most that a list of stretched bonds may owe
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def answer(dq, c, v0, dt):
+    """(path-mean weight [1], its slope over dq [1/m]) of a list over dq [m]; the slope of a law other than that of
+    MOMENTS is that of a mean whose force depends on the slide alone, and may be below 0."""
+    if c.law[1] == MOMENTS:
+        return list_slope(dq, c, v0, dt)
+    mean, short = list_mean(dq, c, v0, dt), SHORT * c.law[2]
+    if abs(dq) > short:
+        return mean, (list_force(dq, c, v0, dt) - mean) / dq
+    return mean, (list_force(short, c, v0, dt) - list_force(-short, c, v0, dt)) / (4 * short)
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def pulled(dq, c, v0, dt):
+    """(path-mean force [N], its slope over dq [N/m]) of a bond list over dq [m]; a slope of 0 stands for an unknown
+    one."""
+    scale = c.force[0]
+    if c.law[1] == MOMENTS:
+        force, slope = list_slope(dq, c, v0, dt)
+        return scale * force, scale * slope
+    return scale * list_mean(dq, c, v0, dt), 0.0
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def solve(free, beta, q, v, dt, c, goal):
+    """(dq, path-mean force, iterations) of a step with dq = free - beta force, by secants; iterations < 0 when it
+    failed."""
+    here, gain = 2 * c.last[0] - c.last[1], 1 + beta * c.force[0] / c.law[2]
+    low, high, last, last_miss = -np.inf, np.inf, here, 0.0
+    for count in range(1, 300):
+        force = pulled(here, c, v, dt)[0]
+        miss = here - free + beta * force
+        if abs(miss) <= goal * beta or high - low <= 4e-16 * (abs(free) + beta * c.bound[0]):
+            return here, force, count
+        if count > 1:
+            gain = (miss - last_miss) / (here - last) if here != last else 1.0
+            gain = gain if gain > 0.1 else 1.0
+        last, last_miss = here, miss
+        low, high, here = narrowed(low, high, here, miss, gain, count - 8)
+    return last, force, -300
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def given(dq, q, v, dt, c, goal):
+    """(path-mean force [N], True) over a slide increment dq [m] in dt [s] that is prescribed."""
+    return pulled(dq, c, v, dt)[0], True
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def commit(dq, force, q, v0, v1, dt, c):
+    """Move the list by the solved step. Returns (work that is not stored [J], whether the list had room).
+
+    That work is dissipated where positive; the printed law also creates energy, and both are summed apart. The stretch
+    reading creates none. What its sums gain in a short step beyond the work, as strips change from one rule of
+    integration to another, was in store before: it is owed, up to OWED, and the next dissipation repays it.
+    """
+    c.last[1] = c.last[0]
+    c.last[0] = dq
+    before = c.counters[4]
+    ok = list_step(dq, c, v0, v1, dt)
+    return booked(force * dq, before, c.force[0], c), ok
+
+
+@njit(error_model="numpy", forceinline=True, **NJIT_NO_REFCOUNT)
+def booked(work, before, limit, c):
+    """Book a step of the list c: its work [J] that is not stored; before: `counters[4]` before it, limit: mu_s N [N]."""
+    net = work - limit * (c.counters[4] - before)
+    if c.law[1] <= POWER and limit > 0:
+        owed = c.counters[11] - net / limit
+        c.counters[11] = min(max(owed, 0.0), OWED * c.law[2])
+        net = limit * (c.counters[11] - owed)
+    if net < 0:
+        c.counters[6] -= net
+    else:
+        c.counters[7] += net
+    return net
+
+
+@njit(error_model="numpy", **NJIT_NO_REFCOUNT)
+def state(c, q, v):
+    """(force [N], stored energy [J], irreversible slip [m]) of the list as it stands at the slide q [m]."""
+    force = c.force[0] * c.counters[5]
+    return force, c.force[0] * (c.counters[4] - c.counters[11]), q - force * c.law[2] / c.force[0] if c.force[0] > 0 else q

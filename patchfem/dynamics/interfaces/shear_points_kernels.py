@@ -1,0 +1,56 @@
+"""What the points behind shear modes answer to their slides: forces and slopes, by the rows of `arrays.Sheared.points`.
+
+The points are bonds of the stretch reading with p = 1, or elastic-plastic. A step has the path mean of its forces under
+the load in the row LOAD; at its `ending` they are those after the slide.
+"""
+
+from ...compiled.jit import njit
+from ...friction.bonds.point_kernels import SHORT, bond_end, bond_mean, loose_mean, short_mean
+from ...friction.flags_kernels import FASTMATH_FLAGS, NJIT_NO_REFCOUNT
+from ...friction.laws.elastic_plastic_kernels import spring_end, spring_mean
+
+PLASTIC, POINTS = 1, 2
+SLACK, FALLS, CALM = 100.0, False, 0.0  # as `shear_solve_kernels` has them
+DENSITY, STRETCH, SQUARE, PLAY, LOAD, SLIDE, FORCE, SLOPE = range(8)  # elastic-plastic: traction/mu, springs
+
+
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
+def short(c, length):
+    """Whether no point slides farther than SHORT bond lengths `length` [m]; not where one slides as far as nan."""
+    points, near = c.points, 0.0
+    for j in range(int(c.count[0])):
+        near += 1.0 if abs(points[SLIDE, j]) <= SHORT * length else 0.0  # a sum, which unlike a maximum is vectorised
+    return near == c.count[0]
+
+
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, forceinline=True, **NJIT_NO_REFCOUNT)
+def respond(kind, ending, c):
+    """Write force [N] and slope [N/m] >= 0 of every point at its slide; returns the friction force [N]."""
+    points, weight, length, force = c.points, c.weight, c.eps[0 if ending else 1], 0.0
+    if kind == POINTS and not ending and c.growth[5] == 0.0 and short(c, length):
+        for j in range(int(c.count[0])):
+            f, s = short_mean(points[DENSITY, j], points[STRETCH, j], points[SLIDE, j], points[LOAD, j], length)
+            points[FORCE, j], points[SLOPE, j] = weight[j] * f, weight[j] * max(s, 0.0)
+            force += weight[j] * f
+        return force
+    return answer(kind, ending, c, length)
+
+
+@njit(error_model="numpy", fastmath=FASTMATH_FLAGS, **NJIT_NO_REFCOUNT)
+def answer(kind, ending, c, length):
+    """`respond` of any law and slide, at a bond length [m]."""
+    points, weight, loose, force = c.points, c.weight, c.growth[5] * length, 0.0
+    for j in range(int(c.count[0])):
+        m, z, load, xi = points[DENSITY, j], points[STRETCH, j], points[LOAD, j], points[SLIDE, j]
+        if kind == PLASTIC:
+            f, s = spring_end(m, z, load, xi, length) if ending else spring_mean(m, z, load, xi, length)
+        elif ending:
+            f, s = bond_end(m, z, xi, load, length)
+        elif loose > 0.0:
+            f, s = loose_mean(m, z, points[PLAY, j], loose, xi, load, length)
+        else:
+            f, s = bond_mean(m, z, xi, load, length)
+        f *= weight[j]
+        points[FORCE, j], points[SLOPE, j] = f, weight[j] * max(s, 0.0)
+        force += f
+    return force

@@ -1,0 +1,274 @@
+"""What a sweep says first: how far its key may go, where its main measure runs, how many cases miss the tolerance."""
+
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import Outcome
+from ...formatting import plain
+from ...runs.batch.case_results import FAILED
+from .. import tolerance_misses
+from ..written import NUMBER, brief, label
+from . import limits, peaks, ranked
+from .key_lines import varies
+from .limits import Limits
+from .sentences import both, joined, zero_below
+
+EXACT = 1e-6  # of a value, up to which no error is told: the values are shown to four digits
+AT = 1e-9  # of a frequency, within which two are one
+NONE = MappingProxyType({})
+SETTLED = ranked.SETTLES
+MOVING = Outcome.TRANSIENT.value, Outcome.GROWS.value  # outcomes of cases that move on when their run ends
+FIRST = ("relative_displacement_amplitude", "loop_area", "friction_ratio_peak", "onset_level", "pressure_peak")
+
+
+class Sentences(NamedTuple):
+    """What a sweep says, a sentence each; "" where there is nothing to say.
+
+    Attributes
+    ----------
+    limit : str
+        How far the key may go.
+    peak : str
+        Where the peak over frequency lies.
+    rank : str
+        Which keys matter most.
+    scatter : str
+        How far the results of random cases scatter.
+    span : str
+        Range of the main measure.
+    misses : str
+        How many cases miss the tolerance.
+    left : str
+        How many cases have no result yet, and whether none has settled.
+    ends : str
+        How many curves over frequency are largest at an end.
+    unsettled : str
+        How far unsettled cases move, where that is farther than the settled ones.
+    """
+
+    limit: str = ""
+    peak: str = ""
+    rank: str = ""
+    scatter: str = ""
+    span: str = ""
+    misses: str = ""
+    left: str = ""
+    ends: str = ""
+    unsettled: str = ""
+
+
+class SweepHeadline(NamedTuple):
+    """What a sweep says first, with the tables behind it.
+
+    Attributes
+    ----------
+    said : Sentences
+    missed : dict
+        Cases over the tolerance, from `missed.counted`.
+    limits : limits.Limits
+        How far a key may go.
+    ranks, spread : dict
+        From `ranked.ranks_of` and `ranked.quantiles`.
+    peaks : Sequence
+        From `peaks.found`.
+    asked : str
+        Measure of `--of`.
+    """
+
+    said: Sentences
+    missed: dict
+    limits: Limits
+    ranks: dict
+    spread: dict
+    peaks: Sequence
+    asked: str
+
+    def sentences(self) -> list:
+        """Return the sentences that people read: the answer, whether all cases meet the tolerance, and the others."""
+        said = self.said
+        rank = said.rank if said.scatter or not (said.limit or said.peak) else ""  # the limits of a grid say more
+        others = [said.limit, said.peak, rank, said.scatter, said.span]
+        if self.asked:
+            others = [said.rank, said.scatter, said.span, said.limit, said.peak]
+        used = self._answer_parts()
+        misses = "" if self.missed or not used else said.misses
+        return [one for one in (self.answer(), misses, *(one for one in others if one not in used)) if one]
+
+    def answer(self) -> str:
+        """Return the answer in one sentence.
+
+        How far the key may go, where the peak is, what matters most and how far the results scatter, or the range of
+        the main measure; in brackets, what qualifies it: cases without a result, unsettled or over the tolerance.
+        """
+        text = joined(self._answer_parts())
+        misses = self.said.misses if self.missed else ""
+        notes = joined([note for note in (self.said.left, misses, self.said.ends) if note])
+        if not text or not notes:
+            return text or notes or self.said.misses
+        first = notes[0].lower() if notes[1].islower() else notes[0]
+        return f"{text.rstrip('.')} ({first}{notes[1:].rstrip('.')})."
+
+    def _answer_parts(self) -> list:
+        """Return the sentences of which the answer is made."""
+        said = self.said
+        drawn = [one for one in (said.rank, said.scatter) if one]
+        over_key = said.limit or said.peak
+        if self.asked == "peak_frequency" and said.peak and not drawn:
+            first = [said.peak]
+        elif self.asked and (drawn or said.span):
+            first = drawn or [said.span]
+        elif over_key:
+            first = [over_key]
+        else:
+            first = drawn or [said.span]
+        return [one for one in (said.unsettled, *first) if one]
+
+
+def lead_of(table: dict) -> SweepHeadline:
+    """Find what a sweep says first; table: as `sweep.page` takes it."""
+    measures, tolerance = table["measures"], table.get("tolerance", np.nan)
+    values = columns(table)
+    outcome = np.asarray(table["outcome"], str)
+    settled = np.isin(outcome, SETTLED)
+    trusted = {name: _trusted(name, one, tolerance, settled) for name, one in measures.items()}
+    keys = [key | {"words": not any(NUMBER.match(str(text)) for text in key["texts"])} for key in table["keys"]]
+    key_limits = Limits()
+    if not table.get("drawn"):
+        key_limits = limits.limits_of_sweep(keys, values, trusted, table["grid"], table.get("patch"))
+    if key_limits.key is not None:  # one unit for its values in all sentences
+        keys = [key_limits.key if key["name"] == key_limits.key["name"] else key for key in keys]
+
+    def where(case: int) -> str:
+        return ", ".join(f"{key['name']} {brief(str(key['texts'][case]))}"
+                         for key in keys if varies(key) or len(keys) == 1)
+
+    found_peaks = peaks.found(keys, values, trusted, table["grid"])
+    keys_ranked = ranked.rank_keys(table, trusted, settled)
+    span_of_measure = span(values, trusted, settled, ranked.asked_first(FIRST, table), _floors(measures, tolerance))
+    unsettled = _unsettled(values, outcome)
+    asked = table.get("first", "")
+    said = Sentences(
+        limit=limits.sentence(key_limits),
+        peak=peaks.sentence(found_peaks),
+        rank=keys_ranked.rank,
+        scatter=keys_ranked.scatter,
+        span=span_of_measure,
+        misses=tolerance_misses.sentence(measures, tolerance, where, asked),
+        left=_left(table, outcome, keys_ranked.rank == ranked.too_few(table, settled)),
+        ends=_peaks_at_ends(table),
+        unsettled=unsettled,
+    )
+    if table.get("drawn"):
+        said = said._replace(span=joined([one for one in (unsettled, span_of_measure) if one]), unsettled="")
+    over = tolerance_misses.counted(measures, tolerance)
+    return SweepHeadline(said, over, key_limits, keys_ranked.shares, keys_ranked.quantiles, found_peaks, asked)
+
+
+def _trusted(name: str, measure: dict, tolerance, settled: np.ndarray) -> np.ndarray:
+    """Check whether each case meets the tolerance and settled, where any settled case has the measure."""
+    needs_no_settling = name.endswith("_steady") or not np.isfinite(measure["values"])[settled].any()
+    return ~tolerance_misses.over(measure, tolerance) & (settled | needs_no_settling)
+
+
+def _floors(measures: dict, tolerance) -> dict:
+    """Return {measure: (cases that meet the tolerance by its floor alone, the floor as people read it)}."""
+    by_floor = {name: tolerance_misses.by_floor(one, tolerance) for name, one in measures.items()}
+    return {name: (cases, tolerance_misses.floor_of(measures[name], cases)) for name, cases in by_floor.items() if cases.any()}
+
+
+def _unsettled(measures: dict, outcome: np.ndarray) -> str:
+    """State how far unsettled cases move, where that is farther than any settled case; else "".
+
+    Parameters
+    ----------
+    measures : dict
+        {name: (values (n,), errors (n,), SI unit)}, NaN where a case has no value.
+    outcome : (n,) ndarray
+    """
+    name = FIRST[0]
+    if name not in measures:
+        return ""
+    values, unit = np.asarray(measures[name][0], float), measures[name][2]
+    known = np.isfinite(values)
+    late = values[known & np.isin(outcome, MOVING)]
+    settled = values[known & np.isin(outcome, SETTLED)]
+    if not late.size or not settled.size or late.max() <= settled.max():
+        return ""
+    low, high = both(name, late.min(), late.max(), unit, 4)
+    extent = high if low == high else f"{low} to {high}"
+    count = int(np.isin(outcome, MOVING).sum())
+    return (f"{count} of {outcome.size} cases did not settle; their {label(name)} at the end of "
+            f"the run is {extent}.")
+
+
+def _peaks_at_ends(table: dict) -> str:
+    """State in how many cases the peak frequency is an end of the swept frequencies; "" for none."""
+    measures, name = columns(table), "peak_frequency"
+    if name not in measures:
+        return ""
+    values = np.asarray(measures[name][0], float)
+    ends = table.get("ends", ())
+    at_end = np.any([np.isclose(values, end, rtol=AT, atol=0) for end in ends], axis=0)
+    at_end &= np.asarray(measures[FIRST[0]][0], float) > zero_below(FIRST[0])
+    count, total = int(at_end.sum()), int(np.isfinite(values).sum())
+    where = f"In {count} of {total} cases" if total > 1 else "In this case"
+    return f"{where} the largest response lies at an end of the swept frequencies, so that it may be no resonance." \
+        if count else ""
+
+
+def _left(table: dict, outcome: np.ndarray, known: bool) -> str:
+    """What holds of all that is said: how many cases of an interrupted sweep have no answer, and that of those that run
+    none has settled, unless that is known; "" where neither is so."""
+    count, ran, said = int(np.sum(outcome == "")), outcome[(outcome != "") & (outcome != FAILED)], []
+    if count:
+        said.append(f"{count} of {outcome.size} cases {'has' if count == 1 else 'have'} no result yet and "
+                    f"{'is' if count == 1 else 'are'} left out.")
+    if ran.size and not np.isin(ran, SETTLED).any() and not known:
+        said.append("No case has settled, so this answer describes the end of each run.")
+    first = table.get("first", "")
+    if first and not np.isfinite(table["measures"].get(first, {"values": ()})["values"]).any():
+        said.append(f"No case has a value of {label(first)}, so this answer describes other measures.")
+    return joined(said)
+
+
+def span(measures: dict, trusted: dict, settled: np.ndarray, names: Sequence = FIRST, least: Mapping = NONE) -> str:
+    """From where to where the first measure of interest runs, and how well its values are known; "" where none has a
+    value that counts.
+
+    measures: {name: (values (n,), errors (n,), SI unit)}, NaN where a case has none; trusted: {name: (n,) whether the
+    value of a case counts}; settled: (n,) whether a case did; names: of the measures, the first of interest first;
+    least: {name: (`missed.by_floor`, the floor as people read it)} of those that meet the tolerance by their floor.
+    """
+    for name in names:
+        every = np.isfinite(measures[name][0]) if name in measures else np.zeros(1, bool)
+        if not every.any():
+            continue
+        there = every & trusted[name]
+        if not there.any():
+            return ""
+        values, errors, unit = (part if isinstance(part, str) else np.asarray(part, float)[there]
+                                for part in measures[name])
+        low, high = both(name, values.min(), values.max(), unit, 4)
+        alike = there.sum() > 1  # of one case nothing runs
+        ran = f"ranges from {low} to {high}" if low != high else f"is {high} throughout" if alike else f"is {high}"
+        known = np.isfinite(errors) & (errors > 0) & (np.abs(values) > zero_below(name))  # 0 is known absolutely
+        known &= ~least[name][0][there] if name in least else True
+        share = float(np.max(errors[known] / np.abs(values[known]))) if known.any() else 0.0
+        bands = [f"{plain(100 * share, 1)} %"] * (share > EXACT)
+        if name in least and least[name][0][there].any():
+            bands.append(f"{least[name][1]}, the floor of this measure")
+        band = f", with errors of at most {' or '.join(bands)}" if bands else ""
+        counts, ended = there.sum(), (every & settled).sum()
+        whose = "" if counts == every.sum() else \
+            f" of the {'only settled case' if counts == 1 else 'settled cases'}" if counts == ended else \
+            f" in the {'only case that meets' if counts == 1 else 'cases that meet'} the tolerance in this measure"
+        return f"{ranked.called(name).capitalize()}{whose} {ran}{band}."
+    return ""
+
+
+def columns(table: dict) -> dict:
+    """The measures of a table as (values, errors, unit)."""
+    return {name: (one["values"], one["errors"], one["unit"]) for name, one in table["measures"].items()}

@@ -1,0 +1,511 @@
+"""The answer of a run in words and in the units that people read: its headline, its measures in groups."""
+
+import re
+from collections.abc import Callable, Sequence
+from html import escape
+from math import ceil, floor, inf, isfinite, log10, pi
+from types import MappingProxyType
+from typing import NamedTuple
+
+from ... import formatting
+from ...core import Measure, Outcome, allowed
+from ...response.outcome import OPEN_LOOP, UNSETTLED
+from ...response.rows import TABLE as MOTION
+from ...response.rows import of_first, of_number
+from ...runs.results.patch_rows import TABLE as STATIC
+from ...runs.results.patch_rows import minimum_of, unknown_measures
+from ...runs.results.result import Result
+from ..summary import measure_object
+from .document import prose
+
+G, LBF, INCH = 9.80665, 4.4482216152605, 0.0254
+DEG = ("deg", 180 / pi)
+WORKSHOP = {  # as scales.LADDERS
+    "m": (("mil", 1e3 / INCH), ("in", 1 / INCH)), "m3": (("in^3", INCH**-3),), "rad": (DEG,),
+    "N": (("lbf", 1 / LBF),), "N m": (("lbf in", 1 / LBF / INCH),), "J": (("in lbf", 1 / LBF / INCH),),
+    "Pa": (("psi", INCH**2 / LBF), ("ksi", 1e-3 * INCH**2 / LBF)),
+    "N m-1": (("lbf/in", INCH / LBF), ("klbf/in", 1e-3 * INCH / LBF))}
+GROUPS = ("motion", "friction", "energy", "patch", "wear")
+SAME = 2e-3  # of the fraction in contact, by which it and the places of the contact may differ without a word
+FEW = 3  # interfaces that are all told of first
+NO_SLIP = 1e-15  # m, the last digits of a slide
+WHOLE_RUN = "over the whole run"
+LOOPS = "over the two stored cycles of the steady motion"
+OVER = {"harmonic": LOOPS}  # what energies are told over, by engine
+MARCHED = "over the cycles of the motion, not those of wear"
+OF_WHAT = {  # said behind a value that would otherwise be taken for another, or for more than it says
+    "loop_area": "per cycle", "friction_work": WHOLE_RUN, "energy_dissipated": WHOLE_RUN, "energy_created": WHOLE_RUN,
+    "stick_fraction": "of the interface as a whole", "equivalent_damping": "a damping ratio of mode 1"}
+SCATTER = "_scatter"  # behind the name of what a record of a random drive shows: how far other records differ
+SHAKEN = {"relative_displacement_rms": "the displacement of the output is {} rms",
+          "absolute_acceleration_rms": "the acceleration of the output is {} rms",
+          "response_frequency": "the frequency response H1 peaks at {}",
+          "response_damping": "the damping ratio of that peak is {}"}
+POWER = "friction_power"  # of a random drive, which has no cycle
+RELEASED = "The run ended before the motion came to rest; raise drive.cycles to see more of the decay."
+GROWN = ("The motion still grows at the end of the run, after {}: the measures describe its last cycles and have no "
+         "error estimate.")
+CHANGES = ("transient", "grows")  # outcomes of a motion whose last cycles differ
+STEPPED = ("jump_level",)  # lies between two drive levels of the scene, whatever the tolerance
+RANGES = {"fraction": 1.0, "phase": pi}  # range of a measure [SI], by the end of its name
+ROUND = 1e-12  # of the friction force times the motion: work that is round-off
+NONE = MappingProxyType({})
+UNKNOWN = " (error unknown)"
+SHARP = "values without ± are exact to the last digit shown"
+SHARP_BUT_UNKNOWN = f"{SHARP}, except where the error is unknown"
+
+
+def units(name: str, value: float, unit: str, error: float | None = None) -> list:
+    """Units [(unit, scale)] in which a person reads the measure `name`, by its size or that of its error; the metric
+    one first.
+
+    value, error and unit: in SI; value times scale is in the unit.
+    """
+    if is_share(name):
+        return [("%", 100.0)]
+    if re.sub(r"_\d+$", "", name).endswith("phase"):  # of an interface after the first too
+        return [DEG]
+    if unit == "m s-2":
+        return [("g", 1 / G)]
+    size = max(abs(value), error or 0.0) if isfinite(error or 0.0) else value
+    return [formatting.fitting(value, unit, error), *([formatting.step_of(WORKSHOP[unit], size)] if unit in WORKSHOP else [])]
+
+
+def texts(name: str, measure: dict, scale: float | None = None) -> tuple:
+    """Value and error of a measure as texts, in the first of its units or with a scale of one's own."""
+    value, error, unit = measure["value"], measure["error"], measure["unit"]
+    if value is None:
+        return "-", ""
+    scale = units(name, value, unit, error)[0][1] if scale is None else scale
+    return formatting.rounded(value * scale, None if error is None else error * scale, zero_below(name, measure) * scale,
+                          unit == "1")
+
+
+def is_share(name: str) -> bool:
+    """Whether a measure is a fraction, which people read in %."""
+    return re.sub(r"_\d+$", "", name).endswith("fraction")
+
+
+def short(name: str, value: float, unit: str, digits: int) -> str:
+    """The value [SI] of a measure with so many digits in the unit that people read, 0 below its floor: `46.68 mJ`."""
+    value, unit = (100 * value, "%") if is_share(name) else (value, unit)
+    return formatting.short(value, unit, digits, zero_below(name))
+
+
+def both(name: str, low: float, high: float, unit: str, digits: int) -> tuple:
+    """Two values [SI] as `short` writes them, in one unit unless one of them is a thousand times the other."""
+    texts = tuple(short(name, one, unit, digits) for one in (low, high))
+    if is_share(name) or unit not in formatting.LADDERS or texts[0].partition(" ")[2] == texts[1].partition(" ")[2] \
+            or "0" in texts or abs(high) > 1000 * abs(low):
+        return texts
+    own, scale = formatting.fitting(max(abs(low), abs(high)), unit)
+    return tuple(f"{formatting.plain(one * scale, digits)} {own}" for one in (low, high))
+
+
+def pair(name: str, measure: dict) -> str:
+    """A measure with its error in the first of its units, such as `14.808 ± 0.041 um`; a dash without a value."""
+    value, error = texts(name, measure)
+    if value == "-":
+        return value
+    unit, scale = units(name, measure["value"], measure["unit"], measure["error"])[0]
+    if below_minimum(name, measure):
+        return f"0 to {formatting.plain((measure['value'] + measure['error']) * scale, 2)} {unit}".rstrip()
+    return formatting.paired(value, error, unit)
+
+
+def below_minimum(name: str, measure: dict) -> bool:
+    """Whether the error of a measure reaches below the smallest value that it can have, 0."""
+    value, error = measure["value"], measure["error"]
+    return minimum_of(name) == 0 and value is not None and bool(error) and error >= value > 0
+
+
+def zero_below(name: str, measure: dict = NONE) -> float:
+    """Floor of a measure in its row, or the smaller one of its run [SI]: below it, it is 0 for a reader.
+
+    A floor that the run has raised to the tolerance times larger terms is what is asked of it, not what is known.
+    """
+    row, own = row_of(name), measure.get("floor") or inf
+    return 0.0 if row is None else min(row.floor, own)
+
+
+def others(name: str, measure: dict) -> str:
+    """The value in the units of a workshop, to the digits its error allows; nothing for one that is 0 within it."""
+    value, error = measure["value"], measure["error"]
+    if value is None or not isfinite(value) or texts(name, measure)[0] == "0" or abs(value) <= (error or 0.0):
+        return ""
+    found = units(name, value, measure["unit"], error)[1:]
+    return " = ".join(f"{texts(name, measure, scale)[0]} {unit}" for unit, scale in found if abs(value) * scale >= 1e-3)
+
+
+def _unknown(measures: dict) -> str:
+    """Names of the static measures that are not known within their own size; "" without any."""
+    found = {name: Measure(**{key: one[key] for key in ("value", "unit", "error")}) for name, one in measures.items()}
+    return " and of ".join(unknown_measures(found))
+
+
+def verdict(summary: dict) -> str:
+    """The sentence on how a run ended, from its summary as summary.json holds it; of a bench also whether it slipped.
+
+    `stuck` speaks of the interface as a whole. Where its last cycles dissipate, or slip, more than their error, part of
+    it slips, and the sentence says how much.
+    """
+    outcome, measures = Outcome(summary["outcome"]), summary["measures"]
+    if outcome is Outcome.NOT_CONVERGED and (unknown := _unknown(measures)):
+        known = "use the other measures with their stated errors"
+        return f"The numerical error of {unknown} is as large as the value, so it is not known; {known}."
+    if summary["kind"] == "bench" and outcome is Outcome.DONE:
+        found = _looped(summary["loop"], measures["equivalent_stiffness"]) if "loop" in summary else outcome.sentence
+        return _slid(measures.get("slip_amplitude"), found, "contact_fraction" in measures)
+    if away := summary.get("run_away"):
+        drive, knee = (short("", away[name], "m s-2", 4) for name in ("drive", "knee"))
+        return (f"{outcome.sentence} The drive, {drive}, is larger than {knee}, above which friction alone does not "
+                "limit the amplitude at resonance.")
+    if outcome is Outcome.TRANSIENT and any(one["effect"] == "drive.kind=free" for one in summary["effects"]):
+        return RELEASED
+    if outcome is not Outcome.STUCK or not {"loop_area", "slip_amplitude"} & measures.keys():
+        return outcome.sentence
+    force, motion = (measures.get(name, {}).get("value") or 0.0 for name in
+                     ("friction_force_peak", "relative_displacement_amplitude"))
+    rings = " The amplitude has not settled: it is that of a transient." * any(
+        one.startswith(UNSETTLED) for one in summary.get("warnings", ()))
+    part = "part of the patch slips" if "contact_fraction" in measures else "part of it slips"
+    for first, least, form in (("loop_area", ROUND * abs(force * motion), "{} per cycle"),
+                               ("slip_amplitude", 0.0, "by {}")):
+        found = {name: one for name, one in measures.items() if re.sub(r"_\d+$", "", name) == first and one["value"]}
+        name = max(found, key=lambda each: found[each]["value"], default="")
+        if name and found[name]["value"] > max(_open(found[name]), least):
+            return f"The interface as a whole sticks, but {part} ({form.format(pair(name, found[name]))}).{rings}"
+    return _holds("contact_fraction" in measures, "cycles") + rings
+
+
+def _holds(patch: bool, cycles: str) -> str:
+    """The sentence where no slip is found. On a patch an edge where the pressure ends slips under any force: on a mesh
+    that does not show it, nothing is said of what lies within an element."""
+    return f"The interface sticks: no slip in the last {cycles}" + \
+        (" beyond the error of this mesh; a slip zone smaller than an element cannot be detected." if patch else ".")
+
+
+def _slid(slip: dict | None, done: str, patch: bool) -> str:
+    """The sentence of a bench: its slip, the mean weighted by the pressure, where that is more than what is open."""
+    if slip is None or slip["value"] is None:
+        return done
+    if slip["value"] <= max(_open(slip), NO_SLIP):
+        return f"{done} {_holds(patch, 'cycle')}"
+    return (f"{done} Slip amplitude (half the peak-to-peak slip, averaged over the interface): "
+            f"{pair('slip_amplitude', slip)}.")
+
+
+def _looped(loop: dict, stiffness: dict) -> str:
+    """The sentence on stiffness and damping of a bench; loop: as `summary.loop_of` has it."""
+    factor, error = loop["loss_factor"], loop["error"]
+
+    def number(scale: float) -> str:
+        if error is not None and factor <= error:
+            return f"at most {formatting.plain((factor + error) * scale, 2)}"
+        value, off = formatting.rounded(factor * scale, None if error is None else error * scale, 1e-9, True)
+        return formatting.paired(value, off, "")
+
+    return (f"At a slide amplitude of {formatting.short(loop['slide_amplitude'], 'm', 4)} the interface has an equivalent "
+            f"stiffness of {pair('equivalent_stiffness', stiffness)} and a loss factor of {number(1.0)} (equivalent "
+            f"damping ratio {number(0.5)}).")
+
+
+def _open(one: dict) -> float:
+    """What a measure leaves open, in its unit: its error, or its floor where none was estimated."""
+    return one["floor"] if one["error"] is None else one["error"]
+
+
+class Statement(NamedTuple):
+    """A part of the headline: a measure ("" for none), and a text with {} for its value and error."""
+
+    measure: str
+    text: str
+
+
+def headline(summary: dict, cycles: float | None, number: Callable[[str, str], str] | None = None,
+             released: str = "") -> str:
+    """State the measures that answer first in one sentence; "" where there is none.
+
+    Parameters
+    ----------
+    summary : dict
+        As summary.json holds it.
+    cycles : float or None
+        Cycles of the drive in the run; None for a run without cycles.
+    number : callable
+        Returns what stands in the sentence for the text of a value and the name of its measure.
+    released : str
+        How a released output swung; it replaces the measures of the last cycles.
+    """
+    measures = summary["measures"]
+    covers_cycle = cycles is None or cycles >= 1 - 1e-6
+    statements = []
+    if summary["outcome"] != "no_contact":
+        statements += [*_wear_statements(measures), *_motion_statements(measures, released)]
+        if covers_cycle and not released:
+            statements += _energy_statements(summary)
+        statements += _patch_statements(summary)
+    parts = [part for part in (_filled(one, measures, number) for one in statements) if part]
+    text = "; ".join(parts)
+    if text and not covers_cycle and not released:
+        text = f"in {cycles:.2g} of a cycle {text}"
+    return f"{text[0].upper() + text[1:]}." if text else ""
+
+
+def _filled(statement: Statement, measures: dict, number: Callable[[str, str], str] | None) -> str:
+    """Return a statement with the value of its measure; "" if the measure has no value."""
+    name, text = statement
+    if not name:
+        return text
+    measure = measures.get(name)
+    if not measure or measure["value"] is None:
+        return ""
+    value, interval = of_records(name, measures)
+    value = value or pair(name, measure)
+    text = text.format(value if number is None else number(value, name))
+    return f"{text} ({interval})" if interval else text
+
+
+def _wear_statements(measures: dict) -> list:
+    texts_by_measure = {"worn_depth_max": "{} worn off at the deepest place", "worn_volume": "{} worn off"}
+    return [Statement(*one) for one in texts_by_measure.items() if one[0] in measures][:1]
+
+
+def _motion_statements(measures: dict, released: str) -> list:
+    if released:
+        rows = [("", released), ("friction_work", "friction dissipates {} during the whole run")]
+    else:
+        is_random = "relative_displacement_rms" in measures
+        amplitude = "half the peak-to-peak displacement of the output is {}" if is_random else \
+            "displacement amplitude at the output {} (half peak-to-peak)"
+        rows = [*SHAKEN.items(),
+                ("relative_displacement_amplitude", amplitude),
+                ("relative_displacement_amplitude_steady", "this amplitude would settle at {}"),
+                ("absolute_acceleration_peak", "peak acceleration {}")]
+    if "relative_displacement_amplitude" not in measures:
+        rows.append(("friction_ratio_peak", "friction ratio peaks at {}"))
+    return [Statement(*row) for row in rows]
+
+
+def _energy_statements(summary: dict) -> list:
+    """Return what friction dissipates: as a power under a random drive, else per cycle at each interface."""
+    if POWER in summary["measures"]:
+        return [Statement(POWER, "friction dissipates {}")]
+    text = "{} dissipated per cycle"
+    if any(warning.startswith(OPEN_LOOP) for warning in summary.get("warnings", ())):
+        text = "friction work of the last cycle {}"
+    elif summary["outcome"] in CHANGES and summary["kind"] in ("rig", "linear"):
+        text += " (mean of the last cycles)"
+    return _at_each_interface(summary, "loop_area", text)
+
+
+def _patch_statements(summary: dict) -> list:
+    fraction = summary["measures"].get("contact_fraction", {}).get("value")
+    where = placed(summary.get("contact"), fraction)
+    statements = _at_each_interface(summary, "contact_fraction", "{} of the length in contact" + where)
+    if summary["kind"] == "patch":
+        statements.append(Statement("pressure_peak", "peak pressure {}"))
+    return statements
+
+
+def _at_each_interface(summary: dict, name: str, text: str) -> list:
+    """Return the statement of each interface, of the first alone where they are many; strips are no interfaces."""
+    count = sum(of_first(measure) == name for measure in summary["measures"])
+    if count < 2 or any(effect["effect"] == "contact.strips" for effect in summary["effects"]):
+        return [Statement(name, text)]
+    if count > FEW:
+        return [Statement(name, f"{text} at interface 1 of {count}")]
+    return [Statement(of_number(name, k), f"{text} at interface {k + 1}") for k in range(count)]
+
+
+def placed(contact: dict | None, fraction: float | None = None) -> str:
+    """Where along x the contact is, as words behind its share of the length, such as `, from x = -6.35 to -3.56 mm
+    (left end)`; "" where all of the length is in contact or this is not known. contact: as `summary.contact_of` has
+    it. fraction: in contact, which may be extrapolated to finer meshes where the places are those of the finest one."""
+    if not contact or not contact["stretches"]:
+        return ""
+    first, last, stretches = contact["from"], contact["to"], contact["stretches"]
+    left, right = stretches[0][0] <= first, stretches[-1][1] >= last
+    if left and right and len(stretches) == 1:
+        return ""
+    unit, scale = formatting.step_of(formatting.LADDERS["m"], max(abs(first), abs(last)))
+    least = min([1e-3 * (last - first), *(1e-2 * (end - begin) for begin, end in stretches if end > begin)])
+    digits = max(0, -floor(log10(least * scale)))  # what tells apart both ends of the shortest part
+
+    def number(place: float) -> str:
+        return f"{round(place * scale, digits) + 0.0:.{digits}f}".rstrip("0").rstrip(".") if digits else \
+            f"{place * scale:.0f}"
+
+    count = len(stretches)
+    parts = stretches if count <= FEW else [[stretches[0][0], stretches[-1][1]]]
+    if count == 1 and parts[0][0] == parts[0][1]:
+        return f", at x = {number(parts[0][0])} {unit}"
+    share = sum(end - begin for begin, end in stretches) / (last - first)
+    alike = fraction is None or abs(share - fraction) <= SAME * fraction or f"{share:.3g}" == f"{fraction:.3g}"
+    here = "" if alike else \
+        f" on the finest mesh ({100 * share:.3g} %; the fraction before is extrapolated from all meshes)"
+    told = " and from ".join(
+        f"{number(begin)} to {number(end)} {unit}{' (left end)' * (begin <= first)}{' (right end)' * (end >= last)}"
+        for begin, end in parts)
+    return f", from x = {told}{here}" if count <= FEW else f", in {count} stretches from x = {told}{here}"
+
+
+def tolerance_sentence(result: Result) -> str:
+    """Say that all measures meet the tolerance, by which limits, and which error is the largest.
+
+    Parameters
+    ----------
+    result : Result
+
+    Returns
+    -------
+    str
+        "" if a measure misses the tolerance (a warning says so) or no error is known.
+    """
+    tolerance = result.plan.model.accuracy.tolerance
+    known = {name: one for name, one in result.measures.items()
+             if one.value is not None and one.error is not None and not name.endswith(SCATTER)}
+    if result.outcome is Outcome.GROWS and result.response is not None:
+        return GROWN.format(formatting.short(float(result.response.time[-1]), "s", 3))
+    if not known or max(one.beyond(tolerance) for one in known.values()) > 1:
+        return ""
+    texts_of = {name: pair(name, measure_object(one)) for name, one in known.items()}
+    visible = {name: known[name] for name, text in texts_of.items() if "±" in text and not text.startswith("0 ")}
+    absolute = [name for name, one in visible.items() if one.error > tolerance * abs(one.value)]
+    relative = {name: one.error / abs(one.value) for name, one in visible.items() if name not in absolute}
+    sentence = f"Every measure with an error estimate meets the tolerance {tolerance:g}"
+    if absolute:
+        sentence += f" ({_absolute_limits(absolute, known, tolerance)})"
+    if relative:
+        name = max(relative, key=lambda one: (relative[one], one))
+        which = "of the other errors" if absolute else "error"
+        share = formatting.plain(relative[name], 2)
+        sentence += f"; the largest {which} is {share} of the value ({name}, {texts_of[name]})"
+    if len(visible) < len(known):
+        unknown = any(one.value is not None and one.error is None for one in result.measures.values())
+        sentence += f"; {SHARP_BUT_UNKNOWN if unknown else SHARP}"
+    return f"{sentence}."
+
+
+def _absolute_limits(names: list, known: dict, tolerance: float) -> str:
+    """Say what the tolerance allows measures whose error is a larger part of their value."""
+    parts = []
+    for name in names:
+        one = known[name]
+        full = next((size for kind, size in RANGES.items() if of_first(name).endswith(kind)), 0.0)
+        limit = allowed(tolerance, one.value, one.floor)
+        if name in STEPPED:
+            parts.append(f"{name}: one step between the drive levels of the scene")
+        elif one.error <= tolerance * full:
+            parts.append(f"{name}: {tolerance:g} of its range of {_plain_value(name, full, one.unit)}")
+        else:
+            parts.append(f"{name}: {_plain_value(name, limit, one.unit)}")
+    return "; ".join(parts)
+
+
+def _plain_value(name: str, value: float, unit: str) -> str:
+    """Format a value [SI] of a measure with three digits in the unit that people read."""
+    shown, scale = units(name, value, unit)[0]
+    return f"{formatting.plain(value * scale, 3)} {shown}".rstrip()
+
+
+def linked(text: str, name: str, more: str = "") -> str:
+    """A text as a link to the definition of a measure on the same page."""
+    return f"<a{more} href='#measure-{escape(name)}'>{escape(text)}</a>"
+
+
+def row_of(name: str, pressed: bool = False):
+    """The Row of a measure by its name, that of one of several interfaces ends in its number; None without one.
+
+    pressed: a patch was pressed, so that what it shares with a point, the load, is its own.
+    """
+    for table in (STATIC, MOTION) if pressed else (MOTION, STATIC):
+        for known in (name, re.sub(r"_\d+$", "", name)):
+            if known in table:
+                return table[known]
+    return None
+
+
+def meaning(name: str) -> str:
+    """What a measure is, in a sentence; "" for one that no table has."""
+    row = row_of(name)
+    return "" if row is None else row.text
+
+
+def group_of(name: str, pressed: bool = True) -> str:
+    """The group, one of GROUPS, of a measure by its name; pressed: as `row_of` takes it."""
+    row = row_of(name, pressed)
+    return GROUPS[0] if row is None else row.group
+
+
+def in_order(measures: dict) -> dict:
+    """The measures as people read them: under a random drive first those of the record, each with its scatter in its
+    own row, which then has none itself."""
+    shaken = [name for name in measures if f"{name}{SCATTER}" in measures]
+    return {name: measures[name] for name in dict.fromkeys((*shaken, *measures))
+            if name.removesuffix(SCATTER) not in shaken or name in shaken}
+
+
+def of_records(name: str, measures: dict) -> tuple:
+    """(value, interval of 95 %) of what a finite record of a random drive shows, as texts to the digits that the
+    scatter of records leaves; ("", "") of any other measure."""
+    one, spread = measures.get(name, NONE), measures.get(f"{name}{SCATTER}", NONE)
+    if one.get("value") is None or spread.get("value") is None:
+        return "", ""
+    value, half = one["value"], spread["value"]
+    unit, scale = units(name, value, one["unit"])[0]
+    digits = max(2, 2 + ceil(log10(abs(value) / half))) if half > 0 and value else 6
+    own, low, high = (formatting.plain(at * scale, digits + extra) for at, extra in
+                      ((value, 1), (max(value - half, 0.0), 0), (value + half, 0)))
+    return f"{own} {unit}".strip(), f"95 % interval {low} to {high} {unit}".strip()
+
+
+def table_of(measures: dict, engine: str = "") -> list[str]:
+    """Lines of all measures in their groups, each with its error in people's units, or why it has no value; under a
+    random drive with the interval of other records. engine: as the summary names it."""
+    every, measures = measures, in_order(measures)
+    width = max(map(len, measures), default=0)
+    out, pressed = [], "contact_fraction" in measures
+    over = MARCHED if "worn_volume" in measures else OVER.get(engine, WHOLE_RUN)
+    for group in GROUPS:
+        lines = [f"  {name:<{width}}  {_value(name, one, over, POWER in every)}{_records(name, every)}"
+                 for name, one in measures.items() if group_of(name, pressed) == group]
+        out += [group, *lines] if lines else []
+    return out
+
+
+def fragment(summary: dict, sentence: str, cycles: float | None, released: str = "") -> str:
+    """The answer as HTML without styles of its own, for a notebook; cycles and released as `headline` takes them."""
+    rows, measures = [], summary["measures"]
+    for line in table_of(measures, summary.get("numerics", {}).get("engine", "")):
+        name, _, value = line.strip().partition(" ")
+        cells = f"<td>{escape(name)}</td><td style='text-align:right'>{escape(value.strip())}</td>"
+        rows.append(f"<tr>{cells if value else f'<th colspan=2>{escape(name)}</th>'}</tr>")
+    title = f"<b>{escape(summary['title'])}</b><br>" if summary["title"] else ""
+    warnings = "".join(f"<p>&#9888; {prose(text)}</p>" for text in summary["warnings"])
+    answer = escape(f"{summary['outcome']}: {sentence} {headline(summary, cycles, released=released)}")
+    return f"<div>{title}{answer}{warnings}<table>{''.join(rows)}</table></div>"
+
+
+def _records(name: str, measures: dict) -> str:
+    """`of_records` behind a value, whose ± is then said to be that of the numerics alone."""
+    text = of_records(name, measures)[1]
+    numerics = "± is the numerical error; " if "±" in pair(name, measures[name]) else ""
+    return f" ({numerics}{text} for other records)" if text else ""
+
+
+def _value(name: str, one: dict, over: str, shaken: bool) -> str:
+    if one.get("reason"):
+        return f"- ({one['reason']})"
+    of_what = OF_WHAT.get(re.sub(r"_\d+$", "", name))
+    of_what = over if of_what == WHOLE_RUN else of_what
+    of_what = f"{of_what} of the first mode" if shaken and of_what == "per cycle" else of_what
+    unknown = UNKNOWN if one["error"] is None and one["value"] is not None else ""
+    return f"{pair(name, one)}{unknown}{f', {of_what}' if of_what else ''}"
+
+
+def joined(sentences: Sequence) -> str:
+    """Sentences as one, with semicolons between them; "" without any."""
+    first, *others = sentences or [""]
+    said = [first, *(f"{one[0].lower() if one[1:2].islower() else one[0]}{one[1:]}" for one in others)]
+    return "; ".join(one.rstrip(".") for one in said) + "." * bool(first)

@@ -1,0 +1,203 @@
+"""Several runs on one page: what differs in their scenes, their measures side by side, their curves in one picture."""
+
+import math
+import tomllib
+from html import escape
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import PatchfemError
+from ...formatting import LADDERS, axis_unit
+from ..drawing.charts import COLOURS, mark
+from ..read_results import numeric, readable, variables, wanted
+from ..summary import read_summary
+from ..written import NUMBER
+from .document import Section, document, prose, table
+from .sentences import linked, meaning, pair
+from .sweep import label
+
+TALL = 410  # pixels of a picture
+POINTS = 4000  # of one line in a picture
+MANY = 10.0  # times the first value, from which a change is told as a factor
+CYCLES = 2.0  # of the last motion that are shown: result.nc keeps so many whole
+CHARTS = (  # title, x: (variable, label), y: (variable, label); only the last cycles of what stands on time
+    ("Pressure", ("x", "place"), ("normal_stress", "normal stress")),
+    ("Friction loop", ("relative_displacement", "displacement"), ("friction_force", "friction force")),
+    ("Displacement", ("time", "time before the end"), ("relative_displacement", "displacement")),
+    ("Acceleration", ("time", "time before the end"), ("absolute_acceleration", "acceleration")),
+    ("Levels", ("level_drive", "level"), ("relative_displacement_amplitude", "displacement amplitude")),
+    ("Steady motions", ("curve_frequency", "frequency"), ("curve_amplitude", "displacement amplitude")))
+
+
+class FinishedRun(NamedTuple):
+    """A finished run as its folder holds it.
+
+    name: of the folder; summary: of summary.json; resolved: the scene with every default, as nested tables; arrays:
+    variable -> (values, unit), the first frame of what has frames.
+    """
+
+    name: str
+    summary: dict
+    resolved: dict
+    arrays: dict
+
+
+def read(folder: Path) -> FinishedRun:
+    """The run in a results folder; PatchfemError where there is none."""
+    folder = Path(folder)
+    try:
+        summary = read_summary(folder / "summary.json")
+        resolved = tomllib.loads((folder / "scene.resolved.toml").read_text(encoding="utf-8"))
+        if not isinstance(resolved.get("drive", {}), dict):
+            raise ValueError("scene.resolved.toml: drive is not a table")
+    except FileNotFoundError as fault:
+        raise PatchfemError(f"{folder}: not a results folder: it has no {Path(fault.filename).name}") from None
+    except (ValueError, OSError, RecursionError) as fault:
+        raise PatchfemError(f"{folder}: its results cannot be read: {fault}") from None
+    return FinishedRun(folder.resolve().name, summary, resolved, _arrays(folder / "result.nc"))
+
+
+def _arrays(path: Path) -> dict:
+    if not path.is_file():
+        return {}
+    shown, out = {name for _, *axes in CHARTS for name, _ in axes}, {}
+    for name, one in variables(path, shown)[1].items():
+        with readable(path, "results of a run"):
+            wanted(numeric(one.values) and one.values.ndim in (1, 2) and one.values.size > 0,
+                   f"{name} contains {one.values.ndim}-dimensional {one.values.dtype}")
+        values = one.values[0] if one.values.ndim == 2 else one.values
+        if np.isfinite(values).any():
+            out[name] = (values.astype(float), one.unit)
+    return out
+
+
+def page(runs: list) -> str:
+    """Make the whole HTML page of several `FinishedRun`s, in their order; differences are from the first."""
+    names = distinct([run.name for run in runs])
+    charts = [one for one in (_chart(number, *chart, runs, names) for number, chart in enumerate(CHARTS)) if one]
+    outcomes = "; ".join(f"{escape(name)}: {escape(run.summary['outcome'])}" for name, run in zip(names, runs))
+    sections = [Section("scenes", "What differs in the scenes", _differences(runs, names)),
+                Section("measures", "Measures side by side", _measures(runs, names))]
+    sections += [Section(one["anchor"] + "-part", one["title"], f'<div id="{one["anchor"]}" class=chart role=img '
+                         f'aria-label="{escape(one["told"])}"></div><p class=soft>{prose(one["told"])}</p>')
+                 for one in charts]
+    known = dict.fromkeys(name for run in runs for name in run.summary["measures"])
+    means = [(f" id='measure-{escape(name)}'", [escape(label(name)), prose(meaning(name))]) for name in known]
+    sections.append(Section("means", "What the measures are", table(("", ""), means)))
+    title = " and ".join(names) if len(names) < 4 else f"{len(names)} runs side by side"
+    return document(title, f"<p class=verdict>{outcomes}.</p>", sections, {"charts": charts} if charts else None,
+                    ("figures.js", "curves.js") if charts else ())
+
+
+def distinct(names: list) -> list:
+    """The names, numbered where several are the same."""
+    return [name if names.count(name) == 1 else f"{name} ({number})" for number, name in enumerate(names, 1)]
+
+
+def _chart(number: int, title: str, x: tuple, y: tuple, runs: list, names: list) -> dict | None:
+    """One picture of all runs that have both variables, in units that suit the largest values."""
+    lines = []
+    for run, name in zip(runs, names):
+        if x[0] not in run.arrays or y[0] not in run.arrays:
+            continue
+        (a, unit_a), (b, unit_b) = run.arrays[x[0]], run.arrays[y[0]]
+        if a.shape != b.shape or not a.size:
+            continue
+        if "time" in run.arrays and run.arrays["time"][0].shape == a.shape:
+            late = _late(run)
+            a, b = a[late], b[late]
+            a = a - a[-1] if x[0] == "time" else a
+        step = -(-a.size // POINTS)
+        lines.append((name, a[::step], b[::step]))
+    if not lines:
+        return None
+    (unit_a, scale_a), (unit_b, scale_b) = (
+        axis_unit(np.concatenate([line[k] for line in lines]), unit) if unit in LADDERS else (unit, 1.0)
+        for k, unit in ((1, unit_a), (2, unit_b)))
+    peaks = ", ".join(f"{name} from {np.nanmin(b) * scale_b:.4g} to {np.nanmax(b) * scale_b:.4g}"
+                      for name, _, b in lines)
+    return {"anchor": f"chart{number}", "title": title, "height": TALL,
+            "x": {"label": x[1], "unit": unit_a, "log": False}, "y": {"label": y[1], "unit": unit_b, "log": False},
+            "told": f"{y[1].capitalize()} [{unit_b}] over {x[1]}: {peaks}.",
+            "marks": [mark("dots" if x[0] == "level_drive" else "line", colour, name, x=a * scale_a, y=b * scale_b)
+                      for colour, (name, a, b) in zip(COLOURS * len(lines), lines)]}
+
+
+def period_of(run: FinishedRun) -> float | None:
+    """Period [s] of the sine that drives a run; None where none does."""
+    written = NUMBER.match(str(run.resolved.get("drive", {}).get("frequency", "")))
+    return 1 / float(written[1]) if written and float(written[1]) > 0 else None
+
+
+def _late(run: FinishedRun) -> np.ndarray:
+    """Which samples lie in the last CYCLES cycles of a sine, or in the last tenth of a run without one."""
+    time, period = run.arrays["time"][0], period_of(run)
+    span = CYCLES * period if period else np.ptp(time) / 10
+    if run.summary["kind"] == "bench":
+        span = np.ptp(time)
+    return time >= time[-1] - span * (1 + 1e-9)
+
+
+def _flat(table, at: str = "") -> dict:
+    """Nested tables as one: "contact.tilt.angle" -> value; entries of lists by their name or number."""
+    if isinstance(table, dict):
+        pairs = table.items()
+    elif isinstance(table, list) and table and isinstance(table[0], dict):
+        pairs = [(one.get("name", number), one) for number, one in enumerate(table, 1)]
+    else:
+        return {at: table}
+    return {key: value for name, one in pairs for key, value in _flat(one, f"{at}.{name}" if at else str(name)).items()}
+
+
+def _differences(runs: list, names: list) -> str:
+    """A table of the keys of the resolved scenes that are not the same in all of them."""
+    flat = [_flat(run.resolved) for run in runs]
+    keys = [key for key in dict.fromkeys(key for one in flat for key in one)
+            if any(one.get(key) != flat[0].get(key) for one in flat)]
+    if not keys:
+        return "<p>There is no difference: the resolved scenes are the same.</p>"
+    rows = [[escape(key), *(_written(one.get(key)) for one in flat)] for key in keys]
+    return ("<p class=soft>The table lists the keys whose values differ between the resolved scenes, in SI.</p>"
+            + table(("key", *map(escape, names)), rows))
+
+
+def _written(value) -> str:
+    text = "&ndash;" if value is None else f"{value:.8g}" if isinstance(value, float) else escape(str(value))
+    return text if len(text) < 80 else text[:76] + " …"
+
+
+def _measures(runs: list, names: list) -> str:
+    """A table of the measures of all runs; what differs from the first by more than both errors is marked."""
+    rows = []
+    for name in dict.fromkeys(name for run in runs for name in run.summary["measures"]):
+        found = [run.summary["measures"].get(name) for run in runs]
+        rows.append([linked(label(name), name),
+                     *(_cell(name, one, found[0] if number else None) for number, one in enumerate(found))])
+    return ("<p class=soft>Each cell shows a value and its estimated numerical error. Bold values differ from the "
+            "first run by more than the sum of both errors. The change from the first run is in brackets: in per "
+            "cent; as a factor if the value is ten times the first value or more; as a dash if the first value is "
+            "smaller than its error.</p>"
+            + table(("measure", *(f">{escape(name)}" for name in names)), rows, "across side"))
+
+
+def _cell(name: str, one: dict | None, first: dict | None) -> str:
+    if one is None or one["value"] is None or not math.isfinite(one["value"]):
+        return "&ndash;"
+    text = escape(pair(name, one))
+    alone = first is None or first["value"] is None
+    if alone or abs(one["value"] - first["value"]) <= (one["error"] or 0.0) + (first["error"] or 0.0):
+        return f"<span class=v>{text}</span>"
+    return f"<b class=v>{text}</b> <span class=v>({_share(one['value'], first)})</span>"
+
+
+def _share(value: float, first: dict) -> str:
+    """The change from the first value: in per cent, as a factor where it is many times as large, a dash where the first
+    is 0 within its error, so that any number would tell of that error."""
+    if abs(first["value"]) <= (first["error"] or 0.0):
+        return "&ndash;"
+    factor = value / first["value"]
+    if abs(factor) < MANY:
+        return f"{(value - first['value']) / abs(first['value']):+.2%}"
+    return f"&times; {float(f'{factor:.2g}'):.7g}"  # two digits, and 150 as it is

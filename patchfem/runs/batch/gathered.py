@@ -1,0 +1,300 @@
+"""Patches with bonds behind shear, of a study of many: pressed together, each runs by itself, a few points in place of
+all its nodes.
+
+Nobody sees the fields of such a run, nor its histories. Cases on one or two modes under one sine march side by side
+(`dynamics.march.lanes`), on POINTS points behind MODES modes, which leave less than SHARE of the tolerance out of the
+backbone: that stands in the bars. Their coarser runs are those of a run by itself, by a half and a quarter of the steps
+and on the coarser mesh. A case that sticks, or may ring in its sticks, or asks for more modes runs by itself, its
+cycles before the last folded as they pass (`dynamics.march.passing_kernels`); what its points and modes each leave out
+is a thousandth of the tolerance (`rig.interface.FEWER`), so no further run tells the error of the modes.
+"""
+
+from collections.abc import Hashable, Sequence
+from dataclasses import replace
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...compiled import load
+from ...core import STICK, Outcome
+from ...dynamics.march import lanes
+from ...effects import has, listed
+from ...model.model import Model
+from ...model.source import placed
+from ...response import run_events
+from ...response.coarser import left_open
+from ...response.errors import FrictionScale, coarser_errors, friction_errors, step_errors
+from ...response.measures import energy_balance
+from ...response.reasons import SHARED
+from ...response.ringing import LEAST_PERIODS, SHORT
+from ..accuracy_warnings import Finding, tolerance_warnings
+from ..patch import result as of_patch
+from ..results.result import without_folders
+from ..results.travel import outcome_on_piece, travelled
+from ..rig.costs import MOST_STEPS
+from ..rig.engines import MARCH, engine_of, knobs_idle
+from ..rig.interface import few_points
+from ..rig.lists import quadrature_of
+from ..rig.motion_warnings import law_warnings
+from ..rig.numerics import choose
+from . import one_by_one, patches
+from .case_results import CaseResults, unread
+from .lumped.columns import MAIN, Runs, batch_answers, known_of
+from .lumped.lumped import take_out
+from .samples import Samples, peaks
+
+TOGETHER = 256  # cases that are pressed at once
+SAMPLES = 1_200_000  # of all cases that march at once, which are held together: 200 MB with what is read off them
+SHARE = 3e-2  # of the tolerance, by which few modes, and few points, may each miss the backbone of the patch
+TWICE = 2.0  # times that share, by which a loop may miss what its backbone does once
+HELD = 1e-3  # bond lengths of slip up to which a case sticks
+RINGS = "ring_frequency", "ring_damping"
+
+
+class _Pressed(NamedTuple):
+    """A case in lanes: its points, and those of the coarser mesh; error: share of the friction limit that both leave
+    out; measures, warnings and notes of its pressed patch; numerics as of a run."""
+
+    fine: lanes.Points
+    coarse: lanes.Points
+    error: float
+    measures: dict
+    warnings: list
+    notes: list
+    patch: Any
+    numerics: Any
+
+
+def refuses(model: Model) -> str:
+    """Why all points of a model move; "" where a few may stand for them."""
+    if model.patch is None or not model.soft or model.friction is None or not has(model.friction.law, "bonds") \
+            or listed(model.friction):
+        return "the case is not an elastic patch with a law of bonds"
+    if model.rig.load_varies or model.patch.strips is not None or model.grooves is not None or model.wear is not None:
+        return "the load of the case changes, or the case has strips, grooves or wear"
+    return "" if engine_of(model) is MARCH else "the case is not integrated in time"
+
+
+def group(model: Model) -> Hashable:
+    """Equal for models that march side by side; None for those that run by themselves."""
+    if no_lanes(model):
+        return None
+    modes = model.rig.modes
+    parts = modes.omega, modes.zeta, modes.slide, modes.base, modes.output
+    return (*(np.asarray(part, float).tobytes() for part in parts), modes.mass, model.rig.drive.omega,
+            int(model.rig.cycles), model.accuracy.tolerance)
+
+
+def no_lanes(model: Model) -> str:
+    """Why a model that is not refused does not march in lanes; "" where it may."""
+    rig, law = model.rig, model.bonds
+    if not rig.waveform.is_sine or rig.kind != "base" or rig.levels or rig.start is not None or rig.bends or rig.names:
+        return "the case is not a rig that starts at rest and is driven by a base motion of one sine"
+    if rig.modes.gauge is not None or rig.richer is not None or np.isfinite(rig.travel):
+        return "the case has a gauge, a reduced structure or a stop"
+    if rig.cycles != int(rig.cycles) or rig.cycles < 20:
+        return "the case has fewer than 20 cycles, or a number of cycles that is not whole"
+    if law.grows or law.order != 1 or law.initial != 1 or law.breakaway or law.ratio != 1 or not law.static > 0:
+        return "the bonds of the case change in number or length"
+    if model.heat is not None or model.accuracy.shear_modes is not None or unread(model):
+        return "the case has [friction.temperature] or accuracy.shear_modes, or its table of measured responses " \
+            "cannot be read"
+    return "" if lanes.fits(rig.modes) else "the case has too many modes"
+
+
+def solve(models: Sequence[Model], say=None) -> CaseResults:
+    """Answers of models of a group."""
+    few = [replace(model, patch=replace(model.patch, gathers=True)) for model in models]
+    return patches.pressed_first(few, TOGETHER, lambda part: _solved(part, say))
+
+
+def _solved(models: list, say) -> CaseResults:
+    """Answers of models whose patches are pressed."""
+    begin, out, alone = perf_counter(), CaseResults.blank(len(models)), set(range(len(models)))
+    held = {} if no_lanes(models[0]) else {case: one for case, model in enumerate(models)
+                                           if (one := _pressed(model)) is not None}
+    for steps in sorted({one.numerics.steps for one in held.values()}):
+        cases = [case for case, one in held.items() if one.numerics.steps == steps]
+        answers, lost = _side_by_side([models[case] for case in cases], [held[case] for case in cases], steps)
+        answers.seconds[:] = (perf_counter() - begin) / len(models)
+        take_out(answers, np.flatnonzero(lost).tolist())
+        out.place(cases, answers)
+        alone -= {cases[k] for k in np.flatnonzero(~lost)}
+    if alone:
+        rest = sorted(alone)
+        out.place(rest, one_by_one.solve([models[case] for case in rest], say))
+    return out
+
+
+def _side_by_side(models: list, held: list, steps: int) -> tuple:
+    """(Answers of pressed cases at so many steps a cycle, or twice as many where the displacement asks for them and the
+    scene does not pin them; (n,) whether a case must be run by itself). Those that slide alike stand beside each
+    other."""
+    found, lost, many = CaseResults.blank(len(models)), np.zeros(len(models), bool), load(lanes.KERNELS).LANES
+    order = np.argsort([one.fine.amplitude / one.fine.limit.sum() for one in held], kind="stable")
+    size = max(1, SAMPLES // (steps * held[0].numerics.window * many)) * many
+    for first in range(0, len(models), size):
+        cases = order[first:first + size]
+        answers, lost[cases], more = _marched([models[k] for k in cases], [held[k] for k in cases], steps)
+        found.place(cases, answers)
+        if (again := cases[more]).size:
+            finer, lost[again] = _side_by_side([models[k] for k in again], [held[k] for k in again], 2 * steps)
+            take_out(found, again.tolist())
+            found.place(again, finer)
+    return found, lost
+
+
+def _pressed(model: Model) -> _Pressed | None:
+    """A case with its patch pressed, on few points; None of one that runs by itself."""
+    try:
+        with placed(model.source):
+            patch, *coarse = of_patch.solve_all(model.patch, model.accuracy.tolerance)
+            numerics = choose(model)
+            if coarse[0] is None or patch.pressure.outcome is Outcome.NO_CONTACT or numerics.steps % 4 \
+                    or quadrature_of(model, numerics).engine != "recursion":
+                return None
+            kernels, tolerance = load(lanes.KERNELS), SHARE * model.accuracy.tolerance
+            found = [few_points(one, model.bonds, tolerance, kernels.POINTS, kernels.MODES) for one in (
+                patch, coarse[0])]
+            if None in found:
+                return None
+            points = [lanes.Points(limit, few.shape, few.stiffness, model.bonds.length, model.rig.drive.acceleration)
+                      for few, limit, _ in found]
+            warnings = [*model.source.remarks, *knobs_idle(model, MARCH.name), *of_patch.strained(model.patch, patch)]
+            return _Pressed(*points, found[0][2], of_patch.measured(model, patch, coarse), warnings,
+                            of_patch.left_out(model, patch, coarse), patch, numerics)
+    except Exception:  # what is wrong is told by its own run
+        return None
+
+
+def _marched(models: list, held: list, steps: int) -> tuple:
+    """(Answers of pressed cases at so many steps a cycle, (n,) whether a case must be run by itself, and whether it
+    marches by twice the steps)."""
+    rig, window, cycles = models[0].rig, held[0].numerics.window, int(models[0].rig.cycles)
+
+    def read(share: int, coarse: bool = False, asked=None) -> _Read:
+        cases = [one.coarse if coarse else one.fine for one in held]
+        done = lanes.march(rig.modes, rig.drive, cases, cycles, steps // share, window)
+        return _read(models, held, done, steps // share, asked)
+
+    fine = read(1)
+    rings = ~np.isnan(fine.values[RINGS[0]])
+    half, quarter, coarse = read(2, False, rings), read(4, False, rings), read(4, True, rings)
+    runs, parts = _with_errors(models, held, (fine, half, quarter, coarse), (steps, window, cycles))
+    found, alone, _ = batch_answers(models, runs, {"engine": MARCH.name, "steps_per_cycle": steps,
+                                                   "window_cycles": window})
+    alone |= runs.stuck | runs.lost
+    tolerance = models[0].accuracy.tolerance
+    more = ~alone & (found.errors[MAIN] > tolerance * np.abs(found.values[MAIN]) + found.floors[MAIN])
+    if 2 * steps > MOST_STEPS or 2 * steps * cycles > 1e7 or "steps_per_cycle" in held[0].numerics.pinned:
+        more[:] = False
+    for case in np.flatnonzero(~alone & ~more).tolist():
+        _tell(found, case, models[case], held[case], (fine, half, quarter), parts[case], steps)
+    return found, alone, more
+
+
+class _Read(NamedTuple):
+    """What a march shows: measures by name (n,), energies, extremes and phasors of its cycles, largest slide (n,) [m];
+    own: what each leaves open itself, by name; lost (n,): whether it must be run otherwise."""
+
+    values: dict
+    book: dict
+    extremes: np.ndarray
+    phasors: np.ndarray
+    reach: np.ndarray
+    own: list
+    lost: np.ndarray
+
+
+def _read(models: list, held: list, done: lanes.Marched, steps: int, asked=None) -> _Read:
+    """What a march of so many steps a cycle shows; asked (n,): of which rings are told, None for all."""
+    modes, omega, window = models[0].rig.modes, models[0].rig.drive.omega, held[0].numerics.window
+    seen = Samples(done, modes, omega, np.array([model.rig.drive.acceleration for model in models]), steps, window)
+    book = {"friction": done.book["lost"], "peak_stored": done.book["peak"]} | done.book
+    load = np.array([one.patch.pressure.load for one in held])
+    with np.errstate(all="ignore"):
+        stiffness = np.array([model.rig.stiffness for model in models])
+        values = seen.values(book, stiffness * ~_beside(models[0], done), load)
+        # the pieces give way, so that nothing swings faster than the rig on its bonds
+        fastest = np.sqrt((modes.omega**2).max() + (modes.slide**2).sum() / modes.mass * np.array(
+            [one.fine.limit.sum() / one.fine.length for one in held]))
+        may = seen.longest_stick(STICK) * fastest >= 2 * np.pi * SHORT * LEAST_PERIODS
+        accelerations = seen.acceleration()
+        if asked is not None:
+            may &= asked
+        rings = [seen.window_of(case, accelerations[:, case]) if one else None for case, one in enumerate(may)]
+        rings = [({}, {}) if one is None else run_events.rings(one, modes, models[0].rig.drive, held=HELD * held[
+            case].fine.length) for case, one in enumerate(rings)]
+        values |= {name: np.array([one[0].get(name, np.nan) for one in rings]) for name in RINGS}
+        beyond = peaks(np.abs(accelerations))[1]
+    own = [{"absolute_acceleration_peak": float(above)} | errors for above, (_, errors) in zip(beyond, rings)]
+    lost = (done.bad > 0) | ~np.isfinite(done.book["work_in"])
+    return _Read(values, book, done.extremes, done.phasors, done.reach, own, lost)
+
+
+def _beside(model: Model, done: lanes.Marched) -> np.ndarray:
+    """(n,) whether another mode than the first carries part of the slide."""
+    return np.array([model.rig.beside_first(done.z[:, :, k]) > SHARED for k in range(done.z.shape[2])])
+
+
+def _with_errors(models: list, held: list, reads: tuple, counts: tuple) -> tuple:
+    """(Runs with their errors, and of each case its parts of them as `left_open` takes them)."""
+    fine, (steps, window, cycles), n = reads[0], counts, len(models)
+    whole = []
+    for one in reads:
+        last = one.extremes[:, -window:]
+        amplitude = (last[:, :, 1].max(axis=1) - last[:, :, 0].min(axis=1)) / 2
+        whole.append(one.values | {MAIN: amplitude, "energy_balance": energy_balance(one.book)})
+    errors, parts = {name: np.zeros(n) for name in whole[0]}, []
+    for case in range(n):
+        a, b, c, d = ({name: float(part[case]) for name, part in one.items() if not np.isnan(part[case])}
+                      for one in whole)
+        few = _left_out(a, TWICE * held[case].error, models[case].friction.static, held[case].fine,
+                        fine.book["passed"][case])
+        own = fine.own[case]
+        parts.append((step_errors(a, b, c, steps=steps), coarser_errors(c, d, order=2.0), few, own))
+        for name, value in a.items():
+            errors[name][case] = sum(part.get(name, abs(value)) for part in parts[-1][:3]) + own.get(name, 0.0)
+    ends = np.arange(cycles - 1, -1, -window)[::-1]
+    least = HELD * np.array([one.fine.length for one in held])
+    runs = Runs(cycles, window, fine.values, fine.book, fine.extremes, fine.phasors[:, ends],
+                fine.values["slip_amplitude"] <= least, fine.lost, errors, MARCH.least, MARCH.closes, again=False)
+    return runs, parts
+
+
+def _left_out(values: dict, fraction: float, static: float, points: lanes.Points, work: float) -> dict:
+    """Return `friction_errors` of a fraction [1] of the friction limit that modes and points leave out.
+
+    static [1]: coefficient of friction; work [J]: what friction exchanged to and fro.
+    """
+    limit = points.limit.sum()
+    cycle_work = 4 * limit * (values["slip_amplitude"] + points.length)
+    return friction_errors(values, fraction, FrictionScale(static, limit, points.length, work, cycle_work))
+
+
+def _tell(found: CaseResults, case: int, model: Model, one: _Pressed, reads: tuple, parts: tuple, steps: int) -> None:
+    """Put the measures of the pressed patch in, and the outcome, numerics, warnings and notes as a run of its own has
+    them."""
+    reach, known = reads[0].reach[case:case + 1], known_of(found, case)
+    outcome = outcome_on_piece(Outcome(found.outcome[case]), model.patch, one.patch, reach)
+    found.outcome[case] = str(outcome)
+    found.fill(case, one.measures)
+    found.numerics[case] = found.numerics[case] | {
+        "shear_modes": int(one.fine.stiffness.size), "quadrature": "recursion",
+        "interface_nodes": int(one.patch.x.size)}
+    measures = one.measures | {name: m for name, m in known.items() if name != "normal_load"}
+    tolerance, warned = model.accuracy.tolerance, []
+    if any(m.beyond(tolerance) > 1 for m in measures.values()):
+        runs = [{name: float(column[case]) for name, column in read.values.items()} for read in reads]
+        extra = found.numerics[case] | {"cycles": model.rig.cycles, "left_open": left_open(
+            ("steps", "mesh", "modes", "own"), parts, runs)}
+        warned = tolerance_warnings(Finding(model, measures, one.patch, extra))
+    drift = {name: m for name, m in known.items() if name == "drift_per_cycle"}
+    warned = without_folders([*one.warnings, *model.rig.notes, *law_warnings(model, outcome, drift, 0.0),
+                              *travelled(one.patch, reach), *warned], model.source.path)
+    found.warnings.pop(case, None)
+    if warned:
+        found.warnings[case] = warned
+    if noted := without_folders([*model.source.notes, *one.notes], model.source.path):
+        found.notes[case] = noted

@@ -1,0 +1,253 @@
+"""Measures of many runs as columns, with errors, outcome and reasons: what `runs.rig.rig` makes of one Solution."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import NamedTuple
+
+import numpy as np
+
+from ....core import Measure, Outcome
+from ....effects import has
+from ....model.alike import Alike, columns_of
+from ....response.errors import total_error
+from ....response.measures import energy_balance
+from ....response.outcome import SMALL, goes_on, moves_on, ringing_left, rings_on, settled, steady_error
+from ....response.reasons import CYCLIC, SETTLES, STOPS, UNSEEN, without_value
+from ....response.rows import TABLE, floor_of, larger_term
+from ....response.settling import CLASSES, STEADY, steady_amplitudes, windows_of
+from ....structure.drive_sizes import largest, slowest
+from ...accuracy_warnings import Finding, tolerance_warnings
+from ...results.notes import BOOKS
+from ...results.result import without_folders
+from ...rig.engines import knobs_idle
+from ...rig.motion_warnings import law_warnings
+from ..case_results import CaseResults
+
+ENDS = 5  # last windows whose phasors tell a steady motion (response.settling)
+MAIN, PHASE = "relative_displacement_amplitude", "slip_start_phase"
+
+
+class Sizes(NamedTuple):
+    """What a scene says of each of n models, (n,): tolerance; scale of the displacements to expect [m]; largest
+    acceleration of the drive [m s-2], its period [s]; least rate of a decay [1/s]."""
+
+    tolerance: np.ndarray
+    moved: np.ndarray
+    largest: np.ndarray
+    period: np.ndarray
+    decay: np.ndarray
+
+
+def sizes_of(models) -> Sizes:
+    """The Sizes of models."""
+    return Sizes(*columns_of(models, lambda model: (
+        model.accuracy.tolerance, model.rig.displacement, largest(model.rig.drive), model.rig.drive.period,
+        slowest(model.rig.modes))))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Runs:
+    """What an engine found of n runs of `cycles` cycles each, the last `window` of which are read.
+
+    values: measure -> (n,), NaN where a run has none; book: energies of the run [J], (n,) each; extremes: (n, c, 2) [m]
+    of the output per cycle; phasors: (n, w) [m] of the output in the last cycle of the last ENDS windows, or of all;
+    stuck, lost: (n,) whether nothing slipped, and whether a run must be made by itself; errors: measure -> (n,) beside
+    `least` of its value; closes: gap of the energy balance beyond which a run has not converged; loads: (n,) of a stuck
+    run, whether what it holds still rises; steady: ((n,), (n,)) [m] amplitude and error of the motion that a run is
+    known to settle to, NaN where none is; chosen: what each run chose besides; again: whether a run by itself is
+    made again with finer steps where its amplitude misses the tolerance. Extremes and phasors are those of a run by
+    itself to the last bit: what is extrapolated far shows it.
+    """
+
+    cycles: int
+    window: int
+    values: dict
+    book: dict
+    extremes: np.ndarray
+    phasors: np.ndarray
+    stuck: np.ndarray
+    lost: np.ndarray
+    errors: dict
+    least: float
+    closes: float
+    loads: np.ndarray | bool = False
+    steady: tuple | None = None
+    chosen: tuple = ()
+    again: bool = True
+
+    @property
+    def amplitudes(self) -> np.ndarray:
+        """Half the range of the output in the last cycles (n,) [m]."""
+        last = self.extremes[:, -self.window:]
+        return (last[:, :, 1].max(axis=1) - last[:, :, 0].min(axis=1)) / 2
+
+
+def batch_answers(models, runs: Runs, numerics: dict, again: Callable | None = None) -> tuple:
+    """(Answers of the models, (n,) whether a case must be run by itself, (n,) whether all its errors but that of the
+    steady estimate are within its tolerance).
+
+    numerics: as `results.result.choices` has it; again(Answers) -> (n,) which are answered another time, and are not
+    warned of what is wide.
+    """
+    n, values = len(models), dict(runs.values)
+    values[MAIN] = runs.values.get(MAIN, runs.amplitudes)
+    values["energy_balance"] = energy_balance(runs.book)
+    nothing = np.zeros(n)
+    errors = {name: total_error(name, value, [runs.errors.get(name, nothing)], runs.least, values[MAIN])
+              for name, value in values.items()}
+    sizes = sizes_of(models)
+    tolerance, moved = sizes.tolerance, sizes.moved
+    outcome, (steady, error) = _outcome(sizes, runs, moves_on(
+        values["drift_per_cycle"], errors["drift_per_cycle"], values[MAIN], tolerance,
+        floor_of("drift_per_cycle", moved)))
+    found = CaseResults.blank(n)
+    found.outcome[:] = [str(one) for one in outcome]
+    alone = runs.lost | (values["energy_balance"] > runs.closes) | (values["work_check"] > BOOKS)
+    grows = np.array([one is Outcome.GROWS for one in outcome])
+    with np.errstate(invalid="ignore"):
+        on = goes_on(steady, error, values[MAIN], tolerance) & np.array([one is Outcome.STEADY for one in outcome])
+    still = (on | np.array([one is Outcome.TRANSIENT for one in outcome])) & ~np.isnan(steady) & ~runs.stuck
+    values[SETTLES] = np.where(still, steady, np.nan)
+    errors[SETTLES] = steady_error(steady, error, values[MAIN], errors[MAIN])
+    resolved, wide_of = np.ones(n, bool), np.zeros(n, bool)
+    for name, value in values.items():
+        there = ~np.isnan(value)
+        if not there.any():
+            continue
+        row, floor = TABLE[name], floor_of(name, moved)
+        wide = there & (errors[name] > tolerance * np.abs(value) + floor)
+        floor = np.fmax(floor, tolerance * larger_term(name, values))
+        wide_of |= wide & (errors[name] > tolerance * np.abs(value) + floor) & ~grows
+        if name == MAIN and runs.again:
+            alone |= wide & ~grows
+        if not name.endswith("_steady"):
+            resolved &= ~wide
+        found.units[name], found.values[name] = row.unit, value
+        found.errors[name] = np.where(there & ~grows, errors[name], np.nan)
+        found.floors[name] = np.where(there, floor, np.nan)
+    _reasons(models, sizes, runs, found)
+    unseen = np.isnan(values[SETTLES]) & np.array([one is Outcome.TRANSIENT for one in outcome])
+    if unseen.any():
+        found.measure(SETTLES, TABLE[SETTLES].unit)
+        found.floors[SETTLES][unseen] = TABLE[SETTLES].floor
+        found.reasons.setdefault(SETTLES, {}).update(dict.fromkeys(np.flatnonzero(unseen).tolist(), UNSEEN))
+    if has(models[0].friction.law, "set-valued") and not (models[0].soft or models[0].rig.soft):
+        _stops(found)
+    found.numerics.update({case: numerics | runs.chosen[case] for case in range(n)} if runs.chosen
+                          else dict.fromkeys(range(n), numerics))
+    wide_of &= True if again is None else ~again(found)
+    alike = isinstance(models, Alike)
+    remarks = _remarks(models[0], numerics["engine"]) if alike else ()
+    rings = _rings(sizes, runs, outcome, values[MAIN])
+    told = wide_of | _by_law(models, found) if alike else wide_of
+    told = told | np.isin(np.arange(n), list(rings))
+    for case in range(n) if remarks or not alike else np.flatnonzero(told).tolist():
+        model = models[case]
+        said = remarks if alike else _remarks(model, numerics["engine"])
+        if warnings := [*said, *warned(model, outcome[case], found, case, wide_of[case], rings.get(case, ()))]:
+            found.warnings[case] = without_folders(warnings, model.source.path)
+    return found, alone, resolved
+
+
+def _remarks(model, engine: str) -> list:
+    """What is said of a model, whatever its run finds."""
+    return [*model.source.remarks, *knobs_idle(model, engine), *model.rig.notes]
+
+
+def _outcome(sizes: Sizes, runs: Runs, moves) -> tuple:
+    """Outcomes (n), and the steady amplitudes and their errors, (n,) [m] each; moves: (n,), whose middle moves on, so
+    that none is steady."""
+    pick = np.arange(runs.cycles - 1, -1, -runs.window)[::-1]
+    ends = (runs.extremes[:, pick, 1] - runs.extremes[:, pick, 0]) / 2
+    floor = SMALL * (sizes.largest / (2 * np.pi / sizes.period)**2)
+    decay = sizes.decay * runs.window * sizes.period
+    with np.errstate(all="ignore"):
+        steady, bounded = steady_amplitudes(ends[:, -ENDS:], runs.phasors[:, -ENDS:]), False
+        if runs.steady is not None:
+            bounded = ~np.isnan(runs.steady[0])
+            steady = [np.where(bounded, known, seen) for known, seen in zip(runs.steady, steady)]
+        number, *steady = settled(windows_of(runs.extremes, runs.window)[0], runs.extremes, runs.window, steady,
+                                  (sizes.tolerance, floor, decay), bounded)
+    number = np.where((number == STEADY) & moves, 0, number)
+    ends = [Outcome.STUCK if stuck else CLASSES[k] for stuck, k in zip(runs.stuck, number)]
+    return [Outcome.TRANSIENT if loads else one for loads, one in zip(np.broadcast_to(runs.loads, len(ends)), ends)], \
+        steady
+
+
+def _rings(sizes: Sizes, runs: Runs, outcome, amplitude) -> dict:
+    """What `rings_on` says of the cases that stick and ring on, by case."""
+    n, cases = len(amplitude), np.flatnonzero([one is Outcome.STUCK for one in outcome] & (amplitude != 0))
+    tolerance, decay, floor = (np.broadcast_to(one, n)[cases] for one in (
+        sizes.tolerance, sizes.decay * sizes.period, floor_of(MAIN, sizes.moved)))
+    left = ringing_left(runs.extremes[cases], runs.window, decay)
+    columns = zip(cases.tolist(), left.tolist(), amplitude[cases].tolist(), floor.tolist(), tolerance.tolist(),
+                  decay.tolist())
+    found = {case: rings_on(one, (size, least), limits, runs.cycles) for case, one, size, least, *limits in columns}
+    return {case: one for case, one in found.items() if one}
+
+
+def _stops(found: CaseResults) -> None:
+    """No secant stiffness where rigid friction holds at the ends of its slide, as of `response.reasons.stopping`."""
+    stuck, secant = (found.values.get(name) for name in ("stick_fraction", "secant_stiffness"))
+    if stuck is None or secant is None:
+        return
+    with np.errstate(invalid="ignore"):
+        holds = ~np.isnan(secant) & (stuck > TABLE["stick_fraction"].floor + np.nan_to_num(
+            found.errors["stick_fraction"]))
+    if not holds.any():
+        return
+    found.values["secant_stiffness"] = np.where(holds, np.nan, secant)
+    found.errors["secant_stiffness"] = np.where(holds, np.nan, found.errors["secant_stiffness"])
+    found.reasons.setdefault("secant_stiffness", {}).update(dict.fromkeys(np.flatnonzero(holds).tolist(), STOPS))
+
+
+def _reasons(models, sizes: Sizes, runs: Runs, found: CaseResults) -> None:
+    """Why cases have no value of a measure that such runs can have."""
+    names = [*CYCLIC, PHASE]
+    for name in names:
+        found.measure(name, TABLE[name].unit)
+    lacking = np.array([np.isnan(found.values[name]) for name in names])
+    holds = found.values["stick_fraction"] == 1 if "stick_fraction" in found.values else lacking[0] & False
+    sticks = found.values["stick_fraction"] > 0 if "stick_fraction" in found.values else lacking[0] & False
+    signs = np.array([*lacking, holds, sticks, sizes.largest != 0])  # all that a reason hangs on, of a sine
+    patterns, which = np.unique(signs, axis=1, return_inverse=True)
+    for place in np.flatnonzero(patterns[:len(names)].any(axis=0)).tolist():
+        cases = np.flatnonzero(which.ravel() == place).tolist()
+        drive = models[cases[0]].rig.drive
+        here = {name: values[cases[0]] for name, values in found.values.items() if not np.isnan(values[cases[0]])}
+        window = SimpleNamespace(time=np.array([0.0, runs.window * drive.period]), extra={})
+        for name, measure in without_value(here, window, drive, True).items():
+            found.reasons.setdefault(name, {}).update(dict.fromkeys(cases, measure.reason))
+            found.floors[name][cases] = measure.floor
+
+
+def warned(model, outcome, found: CaseResults, case: int, wide: bool, rings=()) -> list:
+    """Warnings of a case, those that its own run would give: of its law and, where `wide` says that some is, of what is
+    known less well than the tolerance asks."""
+    if not wide and not has(model.friction.law, "bonds"):
+        return list(rings)
+    known = known_of(found, case)
+    drift = {name: one for name, one in known.items() if name == "drift_per_cycle"}
+    return [*law_warnings(model, outcome, drift, 0.0), *rings, *tolerance_warnings(Finding(model, known))]
+
+
+def _by_law(models: Alike, found: CaseResults) -> np.ndarray:
+    """(n,) whether the law of a case may have to be warned of, as `law_warnings` does: bonds that grow, are unbounded
+    or creep."""
+    first = models.first
+    if not has(first.friction.law, "bonds"):
+        return np.zeros(len(models), bool)
+    if first.bonds.grows or first.bonds.order < 0 or first.bonds.reading != "stretch":
+        return np.ones(len(models), bool)
+    if "drift_per_cycle" not in found.values:  # what moves no cycle long has none
+        return np.zeros(len(models), bool)
+    drift, error = found.values["drift_per_cycle"], found.errors["drift_per_cycle"]
+    return (np.abs(drift) > np.nan_to_num(error)) & (found.outcome != str(Outcome.TRANSIENT))
+
+
+def known_of(found: CaseResults, case: int) -> dict:
+    """The measures of a case whose errors are known, by name."""
+    return {name: Measure(float(column[case]), found.units[name], float(found.errors[name][case]),
+                          float(found.floors[name][case]))
+            for name, column in found.values.items() if not np.isnan(found.errors[name][case])}

@@ -1,0 +1,654 @@
+"""The batch of lanes: lumped cases of one law side by side, with bars from half the steps.
+
+Where the bars of a case of a law of a stretch (tanh, Bouc-Wen, LuGre, bonds of a constant length) miss the tolerance,
+it marches by a quarter of the steps too, which shows how its errors fall. A case marches by twice the steps where its
+bars still miss it: what it said before tells the errors then. A case of Iwan or of the elastic-plastic law that has not
+settled marches on. What rings in a stick that lasts all the time is told in closed form behind one spring, else by a
+fit. A case goes to the exact batch `lumped`, or under a law of a stretch to a run of its own, where a bar still misses
+its tolerance, rings in shorter sticks are to be told, or a motion grows. Where these contradict one of a few (under a
+law of a stretch twice: by its steps and by as many again), more are checked; where more than 3 in 100 are contradicted,
+every case of the batch is exact, else those are.
+"""
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from itertools import pairwise
+from time import perf_counter
+from zlib import crc32
+
+import numpy as np
+
+from ....dynamics.lanes import names_kernels as at
+from ....dynamics.lanes import reading
+from ....dynamics.lanes import run as march
+from ....effects import has, listed
+from ....friction.laws.iwan import largest as largest_slide
+from ....model.alike import Alike, columns_of, some
+from ....model.model import Model
+from ....response.errors import ROUND, coarser_errors, convergence_error, signed
+from ....response.measures import energy_balance
+from ....response.ringing import FAINT, PER_PERIOD, WIDEST, ringing
+from ....response.rows import larger_term
+from ....response.settling import steady_amplitudes, windows_of
+from ....scene.rules.scene_draft import pinned
+from ....structure.drive_sizes import largest
+from ...rig.motion_warnings import creeping_note
+from ...rig.pieces import CHANGES, read_off
+from .. import one_by_one
+from ..case_results import CaseResults
+from . import lumped
+from .columns import ENDS, Runs, batch_answers
+from .pieces import LONGEST, SHORTEST
+
+AMPLITUDE = "relative_displacement_amplitude"
+LEAST = 64  # cases of a study that lanes serve
+TIGHTEST = 1e-4  # tolerance that lanes serve
+TOGETHER = 4096  # cases of one compiled call
+# law -> that of `dynamics.lanes`
+KINDS = {"coulomb": "rigid", "elastic-plastic": "yielding", "iwan": "masing", "tanh": "friction.laws.tanh_kernels",
+         "bouc-wen": "friction.laws.bouc_wen_kernels", "lugre": "friction.laws.lugre_kernels",
+         "nonlocal": "friction.laws.stretch_kernels"}
+MARCH_ON = "yielding", *march.MASING  # whose motions march on until they settle
+SMOOTH, CALM = (128, 256, 512, 1024, 2048), 0.5  # steps of a cycle under a law of a stretch, its rate in a step then
+LAYER = 0.5  # of the rate at which a speed settles in the layer of tanh, from which on bars ask for more steps
+PASSES = 0.75  # of the time in which a slide that turns passes the speed of Stribeck, over that of a rate
+RINGING = 512  # steps of a cycle under a law of a stretch from which a ring that is not found is none
+RATES = ((5.0, 96), (10.0, 192), (20.0, 384))  # fastest motion over the drive, and the steps of a cycle it asks for
+OF_TABLE = ((10.0, 96), (20.0, 192), (40.0, 384), (80.0, 768))  # the same behind sliders that are a patch
+OF_FIT = 5.0  # of the error of the fit of a ring, whose samples err alike by the steps of the march
+LEAST_ERROR = 1e-6  # relative error that stays, a hundredth of TIGHTEST: both marches can miss the same event
+NO_LOOP = 1e-6  # of the largest force times slide: a case with less of a loop sticks
+MORE, SETTLED = 10, 1e-5  # times its cycles marches what has not settled; change over a tenth of these that is left
+LATE = 100  # times that change may be left at last
+PACES = 0.25, 0.25, 0.5, *(MORE - 1) * (1.0,)  # of its cycles, after which it is asked whether it has
+# error of an extrapolated range over what the extrapolation says, and over the range at least: 1 of 571 erred more
+OF_STATED, OF_TAIL = 2.5, 7e-6
+# times twice as many cells as a run by itself has in a check of Iwan, and of its bars: 1 of 590 random cases erred more
+# than one, by 1.9
+FINER_CELLS, SHORT = 2, 2.0
+RING = "ring_frequency", "ring_damping"
+# of a measure, by which a coarser mesh that marches changes it at most: the loop of little slip may be all unknown
+WILD = ("relative_displacement_amplitude", 0.1), ("friction_force_peak", 0.1), ("loop_area", 10.0)
+DROPPED = 1e-2  # share of a loop by which another may be larger that is forgotten for want of room
+CHECKED, FEWEST = 200, 2  # one of so many cases is held against the exact engine, so many of a batch at least
+IN_DOUBT, WRONG = 70, 0.03  # so many more where one contradicts; from this share of them on all cases are exact
+RINGS = 0.9 * 3 * np.pi  # angle that its spring turns in a stick, from which a ring is looked for
+
+
+def refuses(model: Model) -> str:
+    """Why lanes do not take a model; "" where they do."""
+    return no_lanes(model) or ("" if steps_of([model])[0] else "its free vibration is too fast for the time steps of "
+                                                               "its drive")
+
+
+def no_lanes(model: Model) -> str:
+    """Why lanes do not take a model, nor any that differs from it in plain numbers; "" where they may."""
+    if why := lumped.not_one_point(model):
+        return why
+    if not SHORTEST <= model.rig.cycles <= LONGEST or not model.friction.static > 0:
+        return "its cycles are too few or too many, or it has no friction"
+    if model.friction.law not in KINDS:
+        return "its law cannot be computed for many cases at once"
+    return _manifold(model.friction) or asks_more(model)
+
+
+def asks_more(model: Model) -> str:
+    """Why the accuracy that a model asks for is not that of lanes; "" where it is."""
+    if model.accuracy.method != "auto" or pinned(model.accuracy) or model.accuracy.tolerance < TIGHTEST:
+        return "the case asks for another method, or for an accuracy beyond that of a batch"
+    return ""
+
+
+def _manifold(friction) -> str:
+    """Why a law of a stretch has more than that to follow; "" where it has not."""
+    grows = has(friction.law, "bonds") and (listed(friction) or friction.slip_growth is not None)
+    return "its bonds grow, or are computed as a list of bonds" if grows else ""
+
+
+def _creates(model: Model):
+    """Whether a law of a stretch may create energy, or its bonds have more than one stretch."""
+    f = model.friction
+    if has(f.law, "bonds"):
+        return np.not_equal(f.breakaway or 0.0, 0.0) | np.not_equal(f.initial_bonds, 1.0)
+    if f.law == "lugre":  # the power of its damping is below zero from there on
+        return np.greater(f.micro_damping * model.rig.speed, 4 * of_law(model)[1])
+    return np.less(f.shape, 0.5) if f.law == "bouc-wen" else False
+
+
+def of_law(model: Model) -> tuple:
+    """Numbers of a law of a stretch, as its `flowing` takes them, and the length [m] over which it gives way, 0 for
+    none."""
+    f, load, limit = model.friction, model.point.load, model.limits(model.point.load)[0]
+    if f.law == "tanh":
+        return limit, 1 / f.reference_speed, 0.0
+    if has(f.law, "bonds"):
+        return limit / f.bond_length, f.bond_length, f.bond_length
+    if f.law == "bouc-wen":
+        return limit, limit / f.stiffness, f.exponent, f.shape, limit / f.stiffness
+    kinetic = f.static if f.kinetic is None else f.kinetic
+    return f.stiffness, kinetic * load, limit, f.stribeck_speed, f.micro_damping, f.viscous, limit / f.stiffness
+
+
+def steps_of(models: Sequence[Model]) -> np.ndarray:
+    """Steps per cycle (n,) of models of one law, 0 where they would be too many."""
+    smooth = march.flows(KINDS[models[0].friction.law])
+    ends = [(CALM * steps / (2 * np.pi), steps) for steps in SMOOTH] if smooth else RATES
+    return steps_at(columns_of(models, _rate)[0], ends)
+
+
+def steps_at(rate, ends) -> np.ndarray:
+    """Steps per cycle (n,) at fastest rates (n,) over that of the drive; ends: up to which rate how many."""
+    return np.append([steps for _, steps in ends], 0)[np.searchsorted([end for end, _ in ends], rate)]
+
+
+def rate_of(model: Model, stiffness):
+    """Fastest rate of a model behind a spring of this stiffness [N/m] over that of its drive."""
+    modes = model.rig.modes
+    return (np.sqrt(modes.omega[0]**2 + stiffness * modes.slide[0]**2 / modes.mass) + modes.dampers[0, 0]) \
+        / model.rig.drive.omega
+
+
+def _rate(model: Model) -> tuple:
+    """Fastest rate of a model over that of its drive; infinite where lanes do not follow it."""
+    modes, omega, damper = model.rig.modes, model.rig.drive.omega, model.rig.modes.dampers[0, 0]
+    scale = modes.slide[0]**2 / modes.mass
+    stiff = _contact(model)[0] * scale
+    if not march.flows(KINDS[model.friction.law]):
+        return rate_of(model, _contact(model)[0]),
+    rate = damper
+    if model.friction.law == "tanh":
+        rate = model.limits(model.point.load)[0] / model.friction.reference_speed * scale + damper
+        rate = np.where(rate > CALM * SMOOTH[-1] / (2 * np.pi) * omega, np.inf, LAYER * rate)
+    if model.friction.law == "lugre":  # its peak of force lasts while the slide turns, as long as its speed is that low
+        turns = np.abs(modes.slide[0] * modes.base[0]) * largest(model.rig.drive)
+        rate = np.maximum(damper, PASSES * turns / model.friction.stribeck_speed)
+    return np.where(_creates(model), np.inf, np.maximum(rate, np.sqrt(modes.omega[0]**2 + stiff)) / omega),
+
+
+def _contact(model: Model) -> tuple:
+    """(stiffness before it slips [N/m], length [m], what else there is) of a contact, as `Cases` has them."""
+    friction, static = model.friction, model.limits(model.point.load)[0]
+    if friction.law == "iwan":
+        chi, share = friction.chi, 1 / (1 + friction.beta)
+        slips = share * (chi + 1) / (chi + 2 - share)  # of the friction, before the last slider does
+        half = np.minimum(1.0, (0.5 / slips)**(1 / (chi + 2)))
+        return friction.stiffness, largest_slide(static, friction.stiffness, chi, friction.beta), chi + 1, share, half
+    if march.flows(KINDS[friction.law]):
+        *numbers, length = of_law(model)
+        return 0.0 if friction.law == "tanh" else static / length, length, *numbers
+    return (static / friction.bond_length, friction.bond_length) if friction.law == "elastic-plastic" else (0.0, 0.0)
+
+
+def group(model: Model) -> tuple:
+    """Equal for models of one compiled call."""
+    return int(model.rig.cycles), model.friction.law
+
+
+def parts(models: Sequence) -> dict[tuple, list]:
+    """Places of the models that lanes take, by group."""
+    places: dict = {}
+    if isinstance(models, Alike):
+        places |= {} if no_lanes(models.first) else {group(models.first): range(len(models))}
+    else:
+        for case, model in enumerate(models):
+            if isinstance(model, Model) and not no_lanes(model):
+                places.setdefault(group(model), []).append(case)
+    steps = {key: steps_of(some(models, cases)) for key, cases in places.items()}
+    return {key: np.array(cases)[steps[key] > 0].tolist() for key, cases in places.items() if steps[key].any()}
+
+
+def solve(models: Sequence[Model], say=None) -> CaseResults:
+    """Answers of models of one group."""
+    found = CaseResults.blank(len(models))
+    for first in range(0, len(models), TOGETHER):
+        part = some(models, range(first, min(first + TOGETHER, len(models))))
+        found.place(range(first, first + len(part)), _solved(part, say))
+    return found
+
+
+def _solved(models: Sequence[Model], say) -> CaseResults:
+    """Answers of models, as `answered` gives them."""
+    law = models[0].friction.law
+
+    def exact(places, check: bool) -> CaseResults:
+        return exactly(some(models, places), say, FINER_CELLS if law == "iwan" and check else 0)
+
+    found, others, _ = answered(models, (*cases_of(models), None), steps_of(models), exact)
+    if law == "tanh":
+        speeds, first = columns_of(models, lambda model: (model.friction.reference_speed,))[0], models[0].friction
+        notes = {one: creeping_note(first.model_copy(update={"reference_speed": one})) for one in {*speeds.tolist()}}
+        found.notes |= {case: [*notes[speeds[case]]] for case in np.flatnonzero(~others).tolist()}
+    return found
+
+
+def answered(models: Sequence[Model], cases: tuple, steps, exactly: Callable) -> tuple:
+    """(Answers of models, (n,) which are not of lanes, (n,) furthest the output was [m]); a few of them are held
+    against the exact engine. Where these contradict the others, a law of a stretch marches by twice the steps, and more
+    are checked; where more than a few still do, all are exact.
+
+    cases: as of `cases_of`, and what a coarser mesh makes of them, None without one; steps (n,); exactly(places, check)
+    -> exact Answers of some, for a check or for themselves.
+    """
+    begin, law = perf_counter(), kind_of(models[0])
+    found, exact, steps, reach = _side_by_side(models, cases, steps)
+    found.seconds[:] = (perf_counter() - begin) / len(models)
+    marks = np.column_stack(cases[0])
+    looked = checked(marks, ~exact)
+    ones = exactly(looked, True) if looked else None
+    times, again = SHORT if law == "masing" else 1.0, np.flatnonzero(~exact & (2 * steps <= SMOOTH[-1]))
+    wrong = contradicted(found, ones, looked, exact, times)
+    if wrong and again.size and march.flows(law):
+        finer, exact[again], *_ = _side_by_side(some(models, again), _of(cases, again), 2 * steps[again])
+        lumped.take_out(found, again)
+        found.place(again, finer)
+        wrong = contradicted(found, ones, looked, exact, times)
+    if wrong:  # by chance, or is it the rule?
+        free = ~exact
+        free[looked] = False
+        more = checked(marks, free, IN_DOUBT)
+        others = contradicted(found, exactly(more, True) if more else None, more, exact, times)
+        looked, wrong = [*looked, *more], wrong | others
+    whole = len(wrong) > WRONG * len(looked)
+    exact[list(wrong)] = True
+    exact |= whole
+    if (places := np.flatnonzero(exact)).size:
+        lumped.take_out(found, places)
+        found.place(places, exactly(places.tolist(), False))
+    for case in places.tolist() if whole else wrong:
+        of = next(iter(wrong.values())) if whole else wrong[case]
+        found.notes[case] = [*found.notes.get(case, ()), (
+            f"in {len(looked)} cases the fast engine was checked against the exact engine and differed from it in "
+            f"{len(wrong)}, in {of} {'for example' if whole else 'of this case'}, so "
+            f"{'all cases were' if whole else 'this case was'} computed by the exact engine")]
+    return found, exact, reach
+
+
+def _side_by_side(models: Sequence[Model], cases: tuple, steps) -> tuple:
+    """(Answers of models, (n,) which must be run otherwise, steps a cycle (n,) of each, furthest (n,) [m] their output
+    was) from steps (n,) on that many more are made of where bars miss the tolerance; all that march by the same steps
+    do so together, those for whose errors it is too. Where the change at half the steps is too large under a law of a
+    stretch, a quarter of them tells how it falls. What a coarser mesh changes is told by the fewest steps, and by more
+    where that is so much that steps are too long for its start, or where the case sticks, as what then is left of the
+    third harmonic hangs on both."""
+    found, exact, steps = CaseResults.blank(len(models)), np.zeros(len(models), bool), steps.copy()
+    reach = np.zeros(len(models))
+    law, cycles, meshed = kind_of(models[0]), group(models[0])[0], {}
+    fewest, known, flows = steps // 2, {}, march.flows(law)
+    now, smooth = int(fewest.min()), flows or law in march.MASING
+    finest = (SMOOTH if smooth else RATES[-1])[-1]
+
+    def tell_mesh(places, fine: dict) -> None:
+        rough = _measured(law, *_of(cases[2], places), cycles, now)[0]
+        for name, error in _of_mesh(fine, rough).items():
+            meshed.setdefault(name, np.zeros(len(models)))[places] = error
+
+    def measured(places, count: int) -> tuple:
+        seen = _measured(law, *_of(cases[:2], places), cycles, count)
+        for name, column in seen[0].items():
+            known.setdefault(count, {}).setdefault(name, np.full(len(models), np.nan))[places] = column
+        return seen
+
+    def tell(places, seen: tuple, *shares: int) -> np.ndarray:
+        fewer = [_of(known[now // share], places) for share in shares]
+        some_cases = *_of(cases[:2], places), _of(meshed, places)
+        answers, exact[places], wide = _marched(some(models, places), some_cases, now, seen, fewer)
+        lumped.take_out(found, places)  # what fewer steps said
+        found.place(places, answers)
+        return wide
+
+    while (steps >= now).any():
+        here = np.flatnonzero((fewest <= now) & (steps >= now))
+        ready = np.flatnonzero(steps[here] == now)
+        if here.size:
+            seen, places = measured(here, now), here[ready]
+            tells = fewest[here] == now
+            if meshed and ready.size:
+                own = _of(seen[0], ready)
+                tells[ready] |= _wild(own, _of(meshed, places)) | ~_loops(own)
+            if cases[2] is not None and tells.any():
+                tell_mesh(here[tells], _of(seen[0], tells))
+        if ready.size:
+            reach[places] = np.abs(seen[3][ready]).max(axis=(1, 2))
+            wide = tell(places, _of(seen, ready), 2)
+            if flows and wide.any():
+                if (lack := places[wide & (2 * fewest[places] == now)]).size:
+                    measured(lack, now // 4)
+                wide[wide] = tell(places[wide], _of(seen, ready[wide]), 2, 4)
+            more = wide & (2 * now <= finest) & (smooth | ~exact[places])
+            steps[places[more]] = 2 * now
+            exact[places[wide]] = ~more[wide]
+        now *= 2
+    return found, exact, steps, reach
+
+
+def _wild(values: dict, meshed: dict) -> np.ndarray:
+    """(n,) whether a coarser mesh changes a motion or its loop by more than a mesh does that is fine enough to march;
+    values, errors by name (n,)."""
+    return np.any([~(meshed[name] <= share * np.abs(values[name])) for name, share in WILD if name in meshed], axis=0)
+
+
+def _of(found, places):
+    """The rows of some places of arrays in a dictionary or a tuple; what is no array is of all."""
+    if isinstance(found, dict):
+        return {name: _of(one, places) for name, one in found.items()}
+    if isinstance(found, tuple):
+        parts = [_of(one, places) for one in found]
+        return type(found)(*parts) if hasattr(found, "_fields") else tuple(parts)
+    return found[places] if np.ndim(found) else found
+
+
+def _marched(models: Sequence[Model], cases: tuple, steps: int, seen: tuple, coarser: list) -> tuple:
+    """(Answers of models that marched by so many steps a cycle; (n,) which must be run otherwise, and for which so many
+    steps are too few); arguments as of `runs_of`."""
+    window, wide_of = window_of(group(models[0])[0]), partial(too_wide, models, meshed=cases[2])
+    runs, exact, lost = runs_of(models, cases, steps, seen, coarser)
+    found, alone, _ = batch_answers(models, runs, {"engine": "exact", "window_cycles": window}, wide_of)
+    chosen = {"engine": "lanes", "steps_per_cycle": steps, "window_cycles": window}
+    found.numerics.update(dict.fromkeys(range(len(models)), chosen))
+    return found, exact | (found.outcome == "grows"), wide_of(found) | lost | alone
+
+
+def exactly(models: Sequence[Model], say, finer: int = 0) -> CaseResults:
+    """Answers of models of a group by the exact batch; by runs of their own where that refuses them. finer: how often
+    twice the cells of a density are taken."""
+    models = list(models)
+    found, fit = CaseResults.blank(len(models)), np.array([not lumped.refuses(model) for model in models])
+    for cases, solves in ((np.flatnonzero(fit), partial(lumped.solve, finer=finer)),
+                          (np.flatnonzero(~fit), one_by_one.solve)):
+        if cases.size:
+            found.place(cases, solves([models[case] for case in cases], say))
+    return found
+
+
+def too_wide(models, found: CaseResults, meshed: dict | None = None) -> np.ndarray:
+    """(n,) whether a bar misses the tolerance of a case: of a measure or of the larger term that it is left of, beside
+    what a coarser mesh changes, (n,) by name, which no other engine knows better."""
+    tolerance, out = columns_of(models, lambda model: (model.accuracy.tolerance,))[0], np.zeros(len(models), bool)
+    for name, values in found.values.items():
+        if name in RING:  # the fit of a single run knows it no better
+            continue
+        if name.endswith("_steady") and kind_of(models[0]) not in MARCH_ON:
+            continue  # an extrapolation errs alike at finer steps, and in the exact engine
+        of_mesh = (meshed or {}).get(name.removesuffix("_steady"), 0.0)
+        floors = np.fmax(found.floors[name], tolerance * larger_term(name, found.values))
+        if name == "equivalent_damping" and "loop_area" in found.values:  # the loop over an energy, known no better
+            floors = np.fmax(floors, found.floors["loop_area"] * _of_loop(found.values))
+        out |= found.errors[name] - of_mesh > tolerance * np.abs(values) + floors
+    return out
+
+
+def checked(marks, free, least: int = FEWEST) -> list:
+    """Numbers of the cases that the exact engine checks: by a hash of what each is, whatever stands beside it; marks
+    (n, k): numbers that tell each from any other; free: (n,) which may be; least: so many at least, if there are."""
+    hashes = np.array([crc32(row.tobytes()) for row in marks])
+    order = [case for case in np.argsort(hashes, kind="stable").tolist() if free[case]]
+    few = sum(hashes[case] < 2**32 // CHECKED for case in order)
+    return order[:max(few, least)]
+
+
+def contradicted(found: CaseResults, ones: CaseResults | None, looked: list, exact, times: float = 1.0) -> dict[int, str]:
+    """Measures, by case, that exact answers of some cases contradict first, beyond the sum of both bars and the floor;
+    exact: (n,) which are not answered by lanes; times: their bars are taken."""
+    wrong: dict[int, str] = {}
+    for place, case in enumerate(looked):
+        for name, column in found.values.items() if not exact[case] else ():
+            if not (name in ones.values and ones.has(name, place)):
+                continue
+            apart = abs(column[case] - ones.values[name][place])
+            if name == "slip_start_phase":
+                apart = min(apart, np.pi - apart)
+            bars = np.nan_to_num(found.errors[name][case]) + times * np.nan_to_num(ones.errors[name][place])
+            if apart > bars + found.floors[name][case]:
+                wrong.setdefault(case, name)
+    return wrong
+
+
+def runs_of(models, cases: tuple, steps: int, seen: tuple, coarser: list) -> tuple:
+    """(Runs of models of a group, (n,) which must be run otherwise, (n,) which need finer steps at least); cases: as of
+    `cases_of`; seen: as of `_measured`, by so many steps a cycle; coarser: values by half of them, and by a quarter."""
+    law, cycles, (cases, c, meshed), (values, book, found, extremes, rise) = kind_of(models[0]), group(models[0])[0], \
+        cases, seen
+    window = window_of(cycles)
+    errors = bars(values, coarser)
+    errors |= {name: errors[name] + error for name, error in (meshed or {}).items() if name in errors}
+    slips = found.shown[:, at.SLIP_HIGH - at.SHOW] - found.shown[:, at.SLIP_LOW - at.SHOW]
+    stuck = slips / 2 <= np.maximum(c["held"], ROUND * np.abs(found.history[:, :, :2]).max(axis=(1, 2)))
+    stuck &= (cases.spring > 0) | (law == "rigid")
+    exact = np.any([np.isnan(values[name]) != np.isnan(coarser[0][name]) for name in values], axis=0)
+    rings, told, untold, faint = _rings(law, cases, c, found, (stuck, window, steps))
+    errors, exact, steady = errors | told, exact | untold, None
+    if law in MARCH_ON:
+        steady, open_ones = _settled(law, cases, found, steps, windows_of(extremes, window)[0], ~stuck)
+        steady, exact = tuple(np.abs(c["ratio"]) * one for one in steady), exact | open_ones
+    if law in march.MASING:
+        exact |= march.own_of(law, found.motion, "DROPPED") > DROPPED
+    phasors = (found.history[:, :, 2:] @ [1, 1j]) * c["ratio"][:, None]
+    ends = np.arange(cycles - 1, -1, -window)[::-1][-ENDS:]
+    nowhere = np.zeros(len(models), bool)  # what is lost goes elsewhere
+    tolerance, = columns_of(models, lambda model: (model.accuracy.tolerance,))
+    runs = Runs(cycles, window, values | rings, book, extremes, phasors[:, ends], stuck, nowhere, errors, LEAST_ERROR,
+                np.inf, stuck & (rise > tolerance * values["friction_force_peak"]), steady, again=False)
+    ended = np.isfinite(found.motion[:, at.X] + coarser[0]["friction_work"])
+    return runs, exact, faint | ~ended
+
+
+def may_ring(cases, found) -> np.ndarray:
+    """(n,) whether a stick of the last cycles is long enough that what rings in it could be told."""
+    own = np.sqrt(np.maximum(cases.square + cases.spring - cases.damp**2 / 4, 0.0))
+    return found.shown[:, at.LONGEST - at.SHOW] * own >= RINGS
+
+
+def stays(cases, found) -> np.ndarray:
+    """(n,) whether a start or a ring may be left at the end: cycles change by what it decays in one, by its damper at
+    least."""
+    last = found.history[:, -2:, :2]
+    change = np.abs(last[:, 1] - last[:, 0]).max(axis=1) / np.maximum(-np.expm1(-np.pi * cases.damp), 1e-300)
+    gain = np.abs(cases.out) * (cases.square + cases.spring) * change
+    return gain > FAINT / 3 * found.shown[:, at.ACCELERATION - at.SHOW]
+
+
+def _rings(law: str, cases, c: dict, found, read: tuple) -> tuple:
+    """(ring_frequency [Hz] and ring_damping by name, their errors, (n,) whether a run has to tell what rings, and
+    whether finer steps have to); read: (n,) which are stuck, the cycles that are read of what does not repeat, steps of
+    a cycle.
+
+    Told is what rings in a stick that lasts all the time: in closed form behind a spring, else by the fit of a run.
+    """
+    (stuck, window, steps), n, faint = read, len(found.ended), np.zeros(len(found.ended), bool)
+    out = tuple({name: np.full(n, np.nan) for name in RING} for _ in range(2))
+    if law == "rigid":  # nothing moves in its sticks
+        return *out, faint, faint
+    rings, marched = may_ring(cases, found), found.ended >= found.history.shape[1] - window
+    held = found.shown[:, at.STUCK - at.SHOW] > 2 * np.pi * (found.cycles - 1e-6)
+    if law == "yielding":
+        _of_springs(cases, c, found, held & rings & marched, out)
+        return *out, rings & ~held, faint
+    # nothing rings in what repeats, but a start may be left in a stick of all cycles
+    may = (rings & marched & (march.own_of(law, found.motion, "EVER") > 0)) | (stays(cases, found) & stuck) \
+        if law in march.MASING else stays(cases, found) & (stuck | rings)
+    untold, told = may & ~held, may & held
+    strides = steps / (PER_PERIOD * np.sqrt(np.maximum(cases.square + cases.spring, 1.0)))
+    strides = 2 ** np.log2(np.maximum(strides, 1.0)).astype(int)  # each case by its own, whatever stands beside it
+    where = np.flatnonzero(told)
+    every = march.accelerations(law, _of(cases, where), found.begun[where], window, steps) if where.size else ()
+    for case, signal in zip(where.tolist(), every):
+        omega, signal = float(c["omega"][case]), signal[::strides[case]]
+        time = np.linspace(0, 2 * np.pi * window / omega, len(signal))
+        values, apart = ringing(time, signal, [(0.0, time[-1])], omega)
+        faint[case] = not values and march.flows(law) and steps < RINGING  # for so few steps, perhaps
+        for name, value in values.items():
+            out[0][name][case], out[1][name][case] = value, OF_FIT * apart[name]
+    return *out, untold, faint
+
+
+def _of_springs(cases, c: dict, found, held, out: tuple) -> None:
+    """Write what rings in cases that a spring holds through all cycles that were read, (n,) `held`, in closed form, by
+    the rule of `response.ringing`; out: values and errors by name."""
+    beta, half, angle = cases.square + cases.spring, cases.damp / 2, 2 * np.pi * found.cycles
+    own, far = np.sqrt(np.maximum(beta - half**2, 0.0)), beta - 1
+    whole = far**2 + cases.damp**2
+    begun, place = found.begun, found.begun[:, at.PLACE]
+    with np.errstate(all="ignore"):  # the motion less that of the sine and of the stretch of the spring
+        z = begun[:, at.X] - cases.spring * place / beta + cases.push * cases.damp / whole
+        other = (begun[:, at.V] - cases.push * far / whole + half * z) / own
+        damping = half / np.sqrt(beta)
+        forced = (angle > 3 * np.pi) & (damping < 1e-3) & (np.abs(own - np.round(own)) < 1e-2)
+        size = np.abs(cases.out) * beta * np.hypot(z, other)
+        told = held & (angle * own >= 3 * np.pi) & (damping < WIDEST) & ~forced & (whole > 1e-18 * beta**2) \
+            & (size > FAINT * found.shown[:, at.ACCELERATION - at.SHOW])
+    for name, value in zip(RING, (own * c["omega"] / (2 * np.pi), damping)):
+        out[0][name][told], out[1][name][told] = value[told], 0.0
+
+
+def _settled(law: str, cases, found, steps: int, amplitudes, free) -> tuple:
+    """((half the range of the slide that motions settle to [m], its error), (n,) each, NaN of those that need none;
+    (n,) which of them do not show it after MORE times their cycles, nor by how they come near).
+
+    amplitudes (n, w) [m] of the output by windows; free: (n,) which may. They march on by a part of as many cycles as
+    they did, later by all of these, each until it settles, so that what settles soon costs little.
+    """
+    out, part = np.full((2, len(free)), np.nan), found.history.shape[1]
+    if amplitudes.shape[1] > 2:
+        free = free & (np.ptp(amplitudes[:, -3:], axis=1) > CHANGES * TIGHTEST * amplitudes[:, -1])
+    lost, where, motion = free.copy(), np.flatnonzero(free), found.motion[free]
+    history = found.history[where]
+    for share in PACES:
+        if not where.size:
+            break
+        here, before = _of(cases, where), motion
+        more, motion = march.march_on(law, here, before, max(1, int(share * part)), steps)
+        history = np.concatenate([history, more], axis=1)
+        late = history.shape[1] > MORE * part
+        least = _left(here, before, motion, more.shape[1])
+        value, error = _known(history, part, least, (LATE if late else 1) * SETTLED)
+        near = (LATE if late else 2) * SETTLED
+        ranges = np.ptp(history[:, -part:, :2], axis=2) / 2
+        known = error < near * ranges[:, -1]
+        if law == "yielding":
+            known &= _goes_on(ranges, cases.length[where], value, error)
+        out[:, where[known]], lost[where[known]] = (value[known], error[known]), False
+        where, motion, history = where[~known], motion[~known], history[~known]
+    return tuple(out), lost
+
+
+def _goes_on(ranges, length, value, error) -> np.ndarray:
+    """(n,) whether motions behind one spring slip in all of their last cycles and in the one that they settle to, or in
+    none: their free motion decays otherwise once no cycle slips. ranges (n, c): half those of the slide; length (n,):
+    the stretch beyond which it slips; value, error (n,): half the range that they settle to; all [m]."""
+    least, most = np.minimum(ranges.min(axis=1), value - error), np.maximum(ranges.max(axis=1), value + error)
+    return (least > length) | (most < length)
+
+
+def _left(cases, before, motion, cycles: int) -> np.ndarray:
+    """(n,) [m] the most that is left of a free motion, by what so many cycles changed of a motion `before` and by what
+    its damper takes of it in them at least: where it beats slowly, extremes hardly change as long as it is largest."""
+    own, half = np.sqrt(cases.square + cases.spring), cases.damp / 2
+    step = np.hypot(motion[:, at.X] - before[:, at.X], (motion[:, at.V] - before[:, at.V]) / own)
+    goes = -np.expm1(-2 * np.pi * cycles * (half - np.sqrt(np.maximum(half**2 - cases.square, 0.0))))
+    return step * (1 - goes) / np.maximum(goes, 1e-300)
+
+
+def _known(history, part: int, least, near: float) -> tuple:
+    """(half the range of the slide that motions settle to [m], its error, NaN where nothing tells it, (n,) each), of
+    their history (n, c, 4) beyond `part` cycles: the last where so many cycles hardly change it, and no more than those
+    before them, and no more free motion is left, (n,) `least` [m] at most, than a share `near` of it, else an
+    extrapolation of windows, in the end of windows of `part` cycles."""
+    ranges, count = np.ptp(history[:, :, :2], axis=2) / 2, history.shape[1]
+    last, left = ranges[:, -1], 2 * np.ptp(ranges[:, -part:], axis=1)
+    before = 2 * np.ptp(ranges[:, -2 * part:-part], axis=1) if count >= 2 * part else np.inf
+    closes = (np.maximum(left, least) < near * last) & (left <= np.maximum(before, 1e-9 * last))
+    ends = np.arange(count - 1, 0, -(part if count > MORE * part else window_of(part)))[::-1]
+    with np.errstate(all="ignore"):
+        value, error = steady_amplitudes(ranges[:, ends], history[:, ends, 2:] @ [1, 1j])
+    tail = np.maximum(OF_STATED * error, OF_TAIL * value)
+    return np.where(closes, last, value), np.where(closes, np.maximum(left, least) + 1e-9 * last, tail)
+
+
+def cases_of(models, contacts=None) -> tuple:
+    """(Cases of models, what else is told of them by name, (n,) each: SI); contacts (m, n): what `_of_contact` gives of
+    points, of others."""
+    own, damping, slide, share, output, mass, drive, w, moving, z, v, stiffness, size = columns_of(models, _of_rig)
+    static, kinetic, load, spring, length, *numbers = columns_of(models, _of_contact) if contacts is None else contacts
+    law, scale, numbers = kind_of(models[0]), slide**2 / (mass * w**2), np.array(numbers).T
+    numbers = numbers * march.scales(law, scale, w) if march.flows(law) else numbers.reshape(len(w), -1)
+    cases = march.Cases(damping / w, (own / w)**2, -slide * share * drive / w**2, scale * kinetic, scale * static,
+                        scale * spring, length, output / slide * w**2, drive * moving, slide * z, slide * v / w,
+                        numbers)
+    return cases, {"omega": w, "energy": mass * (w / slide)**2, "ratio": output / slide,
+                   "held": 1e-3 * np.divide(static, spring, out=0 * w, where=spring > 0), "stiffness": stiffness,
+                   "load": load, "size": size}
+
+
+def _of_rig(model: Model) -> tuple:
+    """The numbers of a model but for its contact that `cases_of` takes."""
+    modes, drive, start = model.rig.modes, model.rig.drive, model.rig.start
+    return (modes.omega[0], modes.dampers[0, 0], modes.slide[0], modes.base[0], modes.output[0], modes.mass,
+            drive.acceleration, drive.omega, drive.moving,
+            *((0.0, 0.0) if start is None else (start.z[0], start.v[0])), model.rig.stiffness, largest(drive))
+
+
+def _of_contact(model: Model) -> tuple:
+    """The numbers of the contact of a model that `cases_of` takes: static and kinetic friction [N], load [N], and
+    `_contact`."""
+    static, kinetic = model.limits(model.point.load)
+    kinetic = kinetic if kind_of(model) == "rigid" and model.friction.kinetic is not None else static
+    return static, kinetic, model.point.load, *_contact(model)
+
+
+def kind_of(model: Model) -> str:
+    """The law of `dynamics.lanes` of a model; that of a patch is the table of its elements."""
+    return KINDS[model.friction.law] if model.patch is None else "table"
+
+
+def _of_mesh(fine: dict, rough: dict) -> dict:
+    """Errors by name, (n,) each, of a mesh, from values on it and on a coarser one; one that this lacks is as uncertain
+    as it is large."""
+    with np.errstate(all="ignore"):
+        return {name: np.where(np.isnan(error), np.abs(fine[name]), error)
+                for name, error in coarser_errors(fine, rough).items()}
+
+
+def window_of(cycles: int) -> int:
+    """Last cycles that are read."""
+    return min(10, cycles // 10)
+
+
+def _measured(law: str, cases, c: dict, cycles: int, steps: int) -> tuple:
+    """(values, books, Marched, extremes of the output (n, c, 2) [m], rise of the force [N]) of a march."""
+    found, window = march.march(law, cases, cycles, window_of(cycles), steps), window_of(cycles)
+    extremes = found.history[:, :, :2] * c["ratio"][:, None, None]
+    extremes[c["ratio"] < 0] = extremes[c["ratio"] < 0, :, ::-1]
+    book = reading.books(law, cases, found, c["energy"])
+    seen = reading.reading_of(law, cases, found, c["energy"], c["omega"], extremes[:, -window:])
+    with np.errstate(all="ignore"):
+        values = read_off(seen, book, True, True, c["stiffness"], c["size"])
+    values |= {"normal_load": c["load"], "friction_work": book["friction"], "energy_dissipated": book.pop("lost"),
+               "energy_created": np.zeros(len(c["load"])), "energy_balance": energy_balance(book)}
+    return values, book, found, extremes, seen.rise
+
+
+def bars(values: dict, coarser: list) -> dict:
+    """Return the error of each measure (n,) of cases from their values at half and a quarter of the steps.
+
+    Parameters
+    ----------
+    values : dict
+        Measures by name, (n,) each.
+    coarser : list of dict
+        The same at half the steps and, if it is known, at a quarter of them.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):  # of a march that ran away by half the steps
+        changes = [signed(fine, coarse) for fine, coarse in pairwise([values, *coarser])]
+        return {name: np.nan_to_num(convergence_error(*(gaps[name] for gaps in changes)), posinf=np.inf)
+                for name in values}
+
+
+def _loops(values: dict) -> np.ndarray:
+    """(n,) whether a case has a loop, and not a small difference of what goes to and fro as it sticks."""
+    return np.abs(values["loop_area"]) > NO_LOOP * values["friction_force_peak"] * np.abs(values[AMPLITUDE])
+
+
+def _of_loop(values: dict) -> np.ndarray:
+    """equivalent_damping over loop_area (n,) [1/J]; 0 without a loop."""
+    loop = values["loop_area"]
+    return np.divide(np.abs(values["equivalent_damping"]), np.abs(loop), out=0 * loop, where=loop != 0)

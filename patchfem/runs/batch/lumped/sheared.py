@@ -1,0 +1,149 @@
+"""Patches that slip part by part, on one mode under a sine, many together.
+
+Patches that share their pieces are pressed together (`runs.patch.static`), others as their own runs do it. Their
+elements, and those of the coarser mesh for the error, then move without histories, as `pieces` has it, or in lanes
+(`tabled`). A case that sticks, or rings in its sticks, is run by itself.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ....core import Outcome
+from ....effects import has
+from ....model.model import Model
+from ....model.source import placed
+from ....response.errors import coarser_errors
+from ...accuracy_warnings import Finding, tolerance_warnings
+from ...patch import result as of_patch
+from ...results.result import without_folders
+from ...results.travel import outcome_on_piece, travelled
+from ...rig.engines import PIECES, engine_of
+from ...rig.numerics import choose
+from ...rig.pieces import YieldingElements
+from .. import one_by_one, patches
+from ..case_results import CaseResults, unread
+from . import pieces
+from .columns import batch_answers, known_of
+from .lumped import not_one_sine, take_out
+
+TOGETHER = 128  # cases of one compiled call: their elements and histories of cycles are held at once
+LEAST = 2  # cases of a thread: one takes as long as hundreds of a point
+
+
+class Pressed(NamedTuple):
+    """A case whose patch is pressed: what its motion and its words want of it; patch: for lengths and places alone."""
+
+    fine: YieldingElements
+    coarse: YieldingElements
+    measures: dict
+    warnings: list
+    notes: list
+    patch: Any
+
+
+def refuses(model: Model) -> str:
+    """Why the batch does not take a model; "" where it does."""
+    if model.patch is None or not model.soft or model.patch.strips is not None or model.grooves is not None:
+        return "the case is not a patch that slips part by part"
+    if model.wear is not None or model.heat is not None or unread(model):
+        return "the case has [wear] or [friction.temperature], or its table of measured responses cannot be read"
+    if why := not_one_sine(model.rig):
+        return why
+    if model.friction.law != "elastic-plastic" and (not has(model.friction.law, "set-valued")
+                                                    or has(model.friction.law, "averaged")):
+        return "the points of the patch have no slip force"
+    if not pieces.SHORTEST <= model.rig.cycles <= pieces.LONGEST:
+        return "the case has too few or too many cycles"
+    return "" if engine_of(model) is PIECES else "the case is not computed by the engine from yield to yield"
+
+
+def group(model: Model) -> tuple:
+    """Equal for models of one compiled call."""
+    return int(model.rig.cycles), model.friction.law
+
+
+def solve(models: Sequence[Model], say=None) -> CaseResults:
+    """Answers of models of one group; a case that needs it is run by itself."""
+    return solved(models, say, moved, TOGETHER)
+
+
+def solved(models: Sequence[Model], say, move: Callable, together: int) -> CaseResults:
+    """Answers of models of one group, by so many; move: as `moved`."""
+    return patches.pressed_first(models, together, lambda part: _solved(part, say, move))
+
+
+def _solved(models, say, move: Callable) -> CaseResults:
+    begin, out = perf_counter(), CaseResults.blank(len(models))
+    held = dict.fromkeys(range(len(models)))
+    for case in sorted(held, key=lambda case: id(models[case].patch.solved)):  # those of one patch share its elements
+        held[case] = _pressed(models[case])
+    moves = [case for case, one in held.items() if one is not None]
+    alone = set(range(len(models))) - set(moves)
+    if moves:
+        these = [models[case] for case in moves]
+        answers, lost = move(these, [held[case] for case in moves], say)
+        answers.seconds[:] = (perf_counter() - begin) / len(models)
+        alone |= {moves[k] for k in np.flatnonzero(lost)}
+        take_out(answers, np.flatnonzero(lost).tolist())
+        out.place(moves, answers)
+    if alone:
+        rest = sorted(alone)
+        out.place(rest, one_by_one.solve([models[case] for case in rest], say))
+    return out
+
+
+def _pressed(model: Model) -> Pressed | None:
+    """A case with its patch pressed; None of one that is run by itself."""
+    try:
+        with placed(model.source):
+            patch, *coarse = of_patch.solve_all(model.patch, model.accuracy.tolerance)
+            if coarse[0] is None or patch.pressure.outcome is Outcome.NO_CONTACT:
+                return None
+            warnings = [*model.source.remarks, *of_patch.strained(model.patch, patch)]
+            numerics = choose(model)
+            return Pressed(YieldingElements(model, numerics, patch), YieldingElements(model, numerics, coarse[0]),
+                            of_patch.measured(model, patch, coarse), warnings,
+                            of_patch.left_out(model, patch, coarse), patch)
+    except Exception:  # what is wrong is told by its own run
+        return None
+
+
+def moved(models, held: list, say) -> tuple:
+    """(Answers of pressed cases, (n,) whether a case must be run by itself)."""
+    cycles = int(models[0].rig.cycles)
+    window = min(10, cycles // 10)
+    cases = [pieces.Case(model, one.fine.groups, one.fine.held, one.patch.pressure.load)
+             for model, one in zip(models, held)]
+    fine = pieces.runs_of_cases(cases, cycles, window, say, LEAST)
+    coarser = [case._replace(groups=one.coarse.groups) for case, one in zip(cases, held)]
+    coarse = pieces.runs_of_cases(coarser, cycles, window, say, LEAST, steady=False)
+    chosen = tuple({"elements": int(one.fine.contact.reduction.stiffness.size),
+                    "interface_nodes": int(one.patch.x.size)} for one in held)
+    runs = replace(pieces.with_coarser_errors(fine, [coarse], coarser_errors), chosen=chosen, again=False)
+    found, alone, _ = batch_answers(models, runs, {"engine": PIECES.name, "window_cycles": window})
+    alone = alone | runs.stuck | coarse.lost
+    for case in np.flatnonzero(~alone).tolist():
+        tell(found, case, models[case], held[case], np.abs(runs.extremes[case]).max())
+    return found, alone
+
+
+def tell(found: CaseResults, case: int, model: Model, one: Pressed, reach: float) -> None:
+    """Put the measures of the pressed patch in, and the outcome, warnings and notes as a run of its own has them; reach
+    [m]: furthest its output was."""
+    modes = model.rig.modes
+    slide = np.array([reach * abs(float(modes.interfaces[0, 0]) / float(modes.output[0]))])
+    found.outcome[case] = str(outcome_on_piece(Outcome(found.outcome[case]), model.patch, one.patch, slide))
+    known = known_of(found, case)
+    found.fill(case, one.measures)
+    seen = Finding(model, one.measures | {name: m for name, m in known.items() if name != "normal_load"}, one.patch)
+    warned = without_folders([*one.warnings, *model.rig.notes, *travelled(one.patch, slide), *tolerance_warnings(seen)],
+                             model.source.path)
+    found.warnings.pop(case, None)
+    if warned:
+        found.warnings[case] = warned
+    if noted := without_folders(one.notes, model.source.path):
+        found.notes[case] = noted

@@ -1,0 +1,73 @@
+"""Patches that slip part by part, on one mode under a sine, in lanes.
+
+Under a load that stays, such a patch is a set of Jenkins elements, whose force follows Masing's rule from one curve.
+That of each case and that of its coarser mesh, for the error, march side by side as tables (`lanes.answered`). What
+lanes do not tell goes to `sheared`.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ....compiled import load
+from ....dynamics.lanes import run as march
+from ....model.model import Model
+from .. import one_by_one
+from ..case_results import CaseResults
+from . import lanes, sheared
+
+TOGETHER = 512  # cases of one compiled call, whose tables are held at once
+
+
+def refuses(model: Model) -> str:
+    """Why lanes do not take a model; "" where they do."""
+    return sheared.refuses(model) or lanes.asks_more(model)
+
+
+def group(model: Model) -> tuple:
+    """Equal for models of one compiled call."""
+    return sheared.group(model)
+
+
+def solve(models: Sequence[Model], say=None) -> CaseResults:
+    """Answers of models of one group."""
+    return sheared.solved(models, say, moved, TOGETHER)
+
+
+def moved(models, held: list, say) -> tuple:
+    """(Answers of pressed cases, (n,) whether a case must be run by itself)."""
+    sets = [[one.groups[0] for one in (pressed.fine, pressed.coarse)] for pressed in held]
+    rates = [lanes.rate_of(model, fine.stiffness.sum()) for model, (fine, _) in zip(models, sets)]
+    steps = lanes.steps_at(rates, lanes.OF_TABLE)
+    most = load(f"{march.HERE}.table_curve_kernels").YIELDS - 1
+    fit = (steps > 0) & [max(one.stiffness.size for one in pair) < most for pair in sets]
+    found, lost = CaseResults.blank(len(models)), np.zeros(len(models), bool)
+
+    def exactly(places) -> CaseResults:
+        answers, alone = sheared.moved([models[k] for k in places], [held[k] for k in places], say)
+        answers.place(np.flatnonzero(alone), one_by_one.solve([models[places[k]] for k in np.flatnonzero(alone)], say))
+        return answers
+
+    if (rest := np.flatnonzero(~fit).tolist()):
+        found.place(rest, exactly(rest))
+    if (here := np.flatnonzero(fit).tolist()):
+        these = [models[k] for k in here]
+        cases = [lanes.cases_of(these, _contacts([sets[k][mesh] for k in here], [held[k] for k in here]))
+                 for mesh in range(2)]
+        answers, exact, reach = lanes.answered(these, (*cases[0], cases[1]), steps[here],
+                                               lambda places, _: exactly([here[k] for k in places]))
+        for place in np.flatnonzero(~exact).tolist():
+            case = here[place]
+            answers.numerics[place] = answers.numerics[place] | {
+                "elements": int(sets[case][0].stiffness.size), "interface_nodes": int(held[case].patch.x.size)}
+            sheared.tell(answers, place, models[case], held[case], reach[place])
+        found.place(here, answers)
+    return found, lost
+
+
+def _contacts(sets: list, held: list) -> np.ndarray:
+    """(m, n) numbers of the contacts of patches, as `lanes.cases_of` takes them, from their Elements."""
+    rows = [(one.limit, one.limit, pressed.patch.pressure.load, one.stiffness.sum(), one.yield_slide[-1])
+            for one, pressed in zip(sets, held)]
+    tables = march.tables_of([(one.stiffness, one.yield_slide) for one in sets])
+    return np.column_stack([rows, tables]).T

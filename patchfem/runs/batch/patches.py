@@ -1,0 +1,126 @@
+"""Static patches that share their pieces: pressed together, a pass per mesh for all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import replace
+from time import perf_counter
+from typing import NamedTuple
+
+import numpy as np
+
+from ...core import Outcome, allowed
+from ...elasticity.lapack import one_thread
+from ...model.alike import Alike, some
+from ...model.model import Model
+from ..accuracy_warnings import Finding, tolerance_warnings
+from ..patch import result as of_patch
+from ..patch import static, store
+from ..patch.meshes import geometry_of
+from ..patch.strength import yielding_faces
+from ..results.patch_rows import POSITIVE, TABLE
+from ..results.result import without_folders, without_folders_of
+from . import one_by_one
+from .case_results import CaseResults
+
+AT_ONCE = 2048  # cases whose forces are held at once
+TINY = 1e-300  # an error that is always allowed
+
+
+class _Nodes(NamedTuple):
+    x: np.ndarray
+
+
+def refuses(model: Model) -> str:
+    """Why a model is not pressed together with others; "" where it may be."""
+    return static.not_together(model.patch) if model.kind == "patch" else "the case is no static patch"
+
+
+def group(model: Model) -> Hashable:
+    """Equal for models whose patches are pressed together."""
+    return geometry_of(model.patch), static.pressing_kind(model.patch), model.accuracy.tolerance
+
+
+def parts(models: Sequence[Model]) -> dict:
+    """{group: places} of models that differ in plain numbers alone; of others none."""
+    alike = isinstance(models, Alike) and models.first.kind == "patch" and not refuses(models.first)
+    return {group(models.first): range(len(models))} if alike else {}
+
+
+def solved_together(models: Sequence[Model]) -> list[Model]:
+    """The models in their order, those whose patches press together with how they do, for what moves them then.
+
+    Of patches that are alike, as those of levels or frictions, one is pressed for all, so that they share its shear.
+    """
+    out, groups = list(models), {}
+    for case, model in enumerate(models):
+        if not static.not_together(model.patch):
+            asked = store.content_key(model.patch) if store.is_shared(model.patch) else case
+            groups.setdefault(group(model), {}).setdefault(asked, []).append(case)
+    for alike in groups.values():
+        first = [models[cases[0]] for cases in alike.values()]
+        found = static.solved_patches([model.patch for model in first], first[0].accuracy.tolerance)
+        for cases, one in zip(alike.values(), found):
+            for case in cases if one is not None else ():
+                out[case] = replace(models[case], patch=replace(models[case].patch, solved=one))
+    return out
+
+
+def pressed_first(models: Sequence[Model], together: int, solve: Callable) -> CaseResults:
+    """Answers of models, so many at once, whose patches are pressed before `solve` gives those of a part."""
+    out = CaseResults.blank(len(models))
+    for first in range(0, len(models), together):
+        with one_thread():  # more wait for each other longer than such small systems take
+            part = solved_together(models[first:first + together])
+            out.place(range(first, first + len(part)), solve(part))
+    return out
+
+
+def solve(models: Sequence[Model], say: Callable | None = None) -> CaseResults:
+    """Answers of a group; cases that do not press together with the others are run by themselves."""
+    out = CaseResults.blank(len(models))
+    for start in range(0, len(models), AT_ONCE):
+        cases = range(start, min(start + AT_ONCE, len(models)))
+        out.place(cases, _solved(some(models, cases), say))
+    return out
+
+
+def _solved(models: Sequence[Model], say: Callable | None) -> CaseResults:
+    begin, first, alike = perf_counter(), models[0], isinstance(models, Alike)
+    asked = static.asked_by_columns(models.columns().patch, len(models)) if alike else \
+        static.asked_of([model.patch for model in models])
+    found, out = static.pressed_together(asked, first.accuracy.tolerance), CaseResults.blank(len(models))
+    good, wide, tolerance = found.good, ~found.good, first.accuracy.tolerance
+    unknown = np.any([found.errors[name] >= found.values[name] for name in POSITIVE], axis=0)
+    floors = {name: np.broadcast_to(least, good.shape) for name, least in
+              of_patch.floors(first.patch, tolerance, found.values).items()}
+    for name, values in found.values.items():
+        out.measure(name, TABLE[name].unit)
+        for columns, given in ((out.values, values), (out.errors, found.errors[name]), (out.floors, floors[name])):
+            columns[name][:] = np.where(good, given, np.nan)
+        wide = wide | (found.errors[name] > np.maximum(allowed(tolerance, values, floors[name]), TINY))
+    out.outcome[good] = str(Outcome.DONE)
+    out.outcome[good & unknown] = str(Outcome.NOT_CONVERGED)
+    nodes = {"interface_nodes": found.levels[0].x.size}
+    out.numerics.update(dict.fromkeys(np.flatnonzero(good).tolist(), nodes))
+    strained = of_patch.beyond_small_strains(first.patch, found.top, found.approach)
+    mean = found.values["normal_load"] / (first.patch.length * first.patch.width * first.patch.pairs)
+    least_peak = found.values["pressure_peak"] - found.errors["pressure_peak"]
+    always, told = bool(first.source.remarks) or not alike, without_folders_of(first.source.path)
+    for case in np.flatnonzero(good & (wide | strained | always)).tolist():
+        model, measures = models[case], found.measures(case, floors)
+        warned = [*model.source.remarks,
+                  *of_patch.strained_by(model.patch, float(found.top[case]), float(found.approach[case])),
+                  *tolerance_warnings(Finding(model, measures, _Nodes(found.levels[0].x)))]
+        if warned:
+            out.warnings[case] = without_folders(warned, model.source.path)
+    for case in np.flatnonzero(good).tolist():
+        notes = [*of_patch.slender(first.patch, mean[case]), *found.band(first.patch, case),
+                 *yielding_faces(first.patch, least_peak[case]).values()]
+        if notes:
+            out.notes[case] = told(notes)
+    single = np.flatnonzero(~good)
+    out.seconds[:] = (perf_counter() - begin) / len(models)
+    if single.size:
+        out.place(single, one_by_one.solve(some(models, single), say))
+    return out

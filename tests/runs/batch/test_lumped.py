@@ -1,0 +1,72 @@
+"""Lumped cases in one compiled call, beside the same cases run one by one."""
+
+import numpy as np
+import pytest
+from batch_beside import held_against
+from scene_texts import MODE
+
+from patchfem.api import base_of, build, load
+from patchfem.runs.batch import one_by_one
+from patchfem.runs.batch.case_results import CaseResults
+from patchfem.runs.batch.lumped import lumped
+from patchfem.scene.sets import assignments
+
+DRIVE = '[drive]\nkind = "{kind}"\n{kind_size}\nfrequency = "140 Hz"\ncycles = 40\n'
+SCENE = '[normal]\nload = "30 N"\n[friction]\n{law}\n' + MODE + DRIVE
+LAWS = {"coulomb": 'law = "coulomb"\nstatic = 0.3', "weakening": 'law = "coulomb"\nstatic = 0.3\nkinetic = 0.2',
+        "elastic-plastic": 'law = "elastic-plastic"\nstatic = 0.3\nbond_length = "10 um"',
+        "iwan": 'law = "iwan"\nstatic = 0.3\nstiffness = "2e6 N/m"\nchi = -0.5\nbeta = 1.0'}
+SIZES = {"base": 'acceleration = "5 g"', "force": 'force = "5 N"'}
+
+
+def models(law: str, seed: int, count: int) -> list:
+    """Random cases of a law: sizes that stick, that stop and that slide all the time, near resonance and away."""
+    r, out = np.random.default_rng(seed), []
+    for _ in range(count):
+        kind = str(r.choice(["base", "base", "force"]))
+        push, mode = 10 ** r.uniform(0.3, 2), "structure.mode.axial"
+        sets = {"normal.load": r.uniform(2, 1.5 * push), "drive.frequency": r.uniform(60, 250),
+                f"{mode}.damping": float(r.choice([0, 0.003, 0.05, 0.3, 1.0, 1.4])),
+                f"{mode}.slide": float(r.choice([1, -0.7])), f"{mode}.output": float(r.choice([1, -1.3, 0.5])),
+                "drive.cycles": int(r.choice([20, 47])), "accuracy.tolerance": float(r.choice([1e-3, 1e-5]))}
+        sets |= {"drive.acceleration": push, f"{mode}.base": r.uniform(0.4, 1)} if kind == "base" else \
+            {"drive.force": push}
+        if r.random() < 0.2:
+            sets["structure.start.velocity"] = [0.05]
+        if law == "elastic-plastic":
+            sets["friction.bond_length"] = 10 ** r.uniform(-7, -4)
+        scene = load(SCENE.format(law=LAWS[law], kind=kind, kind_size=SIZES[kind]))
+        out.append(build(base_of(scene).changed(assignments(sets))))
+    return out
+
+
+def batch(cases):
+    """Answers of the batch, group by group."""
+
+    found, groups = CaseResults.blank(len(cases)), {}
+    for case, model in enumerate(cases):
+        assert lumped.refuses(model) == ""
+        groups.setdefault(lumped.group(model), []).append(case)
+    for places in groups.values():
+        found.place(places, lumped.solve([cases[case] for case in places]))
+    return found
+
+
+@pytest.mark.share(0, 1, 2, 3, 5, 6, 7)
+@pytest.mark.parametrize(("law", "count"), [(law, 6 if law == "iwan" else 20) for law in LAWS])
+def test_exact_batch_is_the_single_runs(law, count):
+    cases = models(law, 1, count)
+    held_against(cases, one_by_one.solve(cases), batch(cases))
+
+
+def test_always_errors_of_few_cells_hold_the_result_of_many():
+    """Cells of a density that a tolerance asks for: the answers of all 769 lie within the bars, where small cycles
+    slip too, for which the first cells are too few."""
+    base = base_of(load(SCENE.format(law=LAWS["iwan"], kind="base", kind_size=SIZES["base"])))
+    for push in ("20 m/s^2", "2 m/s^2", "0.3 m/s^2"):
+        few = build(base.changed([f"drive.acceleration={push}", "accuracy.tolerance=1e-3"]))
+        found, best = lumped.solve([few]), lumped._solved([few], None, 0)
+        for name, value in found.values.items():
+            if np.isfinite(value[0]) and name not in ("energy_balance", "work_check"):
+                assert abs(value[0] - best.values[name][0]) <= found.errors[name][0] + found.floors[name][0], name
+                assert found.errors[name][0] <= 1e-3 * abs(value[0]) + found.floors[name][0], name
